@@ -1,0 +1,167 @@
+"""The batch engine: many missions advance slot by slot in compiled code over ``rules.py``.
+
+A lane holds one mission at a time; a finished mission makes room for the next one, so the batch stays
+full. The policies are asked once per slot for all rows that must act. What a mission does never
+depends on the others: B missions in a batch equal B single ones, in any order and grouping.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dess import rules
+from dess.record import Records, empty_records, write_record
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import (
+    World,
+    check_seed,
+    constants_of,
+    empty_scratch,
+    empty_state,
+    ranges_of,
+    spaces_of,
+    world_of,
+)
+from dess.view import View, act, acting_rows
+
+LANES = 256  # missions in flight: enough to hide Python's share, few enough for the cache
+
+
+def simulate_batch(
+    scenario: Scenario | ScenarioSpace | Sequence[Scenario | ScenarioSpace],
+    policy: Any,
+    seed: int = 0,
+    replications: Sequence[int] | int = 1,
+    *,
+    workers: int = 1,
+    lanes: int = LANES,
+    progress: Callable[[int], None] | None = None,
+) -> Records:
+    """Simulate many missions in lockstep.
+
+    Args:
+        scenario: One scenario or space for all missions, or one per mission.
+        policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
+        seed: Seed of all missions.
+        replications: Their replication numbers, or how many, counted from 0.
+        workers: Threads; the compiled code runs beside Python.
+        lanes: Missions in flight per thread.
+        progress: Called with the number of missions finished since its last call.
+
+    Returns:
+        The records, in the order of ``replications``; the same for any ``workers`` and ``lanes``.
+
+    Raises:
+        InputError: If the seed or a replication is out of range.
+        ValueError: If a policy returns something that is no action.
+    """
+    numbers = np.arange(replications) if isinstance(replications, int) else np.array(replications)
+    for number in (numbers.min(), numbers.max()) if len(numbers) else ():
+        check_seed(seed, int(number))
+    team = list(policy) if isinstance(policy, list | tuple) else [policy]
+    one = isinstance(scenario, Scenario | ScenarioSpace)
+    spaces = spaces_of([scenario] if one else scenario)
+    which = np.zeros(len(numbers), np.int64) if one else np.arange(len(numbers))
+    records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
+
+    def run(jobs: np.ndarray, group: list[ScenarioSpace], world: World) -> None:
+        _Batch(group, world, team, seed, lanes).run(jobs, which, numbers, records, progress)
+
+    tasks = []
+    for world, members in _by_world(spaces):
+        chosen = np.isin(which, members)
+        jobs = np.nonzero(chosen)[0]
+        which[jobs] = np.searchsorted(members, which[jobs])
+        group = [spaces[member] for member in members]
+        tasks += [(part, group, world) for part in np.array_split(jobs, workers) if len(part)]
+    if workers == 1:
+        for task in tasks:
+            run(*task)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            for future in [pool.submit(run, *task) for task in tasks]:
+                future.result()
+    return records
+
+
+def _by_world(spaces: list[ScenarioSpace]) -> list[tuple[World, np.ndarray]]:
+    """The scenarios grouped by what a batch must have in common."""
+
+    def key(index: int) -> tuple:
+        s = spaces[index]
+        channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
+        return (s.grid, s.communication_slots, channel, s.nodes)
+
+    ordered = sorted(range(len(spaces)), key=key)
+    groups = [np.array(sorted(members)) for _, members in groupby(ordered, key)]
+    return [(world_of(spaces[members[0]]), members) for members in groups]
+
+
+class _Batch:
+    """Lanes of missions over one world."""
+
+    def __init__(
+        self, spaces: list[ScenarioSpace], world: World, team: list, seed: int, lanes: int
+    ):
+        self.world, self.team, self.seed, self.lanes = world, team, seed, lanes
+        self.constants = np.concatenate([constants_of(space) for space in spaces])
+        self.constants["seed"] = seed
+        self.ranges = np.stack([ranges_of(space) for space in spaces])
+        self.uavs = int(self.ranges[:, 0, 1].max())
+
+    def run(self, jobs, which, numbers, records, progress) -> None:
+        """Simulate the missions ``jobs`` and write their records."""
+        lanes, nodes = min(self.lanes, len(jobs)), len(self.world.nodes)
+        state = empty_state(lanes, self.uavs, nodes)
+        scratch = empty_scratch(self.uavs, nodes)
+        job_of_lane = np.full(lanes, -1)
+        queue = np.array([0, 0])  # next job, jobs done
+        source = (self.constants, self.ranges, which, numbers, jobs)
+        for lane in range(lanes):
+            _next_mission(lane, job_of_lane, queue, source, state)
+        parties, told = len(self.team), 0
+        while queue[1] < len(jobs):
+            for party, policy in enumerate(self.team):
+                mission, uav = acting_rows(state.missions, state.uavs, parties, party)
+                if len(mission):
+                    act(policy, View(state, self.world, mission, uav))
+            _advance(job_of_lane, queue, source, state, self.world, scratch, records)
+            if progress and queue[1] > told:
+                progress(int(queue[1]) - told)
+                told = int(queue[1])
+
+
+@njit(cache=True, nogil=True)
+def _next_mission(lane, job_of_lane, queue, source, state):
+    """Put the next job into a lane; without one the lane stays empty."""
+    constants, ranges, which, numbers, jobs = source
+    mission = state.missions[lane]
+    if queue[0] == len(jobs):
+        job_of_lane[lane] = -1
+        mission.active = 0
+        return
+    job = jobs[queue[0]]
+    queue[0] += 1
+    job_of_lane[lane] = job
+    state.missions[lane] = constants[which[job]]
+    mission.replication = numbers[job]
+    rules.launch(mission, ranges[which[job]], state.uavs[lane], state.residual[lane])
+
+
+@njit(cache=True, nogil=True)
+def _advance(job_of_lane, queue, source, state, world, scratch, records):
+    """One mission slot of every lane; finished missions leave their record and make room."""
+    for lane in range(len(state.missions)):
+        if job_of_lane[lane] < 0:
+            continue
+        mission, uavs, residual = state.missions[lane], state.uavs[lane], state.residual[lane]
+        rules.advance(mission, uavs, residual, world.nodes, world.path_loss, scratch)
+        if mission.active == 0:
+            job = job_of_lane[lane]
+            write_record(mission, uavs, residual, records.missions[job], records.uavs[job])
+            queue[1] += 1
+            _next_mission(lane, job_of_lane, queue, source, state)

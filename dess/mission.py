@@ -1,0 +1,233 @@
+"""The SimPy model: one mission as processes and events.
+
+This module owns time. The mission clock opens each mission slot, fires the communication slots at
+t + n/m and the arrivals at its end; one process per UAV asks for a charging pad and gives it back;
+the charging zone is a monitored ``simpy.Resource``. Every consequence is a call of ``rules.py``.
+"""
+
+from collections.abc import Generator, Sequence
+from typing import Any
+
+import numpy as np
+import simpy
+
+from dess import rules
+from dess.record import EventLog, MissionRecord, empty_records, write_record
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import (
+    BATTERY,
+    QUOTA,
+    check_seed,
+    constants_of,
+    empty_scratch,
+    empty_state,
+    ranges_of,
+    spaces_of,
+    world_of,
+)
+from dess.view import View, act, acting_rows
+
+Process = Generator[simpy.Event, Any, None]
+
+
+def simulate(
+    scenario: Scenario | ScenarioSpace,
+    policy: Any,
+    seed: int = 0,
+    replication: int = 0,
+    *,
+    events: bool = False,
+) -> MissionRecord:
+    """Simulate one mission with the SimPy model.
+
+    Args:
+        scenario: The scenario, or the space that the replication draws its own from.
+        policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
+        seed: Seed of the study.
+        replication: Number of the replication.
+        events: Whether to keep the event log.
+
+    Raises:
+        InputError: If the seed or the replication is out of range.
+        ValueError: If a policy returns something that is no action.
+    """
+    check_seed(seed, replication)
+    team = list(policy) if isinstance(policy, list | tuple) else [policy]
+    log = EventLog() if events else None
+    return Mission(spaces_of([scenario])[0], team, seed, replication, log).run()
+
+
+class ChargingZone(simpy.Resource):
+    """The charging pads of the zone, granted first come first served; every step is logged."""
+
+    def __init__(self, env: simpy.Environment, pads: int, log: EventLog | None):
+        super().__init__(env, capacity=pads)
+        self._log = log
+
+    def record(self, event: str, time: float, i: int, u: np.void) -> None:
+        """Log ``charge_request``, ``charge_start`` or ``charge_end`` of UAV ``i``."""
+        if self._log is not None:
+            self._log.add(time, event, i, -1, u["battery"], u["x"], u["y"])
+
+
+class Mission:
+    """One mission: its clock, its UAVs and its charging zone."""
+
+    def __init__(
+        self,
+        scenario: ScenarioSpace,
+        team: Sequence[Any],
+        seed: int,
+        replication: int,
+        log: EventLog | None,
+    ):
+        self.team, self.log, self.world = team, log, world_of(scenario)
+        self.state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
+        self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
+        self.state.missions[:] = constants_of(scenario)
+        self.state.missions["seed"] = seed
+        self.state.missions["replication"] = replication
+        self.mission = self.state.missions[0]
+        self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
+        rules.launch(self.mission, ranges_of(scenario), self.uavs, self.residual)
+        self.fleet = range(int(self.mission["uavs"]))
+        self.env = simpy.Environment()
+        self.zone = ChargingZone(self.env, int(self.mission["pads"]), log)
+        self.pads: list[Any] = [None] * len(self.fleet)  # pending or granted requests
+
+    def run(self) -> MissionRecord:
+        """Run the mission to its end."""
+        self.slot_opens, self.slot_ends = self.env.event(), self.env.event()
+        self._log_state("mission_start")
+        for i in self.fleet:
+            self.env.process(self._uav(i))
+        self.env.run(self.env.process(self._clock()))
+        self._log_state("mission_end")
+        records = empty_records(1, len(self.fleet))
+        write_record(self.mission, self.uavs, self.residual, records.missions[0], records.uavs[0])
+        return MissionRecord(records.missions[0], records.uavs[0], self.log)
+
+    def _clock(self) -> Process:
+        """Open the mission slots, fire their communication slots, close them."""
+        env, mission, uavs = self.env, self.mission, self.uavs
+        m = int(mission["communication_slots"])
+        while mission["active"] > 0:
+            start = int(mission["slot"])
+            yield env.timeout(0)  # the UAVs wait for the slot, those done have given back their pads
+            self._decide()
+            rules.resolve(mission, uavs)
+            opened, self.slot_opens = self.slot_opens, env.event()
+            opened.succeed()
+            yield env.timeout(0)  # the UAVs have asked for pads or left the queue
+            self._start_charging()
+            rules.spend(mission, uavs)
+            self._log_moves()
+            for n in range(1, m + 1):
+                yield env.timeout(start + n / m - env.now)
+                rules.communicate(mission, uavs, self.residual, *self.world, self.scratch, n)
+                self._log_communications(start, n, m)
+            rules.arrive(mission, self.residual, self.scratch)
+            self._log_arrivals()
+            self._settle()
+            ended, self.slot_ends = self.slot_ends, env.event()
+            ended.succeed()
+        yield env.timeout(0)  # the last UAV gives its pad back
+
+    def _uav(self, i: int) -> Process:
+        """A UAV asks for a pad when it may charge, and gives it back when it is done or leaves.
+
+        All UAVs wait for the same two events of a slot, so they always act in index order.
+        """
+        u = self.uavs[i]
+        while u["active"]:
+            yield self.slot_opens
+            if not rules.may_charge(self.mission, u):
+                self._give_back(i)
+            elif self.pads[i] is None:
+                self.pads[i] = self.zone.request()
+                u["pad_request"] = self.mission["slot"]
+                self.zone.record("charge_request", float(self.mission["slot"]), i, u)
+            yield self.slot_ends
+            if u["pad_request"] < 0:  # charged, or out of the mission
+                self._give_back(i)
+
+    def _give_back(self, i: int) -> None:
+        """Release the pad of UAV ``i``, or leave the queue."""
+        pad, self.pads[i] = self.pads[i], None
+        if pad is None:
+            return
+        self.uavs[i]["pad_request"] = -1
+        if pad.triggered:
+            self.zone.release(pad)
+        else:
+            pad.cancel()
+
+    def _start_charging(self) -> None:
+        """UAVs that were granted a pad by now charge in this slot."""
+        for i in self.fleet:
+            pad, u = self.pads[i], self.uavs[i]
+            if pad is not None and pad.triggered and not u["charging"]:
+                u["charging"] = True
+                self.zone.record("charge_start", float(self.mission["slot"]), i, u)
+
+    def _decide(self) -> None:
+        parties = len(self.team)
+        for party, policy in enumerate(self.team):
+            mission, uav = acting_rows(self.state.missions, self.state.uavs, parties, party)
+            if len(mission):
+                act(policy, View(self.state, self.world, mission, uav))
+
+    def _settle(self) -> None:
+        """Close the slot; log the charging sessions and the UAVs that ended with it."""
+        before = self.uavs.copy() if self.log is not None else None
+        rules.settle(self.mission, self.uavs)
+        if before is None or self.log is None:
+            return
+        time = float(self.mission["slot"])
+        for i in self.fleet:
+            was, u = before[i], self.uavs[i]
+            if was["charging"] and not u["charging"]:
+                self.zone.record("charge_end", time, i, u)
+            if was["active"] and u["end"] == QUOTA:
+                self.log.add(time, "quota_filled", i, -1, u["communications"], u["x"], u["y"])
+            if was["active"] and u["end"] == BATTERY:
+                self.log.add(time, "battery_empty", i, -1, u["battery"], u["x"], u["y"])
+
+    def _log_state(self, event: str) -> None:
+        if self.log is None:
+            return
+        time = float(self.mission["slot"])
+        for i in self.fleet:
+            u = self.uavs[i]
+            self.log.add(time, event, i, -1, u["battery"], u["x"], u["y"])
+        for k, (x, y) in enumerate(self.world.nodes):
+            self.log.add(time, event, -1, k, self.residual[k], x, y)
+
+    def _log_moves(self) -> None:
+        if self.log is None:
+            return
+        time = float(self.mission["slot"])
+        for i in self.fleet:
+            u = self.uavs[i]
+            if u["active"]:
+                if u["overruled"]:
+                    self.log.add(time, "collision", i, -1, u["action"], u["x"], u["y"])
+                self.log.add(time, "move", i, -1, u["battery"], u["x"], u["y"])
+
+    def _log_communications(self, start: int, n: int, m: int) -> None:
+        if self.log is None:
+            return
+        for i in self.fleet:
+            u = self.uavs[i]
+            if u["active"] and u["served"] >= 0:
+                x = u["from_x"] + (u["x"] - u["from_x"]) * n / m
+                y = u["from_y"] + (u["y"] - u["from_y"]) * n / m
+                self.log.add(start + n / m, "communication", i, u["served"], u["amount"], x, y)
+
+    def _log_arrivals(self) -> None:
+        if self.log is None or self.mission["arrival_rate"] == 0:
+            return
+        time = float(self.mission["slot"] + 1)
+        for k in np.nonzero(self.scratch.arrivals)[0]:
+            x, y = self.world.nodes[k]
+            self.log.add(time, "arrival", -1, k, self.scratch.arrivals[k], x, y)

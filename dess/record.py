@@ -1,0 +1,188 @@
+"""What a mission leaves: one row of metrics, one row per UAV and, if asked, the event log."""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from dess.state import END_NAMES, QUOTA
+
+# One mission. Data in data units, rewards summed over the slots and the UAVs (eq. 14).
+MISSION_RECORD = np.dtype(
+    [
+        ("seed", np.uint64),
+        ("replication", np.int64),
+        ("uavs", np.int64),
+        ("flying_time", np.int64),
+        ("charge_start", np.int64),
+        ("charge_complete", np.int64),
+        ("slots", np.int64),
+        ("uav_slots", np.int64),
+        ("success", np.int64),
+        ("collection_ratio", np.float64),
+        ("collection_ratio_and_communication", np.float64),
+        ("initial", np.float64),
+        ("arrived", np.float64),
+        ("collected", np.float64),
+        ("residual", np.float64),
+        ("reward", np.float64),
+    ]
+)
+
+# One UAV of a mission; absent ones of a batch have end 0.
+UAV_RECORD = np.dtype(
+    [
+        ("quota", np.int64),  # communications counted toward the quota
+        ("battery", np.int64),
+        ("slots_flying", np.int64),
+        ("slots_charging", np.int64),
+        ("slots_waiting", np.int64),
+        ("end", np.int64),
+        ("collected", np.float64),
+        ("reward", np.float64),
+    ]
+)
+
+EVENT_NAMES = (
+    "mission_start",
+    "move",
+    "collision",
+    "charge_request",
+    "charge_start",
+    "charge_end",
+    "communication",
+    "arrival",
+    "quota_filled",
+    "battery_empty",
+    "mission_end",
+)
+
+
+class Records(NamedTuple):
+    """The records of N missions: ``missions`` (N,) and ``uavs`` (N, I)."""
+
+    missions: np.ndarray
+    uavs: np.ndarray
+
+
+@njit(cache=True)
+def write_record(mission, uavs, residual, record, uav_records):
+    """Write the record of a finished mission into a ``MISSION_RECORD`` and (I,) ``UAV_RECORD``."""
+    record.seed = mission.seed
+    record.replication = mission.replication
+    record.uavs = mission.uavs
+    record.flying_time = mission.flying_time
+    record.charge_start = mission.charge_start
+    record.charge_complete = mission.charge_complete
+    record.slots = mission.slot
+    record.initial = mission.initial
+    record.arrived = mission.arrived
+    record.collected = mission.collected
+    record.residual = 0.0
+    for k in range(mission.nodes):
+        record.residual += residual[k]
+    record.uav_slots = 0
+    record.success = 1
+    record.reward = 0.0
+    for i in range(mission.uavs):
+        u, out = uavs[i], uav_records[i]
+        out.quota = u.communications
+        out.battery = u.battery
+        out.slots_flying = u.slots_flying
+        out.slots_charging = u.slots_charging
+        out.slots_waiting = u.slots_waiting
+        out.end = u.end
+        out.collected = u.collected
+        out.reward = u.total_reward
+        record.uav_slots += u.slots_flying + u.slots_charging
+        record.reward += u.total_reward
+        if u.end != QUOTA:
+            record.success = 0
+    total = record.initial + record.arrived
+    record.collection_ratio = record.collected / total if total > 0.0 else 1.0
+    record.collection_ratio_and_communication = record.collection_ratio * record.success
+
+
+def empty_records(missions: int, uavs: int) -> Records:
+    """Zeroed records of that many missions and UAVs per mission."""
+    return Records(np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD))
+
+
+@dataclass
+class EventLog:
+    """The events of one mission as columns, in the order in which they happened.
+
+    ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per node
+    (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering included:
+    the cell after the slot's action, ``value`` the battery at the end of the slot. ``communication``
+    and ``arrival`` carry data units, ``quota_filled`` the communications, ``collision`` the
+    action that was overruled, the charging events the battery. ``uav`` and ``node`` are -1 where an event has none.
+    """
+
+    time: list[float] = field(default_factory=list)
+    event: list[str] = field(default_factory=list)
+    uav: list[int] = field(default_factory=list)
+    node: list[int] = field(default_factory=list)
+    value: list[float] = field(default_factory=list)
+    x: list[float] = field(default_factory=list)
+    y: list[float] = field(default_factory=list)
+
+    def add(
+        self, time: float, event: str, uav: int, node: int, value: float, x: float, y: float
+    ) -> None:
+        """Append one event at ``time`` [mission slots] and position ``x, y`` [cells]."""
+        self.time.append(time)
+        self.event.append(event)
+        self.uav.append(uav)
+        self.node.append(node)
+        self.value.append(value)
+        self.x.append(x)
+        self.y.append(y)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """The log as named columns."""
+        return {
+            "time": np.array(self.time, np.float64),
+            "event": np.array(self.event, object),
+            "uav": np.array(self.uav, np.int64),
+            "node": np.array(self.node, np.int64),
+            "value": np.array(self.value, np.float64),
+            "x": np.array(self.x, np.float64),
+            "y": np.array(self.y, np.float64),
+        }
+
+
+@dataclass(frozen=True)
+class MissionRecord:
+    """What one mission left.
+
+    Attributes:
+        metrics: ``MISSION_RECORD`` scalar.
+        uavs: (I,) ``UAV_RECORD`` array.
+        events: The event log, if it was asked for.
+    """
+
+    metrics: np.void
+    uavs: np.ndarray
+    events: EventLog | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        if name in MISSION_RECORD.names:
+            return self.metrics[name].item()
+        raise AttributeError(name)
+
+    def uav_rows(self) -> list[dict[str, Any]]:
+        """Per UAV its quota count, battery, charging slots and how its mission ended."""
+        return [
+            {
+                "quota": int(u["quota"]),
+                "battery": int(u["battery"]),
+                "slots_charging": int(u["slots_charging"]),
+                "end": END_NAMES[u["end"]],
+            }
+            for u in self.uavs
+        ]

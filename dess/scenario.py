@@ -1,0 +1,296 @@
+"""Scenarios: every constant of the model, and the ranges that a mission's scenario is drawn from."""
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from dess.errors import InputError
+
+Cell = tuple[int, int]
+
+# Section VI-A: all combinations of five columns and five rows.
+PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
+
+# The parameters that vary from mission to mission (Table II). The order fixes their draws.
+SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
+
+# An integer as such: neither 2.0 nor true nor "2" is taken for one.
+Integer = Annotated[int, Field(strict=True)]
+# A finite number; an integer will do.
+Number = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Constants(BaseModel):
+    """What a scenario and a space of scenarios have in common: all that is not sampled."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    # World
+    grid: Integer = Field(32, ge=2, le=256, description="cells along one side of the square grid (M)")
+    cell_size: Number = Field(800.0, gt=0, description="side of a cell [m] (c)")
+    altitude: Number = Field(10.0, gt=0, description="flying altitude [m] (h)")
+    nodes: tuple[Cell, ...] = Field(
+        PAPER_NODES, min_length=1, max_length=1024, description="cells [x, y] of the sensor nodes"
+    )
+    zone: tuple[int, int, int, int] = Field(
+        (26, 2, 4, 4), description="start and charging zone: [x, y, width, height] in cells (L)"
+    )
+    pads: Integer | None = Field(
+        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+    forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
+
+    # Time
+    slot_length: Number = Field(1.0, gt=0, description="length of a mission slot (delta_t)")
+    communication_slots: Integer = Field(
+        4, ge=1, le=64, description="communication slots in a mission slot (m)"
+    )
+    max_slots: Integer = Field(
+        500, ge=1, le=100_000, description="mission slots after which a mission is truncated"
+    )
+
+    # Energy
+    charge_rate: Integer = Field(10, ge=1, le=100, description="battery gained in a charging slot [%]")
+
+    # Channel
+    edge_snr: Number = Field(-25.0, description="mean SNR at half the grid's diagonal [dB]")
+    path_loss_exponent: Number = Field(2.27, gt=0, le=10, description="path loss exponent (alpha)")
+    shadowing_variance: Number = Field(2.0, ge=0, le=400, description="variance of shadowing [dB^2]")
+
+    # Data
+    initial_data: tuple[Number, Number] = Field(
+        (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
+    )
+    arrival_rate: Number = Field(
+        0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
+    )
+    quota: Integer = Field(
+        440, ge=1, le=1_000_000, description="communication slots that a UAV must fill (U_C)"
+    )
+
+    # Reward (Table III)
+    reward_data: Number = Field(1.3, description="per data unit that the team collects (alpha)")
+    reward_overruled: Number = Field(-1.0, description="overruled by the safety controller (beta)")
+    reward_depleted: Number = Field(-300.0, description="battery empty without quota (nu)")
+    reward_charging: Number = Field(0.05, description="per charging slot (c)")
+    reward_quota: Number = Field(100.0, description="quota filled (omega)")
+    reward_step: Number = Field(-0.1, description="per mission slot (zeta)")
+
+    @field_validator("nodes", "zone", mode="before")
+    @classmethod
+    def _lists_to_tuples(cls, value: Any) -> Any:
+        return _tuples(value)
+
+    @field_validator("initial_data", mode="before")
+    @classmethod
+    def _number_to_range(cls, value: Any) -> Any:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        return (value, value) if is_number else _tuples(value)
+
+    @model_validator(mode="after")
+    def _fits_the_grid(self) -> Self:
+        x, y, width, height = self.zone
+        if min(x, y) < 0 or min(width, height) < 1 or max(x + width, y + height) > self.grid:
+            raise ValueError(
+                f"zone: {list(self.zone)} does not lie on the {self.grid} x {self.grid} grid; "
+                "allowed: [x, y, width, height] with 0 <= x, y and x + width, y + height <= grid"
+            )
+        for node in self.nodes:
+            if not all(0 <= coordinate < self.grid for coordinate in node):
+                raise ValueError(
+                    f"nodes: {list(node)} is off the grid; allowed: 0 <= x, y < {self.grid}"
+                )
+        if len(set(self.nodes)) < len(self.nodes):
+            twice = next(node for node in self.nodes if self.nodes.count(node) > 1)
+            raise ValueError(f"nodes: {list(twice)} is listed twice; allowed: distinct cells")
+        if self.pads is not None and self.pads > self.zone_cells:
+            raise ValueError(
+                f"pads: {self.pads} is more than the zone has cells; allowed: 1..{self.zone_cells}"
+            )
+        low, high = self.initial_data
+        if not 0 <= low <= high:
+            raise ValueError(
+                f"initial_data: {[low, high]} is no range; allowed: a number >= 0 "
+                "or [low, high] with 0 <= low <= high"
+            )
+        return self
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of cells of the start and charging zone."""
+        return self.zone[2] * self.zone[3]
+
+    def to_toml(self) -> str:
+        """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+
+
+class Scenario(_Constants):
+    """Every constant of one mission (Sections II and VI-A of the paper), frozen and validated.
+
+    Raises:
+        InputError: From ``Scenario.of``, for unknown keys, wrong types and values out of range.
+    """
+
+    uavs: Integer = Field(2, ge=1, le=64, description="number of UAVs (I)")
+    flying_time: Integer = Field(75, ge=1, le=100, description="battery at the start [%] (b(0))")
+    charge_start: Integer = Field(
+        30, ge=10, le=100, description="battery at which charging may start [%] (C_S)"
+    )
+    charge_complete: Integer = Field(
+        80, ge=10, le=100, description="battery at which charging ends [%] (C_C)"
+    )
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        _check_ranges({name: (getattr(self, name),) * 2 for name in SAMPLED}, self.zone_cells)
+        return self
+
+    @classmethod
+    def of(cls, **values: Any) -> Self:
+        """A scenario of the given values, the paper's for all others; one-line errors."""
+        return _validated(cls, values, "scenario")
+
+
+IntegerRange = tuple[Integer, Integer]
+
+
+class ScenarioSpace(_Constants):
+    """The ranges that a mission's scenario is drawn from (Table II), both ends included.
+
+    A single value is a range of one. A range that is narrowed or fixed does not change the draws
+    of the others.
+    """
+
+    uavs: IntegerRange = Field((1, 3), description="number of UAVs (I): an integer or [low, high]")
+    flying_time: IntegerRange = Field(
+        (70, 80), description="battery at the start [%] (b(0)): an integer or [low, high]"
+    )
+    charge_start: IntegerRange = Field(
+        (10, 50),
+        description="battery at which charging may start [%] (C_S): an integer or [low, high]",
+    )
+    charge_complete: IntegerRange = Field(
+        (60, 100), description="battery at which charging ends [%] (C_C): an integer or [low, high]"
+    )
+
+    @field_validator(*SAMPLED, mode="before")
+    @classmethod
+    def _integer_to_range(cls, value: Any) -> Any:
+        is_integer = isinstance(value, int) and not isinstance(value, bool)
+        return (value, value) if is_integer else _tuples(value)
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        _check_ranges({name: getattr(self, name) for name in SAMPLED}, self.zone_cells)
+        return self
+
+    @classmethod
+    def of(cls, scenario: "Scenario | ScenarioSpace | None" = None, **values: Any) -> "ScenarioSpace":
+        """A space of the given values, on top of a scenario or space (default: the paper's)."""
+        base = scenario.model_dump() if scenario is not None else {}
+        return _validated(cls, base | values, "scenario")
+
+    def scenario_at(self, **parameters: int) -> Scenario:
+        """The scenario with the given value for each sampled parameter."""
+        return Scenario.of(**(self.model_dump() | parameters))
+
+
+def load_scenario(name_or_path: str | Path = "paper", **overrides: Any) -> ScenarioSpace:
+    """A shipped scenario by name, or one from a TOML file.
+
+    Args:
+        name_or_path: One of ``scenario_names()``, or the path of a TOML file.
+        **overrides: Fields to set on top; setting a sampled field fixes it.
+
+    Raises:
+        InputError: If there is no such scenario, or it is not valid.
+    """
+    text = str(name_or_path)
+    if text in scenario_names():
+        where = f"scenario {text}"
+        content = resources.files("dess").joinpath(f"scenarios/{text}.toml").read_text("utf-8")
+    else:
+        where = text
+        content = _read_file(text)
+    return _validated(ScenarioSpace, parse_toml(content, where) | overrides, where)
+
+
+def scenario_names() -> list[str]:
+    """The names of the shipped scenarios."""
+    folder = resources.files("dess").joinpath("scenarios")
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """TOML text as a dictionary.
+
+    Raises:
+        InputError: If the text is no TOML; ``where`` says where it came from.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where}: not valid TOML: {error}") from None
+
+
+def validation_line(error: ValidationError, where: str) -> str:
+    """The first complaint of pydantic as one line: where, key, what, and what is allowed."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "extra_forbidden":
+        model = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}.get(error.title)
+        allowed = f"; allowed: {', '.join(sorted(model.model_fields))}" if model else ""
+        return f"{where}: {key}: unknown key{allowed}"
+    if first["type"] == "value_error":
+        return f"{where}: {key + ': ' if key else ''}{message}"
+    return f"{where}: {key}: {message}, not {first['input']!r}"
+
+
+def _validated(model: type, values: dict[str, Any], where: str) -> Any:
+    try:
+        return model.model_validate(values)  # type: ignore[attr-defined]
+    except ValidationError as error:
+        raise InputError(validation_line(error, where)) from None
+
+
+def _read_file(path: str) -> str:
+    try:
+        return Path(path).read_text("utf-8")
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: no such scenario; allowed: {', '.join(scenario_names())}, or a TOML file"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None
+
+
+def _tuples(value: Any) -> Any:
+    """Lists, as TOML gives them, to tuples, at any depth."""
+    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def _check_ranges(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
+    """The rules between sampled parameters, which every combination must keep (eq. 1)."""
+    limits = {
+        "uavs": (1, zone_cells, "number of cells of the zone"),
+        "flying_time": (1, 100, "battery capacity"),
+        "charge_start": (10, 100, "eq. 1"),
+        "charge_complete": (10, 100, "eq. 1"),
+    }
+    for name, (low, high) in ranges.items():
+        least, most, reason = limits[name]
+        if not least <= low <= high <= most:
+            shown = low if low == high else [low, high]
+            raise ValueError(f"{name}: {shown} is not within {least}..{most} ({reason})")
+    start, complete = ranges["charge_start"][1], ranges["charge_complete"][0]
+    if start >= complete:
+        raise ValueError(
+            f"charge_start: {start} is not below charge_complete {complete}; "
+            "allowed: 10 <= charge_start < charge_complete <= 100 (eq. 1)"
+        )

@@ -1,0 +1,227 @@
+"""The state of B missions x I UAVs x K nodes as plain arrays; one mission is B = 1."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from dess import streams
+from dess.errors import InputError
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+
+NORTH, EAST, SOUTH, WEST, HOVER = range(5)
+ACTION_NAMES = ("north", "east", "south", "west", "hover")
+# Steps [cells] of the actions; y grows south.
+STEP_X = np.array([0, 1, 0, -1, 0])
+STEP_Y = np.array([-1, 0, 1, 0, 0])
+
+# How a UAV's mission ended; ACTIVE while it has not.
+ACTIVE, QUOTA, BATTERY, TRUNCATED = range(4)
+END_NAMES = ("active", "quota", "battery", "truncated")
+
+# One mission: the constants of its scenario, then its progress.
+MISSION = np.dtype(
+    [
+        ("seed", np.uint64),
+        ("replication", np.int64),
+        # world
+        ("grid", np.int64),
+        ("nodes", np.int64),
+        ("zone_x", np.int64),
+        ("zone_y", np.int64),
+        ("zone_width", np.int64),
+        ("zone_height", np.int64),
+        ("pads", np.int64),
+        ("forbid_swaps", np.int64),
+        # time
+        ("communication_slots", np.int64),
+        ("max_slots", np.int64),
+        # fleet and energy
+        ("uavs", np.int64),
+        ("flying_time", np.int64),
+        ("charge_start", np.int64),
+        ("charge_complete", np.int64),
+        ("charge_rate", np.int64),
+        ("quota", np.int64),
+        # channel and data
+        ("communication_slot_length", np.float64),
+        ("shadowing_deviation", np.float64),
+        ("initial_low", np.float64),
+        ("initial_high", np.float64),
+        ("arrival_rate", np.float64),
+        # reward weights
+        ("reward_data", np.float64),
+        ("reward_overruled", np.float64),
+        ("reward_depleted", np.float64),
+        ("reward_charging", np.float64),
+        ("reward_quota", np.float64),
+        ("reward_step", np.float64),
+        # progress
+        ("slot", np.int64),  # mission slots done
+        ("active", np.int64),  # UAVs still active
+        ("initial", np.float64),  # data units
+        ("arrived", np.float64),
+        ("collected", np.float64),
+        ("slot_collected", np.float64),  # in the present slot
+    ]
+)
+
+# One UAV: its state, and what happened to it in the present slot.
+UAV = np.dtype(
+    [
+        ("x", np.int64),
+        ("y", np.int64),
+        ("from_x", np.int64),  # cell at the start of the slot
+        ("from_y", np.int64),
+        ("battery", np.int64),
+        ("communications", np.int64),  # counted toward the quota
+        ("action", np.int64),  # asked for
+        ("executed", np.int64),  # after the safety controller
+        ("end", np.int64),
+        ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 without
+        ("slots_flying", np.int64),
+        ("slots_charging", np.int64),
+        ("slots_waiting", np.int64),  # for a pad
+        ("served", np.int64),  # node served in the present communication slot, -1 for none
+        ("active", np.bool_),
+        ("latch", np.bool_),  # charging latch iota
+        ("charging", np.bool_),  # holds a pad
+        ("overruled", np.bool_),
+        ("amount", np.float64),  # collected in the present communication slot
+        ("collected", np.float64),  # in the mission
+        ("reward", np.float64),  # of the present slot
+        ("total_reward", np.float64),
+    ],
+    align=True,
+)
+
+
+class State(NamedTuple):
+    """The state of B missions: ``missions`` (B,), ``uavs`` (B, I), ``residual`` (B, K)."""
+
+    missions: np.ndarray
+    uavs: np.ndarray
+    residual: np.ndarray
+
+
+class World(NamedTuple):
+    """What all missions of a batch share.
+
+    Attributes:
+        nodes: (K, 2) cells of the sensor nodes.
+        path_loss: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
+            and ``b / m`` cells along the other: the lattice of all positions a UAV can serve from.
+    """
+
+    nodes: np.ndarray
+    path_loss: np.ndarray
+
+
+class Scratch(NamedTuple):
+    """Working memory of one mission slot: the shadowing words drawn so far.
+
+    Attributes:
+        words: (I, K, 4) the words of four communication slots per UAV and node.
+        drawn: (I, K) the tick at which they were drawn.
+        tick: (1,) number of the present group of four communication slots.
+        arrivals: (K,) new data of the present slot.
+    """
+
+    words: np.ndarray
+    drawn: np.ndarray
+    tick: np.ndarray
+    arrivals: np.ndarray
+
+
+def empty_state(missions: int, uavs: int, nodes: int) -> State:
+    """A zeroed state of that many missions, UAVs per mission and nodes."""
+    return State(
+        np.zeros(missions, MISSION), np.zeros((missions, uavs), UAV), np.zeros((missions, nodes))
+    )
+
+
+def empty_scratch(uavs: int, nodes: int) -> Scratch:
+    """Working memory for missions of at most that many UAVs and nodes."""
+    return Scratch(
+        np.zeros((uavs, nodes, 4), np.uint64),
+        np.zeros((uavs, nodes), np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(nodes, np.int64),
+    )
+
+
+@lru_cache(maxsize=64)
+def world_of(scenario: ScenarioSpace) -> World:
+    """The nodes and the path loss table of a scenario (eq. 10, in dB)."""
+    m, grid = scenario.communication_slots, scenario.grid
+    coarse = np.arange(grid)[:, None]
+    fine = np.arange(m * (grid - 1) + 1)[None, :] / m
+    horizontal = scenario.cell_size * np.hypot(coarse, fine)
+    distance = np.hypot(horizontal, scenario.altitude)
+    edge = np.sqrt(2) / 2 * grid * scenario.cell_size
+    path_loss = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
+    nodes = np.array(scenario.nodes, np.int64)
+    for array in (nodes, path_loss):
+        array.setflags(write=False)
+    return World(nodes, path_loss)
+
+
+def constants_of(scenario: ScenarioSpace) -> np.ndarray:
+    """A (1,) ``MISSION`` array with the constants of a scenario; sampled parameters at their low end."""
+    mission = np.zeros(1, MISSION)
+    for field in MISSION.names:
+        if field in SAMPLED:
+            mission[field] = getattr(scenario, field)[0]
+        elif field != "nodes" and field in type(scenario).model_fields:
+            value = getattr(scenario, field)
+            mission[field] = scenario.zone_cells if field == "pads" and value is None else value
+    mission["nodes"] = len(scenario.nodes)
+    for field, value in zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True):
+        mission[field] = value
+    mission["initial_low"], mission["initial_high"] = scenario.initial_data
+    mission["communication_slot_length"] = scenario.slot_length / scenario.communication_slots
+    mission["shadowing_deviation"] = np.sqrt(scenario.shadowing_variance)
+    return mission
+
+
+def ranges_of(scenario: ScenarioSpace) -> np.ndarray:
+    """(4, 2) low and high end of the sampled parameters, in the order of ``SAMPLED``."""
+    return np.array([getattr(scenario, name) for name in SAMPLED], np.int64)
+
+
+@njit(cache=True)
+def draw_parameters(mission, ranges):
+    """Draw the sampled parameters of a mission from their ranges (Table II)."""
+    w0, w1, w2, w3 = streams.block(mission.seed, mission.replication, streams.PARAMETERS, 0, 0, 0)
+    mission.uavs = streams.integer(w0, ranges[0, 0], ranges[0, 1])
+    mission.flying_time = streams.integer(w1, ranges[1, 0], ranges[1, 1])
+    mission.charge_start = streams.integer(w2, ranges[2, 0], ranges[2, 1])
+    mission.charge_complete = streams.integer(w3, ranges[3, 0], ranges[3, 1])
+
+
+def sample_scenario(scenario: ScenarioSpace, seed: int, replication: int) -> Scenario:
+    """The scenario of one replication: the sampled parameters drawn, all else as given."""
+    check_seed(seed, replication)
+    missions = constants_of(scenario)
+    missions["seed"], missions["replication"] = seed, replication
+    draw_parameters(missions[0], ranges_of(scenario))
+    return scenario.scenario_at(**{name: int(missions[name][0]) for name in SAMPLED})
+
+
+def check_seed(seed: int, replication: int) -> None:
+    """Refuse seeds and replications outside the counter space.
+
+    Raises:
+        InputError: If one is out of range.
+    """
+    if not 0 <= seed <= streams.MAX_SEED:
+        raise InputError(f"seed: {seed} is out of range; allowed: 0..2**64-1")
+    if not 0 <= replication <= streams.MAX_REPLICATION:
+        raise InputError(f"replication: {replication} is out of range; allowed: 0..2**32-1")
+
+
+def spaces_of(scenarios: Sequence[Scenario | ScenarioSpace]) -> list[ScenarioSpace]:
+    """Each scenario as a space, a space as it is."""
+    return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in scenarios]

@@ -1,0 +1,176 @@
+"""All randomness, as a pure function of its coordinates.
+
+Every exogenous draw is a function of ``(seed, replication, stream, slot, sub-slot, UAV, node)``
+through the counter-based generator Philox 4x32-10 (Salmon et al., SC'11). Nothing is
+remembered between draws, so a replication alone equals the same one inside any sweep, two
+policies meet the same sea, and no draw is made that is not needed.
+
+One Philox block is four 32-bit words. The seed is the key; the counter words are ``index``,
+``slot``, ``stream`` with its lanes, and ``replication``.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+# Streams: the purpose of a draw. Each is a separate, never overlapping part of the counter space.
+PARAMETERS = 0  # the sampled parameters of a mission's scenario
+START = 1  # start cells
+INITIAL_DATA = 2  # initial data per node
+SHADOWING = 3  # shadow fading per UAV, node and communication slot
+ARRIVAL = 4  # new data per node and mission slot
+POLICY = 5  # a policy's own randomness
+
+MAX_SEED = 2**64 - 1
+MAX_REPLICATION = 2**32 - 1
+
+_MASK = np.uint64(0xFFFFFFFF)
+_SHIFT = np.uint64(32)
+_MULTIPLIER_0 = np.uint64(0xD2511F53)
+_MULTIPLIER_1 = np.uint64(0xCD9E8D57)
+_WEYL_0 = np.uint64(0x9E3779B9)
+_WEYL_1 = np.uint64(0xBB67AE85)
+
+
+@njit(cache=True)
+def philox(c0, c1, c2, c3, k0, k1):
+    """Philox 4x32-10: four random 32-bit words of a counter and a key.
+
+    Args:
+        c0, c1, c2, c3: Counter words, ``uint64`` below 2**32.
+        k0, k1: Key words, ``uint64`` below 2**32.
+
+    Returns:
+        Four ``uint64`` below 2**32.
+    """
+    for _ in range(10):
+        p0 = _MULTIPLIER_0 * c0
+        p1 = _MULTIPLIER_1 * c2
+        c0 = (p1 >> _SHIFT) ^ c1 ^ k0
+        c1 = p1 & _MASK
+        c2 = (p0 >> _SHIFT) ^ c3 ^ k1
+        c3 = p0 & _MASK
+        k0 = (k0 + _WEYL_0) & _MASK
+        k1 = (k1 + _WEYL_1) & _MASK
+    return c0, c1, c2, c3
+
+
+@njit(cache=True)
+def block(seed, replication, stream, lane, slot, index):
+    """Four random 32-bit words of the coordinates of a draw.
+
+    Args:
+        seed: Seed of the study, ``uint64``.
+        replication: Number of the replication, below 2**32.
+        stream: Purpose of the draw, one of this module's stream constants.
+        lane: Second coordinate inside the stream (UAV and group of sub-slots), below 2**24.
+        slot: Mission slot, below 2**32.
+        index: Running number (node, or group of four nodes), below 2**32.
+
+    Returns:
+        Four ``uint64`` below 2**32.
+    """
+    key = np.uint64(seed)
+    return philox(
+        np.uint64(index),
+        np.uint64(slot),
+        (np.uint64(stream) << np.uint64(24)) | np.uint64(lane),
+        np.uint64(replication),
+        key & _MASK,
+        key >> _SHIFT,
+    )
+
+
+@njit(cache=True)
+def uniform(word):
+    """A number in the open interval (0, 1) of a 32-bit word."""
+    return (np.float64(word) + 0.5) * 2.0**-32
+
+
+@njit(cache=True)
+def integer(word, low, high):
+    """An integer in ``low..high``, both included, of a 32-bit word (bias below (high-low)/2**32)."""
+    span = np.uint64(high - low + 1)
+    return low + np.int64((np.uint64(word) * span) >> _SHIFT)
+
+
+@njit(cache=True)
+def poisson(word, rate):
+    """A Poisson deviate of a 32-bit word, by inversion.
+
+    Args:
+        word: 32-bit word.
+        rate: Mean, at most 100.
+
+    Returns:
+        A non-negative integer.
+    """
+    u = uniform(word)
+    count = 0
+    term = math.exp(-rate)
+    total = term
+    while u > total and term > 0.0:
+        count += 1
+        term *= rate / count
+        total += term
+    return count
+
+
+@njit(cache=True)
+def normal(word):
+    """A standard normal deviate of a 32-bit word, by inversion.
+
+    Wichura's algorithm AS 241 (PPND16), relative error about 1e-16. The result rises with the
+    word and is bounded: ``abs(normal(word)) <= MAX_NORMAL``.
+    """
+    q = uniform(word) - 0.5
+    if abs(q) <= 0.425:
+        r = 0.180625 - q * q
+        numerator = (
+            (((((((2.5090809287301226727e3 * r + 3.3430575583588128105e4) * r
+            + 6.7265770927008700853e4) * r + 4.5921953931549871457e4) * r
+            + 1.3731693765509461125e4) * r + 1.9715909503065514427e3) * r
+            + 1.3314166789178437745e2) * r + 3.3871328727963666080e0)
+        )  # fmt: skip
+        denominator = (
+            (((((((5.2264952788528545610e3 * r + 2.8729085735721942674e4) * r
+            + 3.9307895800092710610e4) * r + 2.1213794301586595867e4) * r
+            + 5.3941960214247511077e3) * r + 6.8718700749205790830e2) * r
+            + 4.2313330701600911252e1) * r + 1.0)
+        )  # fmt: skip
+        return q * numerator / denominator
+    r = math.sqrt(-math.log(0.5 - abs(q)))
+    if r <= 5.0:
+        r -= 1.6
+        numerator = (
+            (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r
+            + 2.41780725177450611770e-1) * r + 1.27045825245236838258e0) * r
+            + 3.64784832476320460504e0) * r + 5.76949722146069140550e0) * r
+            + 4.63033784615654529590e0) * r + 1.42343711074968357734e0)
+        )  # fmt: skip
+        denominator = (
+            (((((((1.05075007164441684324e-9 * r + 5.475938084995344946e-4) * r
+            + 1.51986665636164571966e-2) * r + 1.48103976427480074590e-1) * r
+            + 6.89767334985100004550e-1) * r + 1.67638483018380384940e0) * r
+            + 2.05319162663775882187e0) * r + 1.0)
+        )  # fmt: skip
+    else:  # beyond |z| = 5, the outermost 6e-7 of the words
+        r -= 5.0
+        numerator = (
+            (((((((2.01033439929228813265e-7 * r + 2.71155556874348757815e-5) * r
+            + 1.24266094738807843860e-3) * r + 2.65321895265761230930e-2) * r
+            + 2.96560571828504891230e-1) * r + 1.78482653991729133580e0) * r
+            + 5.46378491116411436990e0) * r + 6.65790464350110377720e0)
+        )  # fmt: skip
+        denominator = (
+            (((((((2.04426310338993978564e-15 * r + 1.4215117583164458887e-7) * r
+            + 1.8463183175100546818e-5) * r + 7.868691311456132591e-4) * r
+            + 1.48753612908506148525e-2) * r + 1.36929880922735805310e-1) * r
+            + 5.99832206555887937690e-1) * r + 1.0)
+        )  # fmt: skip
+    z = numerator / denominator
+    return z if q > 0.0 else -z
+
+
+MAX_NORMAL = 6.34  # a bound: normal(2**32 - 1) is 6.33796

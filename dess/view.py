@@ -1,0 +1,112 @@
+"""What the UAVs that must act may know, and how their actions enter the state."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from dess.state import HOVER, STEP_X, STEP_Y, State, World
+
+
+class View:
+    """What the UAVs that must act may know; one row per UAV, in however many missions.
+
+    Policies read it and never write to it. R rows, K nodes, I UAVs in the largest mission.
+
+    Attributes:
+        state: The arrays of the batch that the rows belong to.
+        world: The nodes and the path loss table.
+        mission: (R,) index of each row's mission in ``state``.
+        uav: (R,) index of each row's UAV in its mission.
+    """
+
+    def __init__(self, state: State, world: World, mission: np.ndarray, uav: np.ndarray):
+        self.state, self.world, self.mission, self.uav = state, world, mission, uav
+
+    def __len__(self) -> int:
+        return len(self.mission)
+
+    @cached_property
+    def constants(self) -> np.ndarray:
+        """(R,) ``MISSION`` records: the scenario's constants and the progress of each row's mission."""
+        return self.state.missions[self.mission]
+
+    @cached_property
+    def own(self) -> np.ndarray:
+        """(R,) ``UAV`` records: each row's own state."""
+        return self.state.uavs[self.mission, self.uav]
+
+    @cached_property
+    def team(self) -> np.ndarray:
+        """(R, I) ``UAV`` records of each row's whole team, itself included; absent ones inactive."""
+        return self.state.uavs[self.mission]
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """(R, K) residual data of the nodes [data units]."""
+        return self.state.residual[self.mission]
+
+    @cached_property
+    def legal(self) -> np.ndarray:
+        """(R, 5) mask of the legal actions: those that stay on the grid; Hover is always legal."""
+        return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)
+
+
+@njit(cache=True)
+def legal_actions(missions, uavs, rows_mission, rows_uav):
+    """(R, 5) mask of the actions that stay on the grid; a charging UAV has Hover alone."""
+    legal = np.zeros((len(rows_mission), 5), np.bool_)
+    for row in range(len(rows_mission)):
+        b = rows_mission[row]
+        own = uavs[b, rows_uav[row]]
+        legal[row, HOVER] = True
+        if own.charging:
+            continue
+        for action in range(4):
+            x, y = own.x + STEP_X[action], own.y + STEP_Y[action]
+            legal[row, action] = 0 <= x < missions[b].grid and 0 <= y < missions[b].grid
+    return legal
+
+
+@njit(cache=True)
+def acting_rows(missions, uavs, parties, party):
+    """(R,) mission and (R,) UAV index of the UAVs that must act: active and not charging.
+
+    Of a team with ``parties`` policies only the UAVs of policy ``party``: UAV i has policy
+    ``i % parties``.
+    """
+    rows_mission = np.empty(uavs.size, np.int64)
+    rows_uav = np.empty(uavs.size, np.int64)
+    count = 0
+    for b in range(len(missions)):
+        if missions[b].active > 0:
+            for i in range(party, missions[b].uavs, parties):
+                if uavs[b, i].active and not uavs[b, i].charging:
+                    rows_mission[count] = b
+                    rows_uav[count] = i
+                    count += 1
+    return rows_mission[:count], rows_uav[:count]
+
+
+def act(policy: Any, view: View) -> None:
+    """Ask a policy for the actions of a view's rows and enter them into the state.
+
+    Raises:
+        ValueError: If what it returns is no action for every row.
+    """
+    actions = np.asarray(policy.act(view))
+    if actions.shape != (len(view),) or not _enter(view.state.uavs, view.mission, view.uav, actions):
+        raise ValueError(
+            f"policy {policy.name}: act returned no actions 0..4 for each of {len(view)} rows"
+        )
+
+
+@njit(cache=True, nogil=True)
+def _enter(uavs, mission, uav, actions):
+    for row in range(len(mission)):
+        action = np.int64(actions[row])
+        if not 0 <= action <= 4:
+            return False
+        uavs[mission[row], uav[row]].action = action
+    return True
