@@ -1,0 +1,228 @@
+"""Heuristic policies: where to go next. The way there is the same for all, under the return guard.
+
+Each policy chooses a goal; ``_step`` takes the safe action that brings the UAV nearer and keeps clear
+of teammates. Everything is a compiled function of one mission's arrays.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+
+from dess import streams
+from dess.state import STEP_X, STEP_Y
+from dess.view import View
+from policies.guard import (
+    contest,
+    margin,
+    must_charge,
+    parking_cell,
+    path_length,
+    safe_moves,
+    slots_needed,
+)
+
+_RANDOM, _NEAREST, _GREEDY, _TOUR = range(4)
+
+# A node is worth a visit with this share of the mean initial data; below, what has newly arrived
+# would send the UAVs to and fro.
+_WORTH = 0.25
+# Greedy: weight of a node that a teammate is nearer to, and slots added to every distance.
+_SHARED = 0.3
+_SLOTS_AT_NODE = 1.0
+# Cost, in slots, of a step into a cell by how it is contested (policies.guard.contest).
+_CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
+
+
+class _Heuristic:
+    """A policy that is a compiled function."""
+
+    name: str
+    _kind: int
+
+    def act(self, view: View) -> np.ndarray:
+        """(R,) actions for the rows of the view."""
+        state = view.state
+        circuit = _circuit(view.world.nodes.tobytes()) if self._kind == _TOUR else _NO_CIRCUIT
+        return _decide(
+            self._kind,
+            state.missions,
+            state.uavs,
+            state.residual,
+            view.world.nodes,
+            circuit,
+            view.mission,
+            view.uav,
+        )
+
+
+class Random(_Heuristic):
+    """A random safe action, from the policy's own stream."""
+
+    name = "random"
+    _kind = _RANDOM
+
+
+class Nearest(_Heuristic):
+    """The nearest node that is worth a visit."""
+
+    name = "nearest"
+    _kind = _NEAREST
+
+
+class Greedy(_Heuristic):
+    """The node with the most residual data for its distance, leaving to teammates what is nearer to them."""
+
+    name = "greedy"
+    _kind = _GREEDY
+
+
+class Tour(_Heuristic):
+    """A fixed circuit through the nodes, split among the UAVs into stretches of equal length."""
+
+    name = "tour"
+    _kind = _TOUR
+
+
+@njit(cache=True, nogil=True)
+def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_uav):
+    actions = np.empty(len(rows_mission), np.int64)
+    taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
+    safe = np.empty(5, np.bool_)
+    for row in range(len(rows_mission)):
+        b, i = rows_mission[row], rows_uav[row]
+        mission, team, data = missions[b], uavs[b], residual[b]
+        u = team[i]
+        charge = must_charge(mission, u, data.sum())
+        home_x, home_y = u.x, u.y
+        if charge:
+            home_x, home_y, _ = parking_cell(mission, team, i, taken)
+        safe_moves(mission, team, i, charge, home_x, home_y, safe)
+        if kind == _RANDOM:
+            actions[row] = _random_action(mission, team, i, safe)
+            continue
+        node = _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y)
+        if node >= 0:
+            home_x, home_y = nodes[node, 0], nodes[node, 1]
+        actions[row] = _step(mission, team, i, safe, home_x, home_y)
+    return actions
+
+
+@njit(cache=True, nogil=True)
+def _random_action(mission, team, i, safe):
+    """One of the safe actions, those into uncontested cells if there are any."""
+    u = team[i]
+    clear = np.zeros(5, np.bool_)
+    for action in range(5):
+        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        clear[action] = safe[action] and contest(mission, team, i, x, y) == 0
+    choices = clear if clear.any() else safe
+    words = streams.block(
+        mission.seed, mission.replication, streams.POLICY, 0, mission.slot, i
+    )
+    pick = streams.integer(words[0], 0, choices.sum() - 1)
+    for action in range(5):
+        pick -= choices[action]
+        if pick < 0:
+            return action
+    return 4
+
+
+@njit(cache=True, nogil=True)
+def _step(mission, team, i, safe, goal_x, goal_y):
+    """The safe action that brings UAV ``i`` nearest to its goal, clear of teammates."""
+    u = team[i]
+    best, least = 4, 1e18
+    for action in range(5):
+        if not safe[action]:
+            continue
+        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+        cost = path_length(mission, team, i, x, y, goal_x, goal_y)
+        cost += _CONTEST_COST[contest(mission, team, i, x, y)]
+        if cost < least:
+            best, least = action, cost
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
+    """The node that UAV ``i`` makes for: the best of those in reach, -1 without any."""
+    u = team[i]
+    reach = u.battery - 1 - margin(mission) if charge else slots_needed(mission, u)
+    worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
+    best, node = 0.0, -1
+    for k in range(mission.nodes):
+        if data[k] <= 0.0:
+            continue
+        slots = abs(u.x - nodes[k, 0]) + abs(u.y - nodes[k, 1])
+        home = abs(home_x - nodes[k, 0]) + abs(home_y - nodes[k, 1]) if charge else 0
+        if slots + home > reach:
+            continue
+        if kind == _NEAREST:
+            score = 1.0 / (slots + _SLOTS_AT_NODE)
+        elif kind == _GREEDY:
+            score = data[k] / (slots + _SLOTS_AT_NODE)
+            if _teammate_is_nearer(mission, team, i, nodes[k, 0], nodes[k, 1], slots):
+                score *= _SHARED
+        else:
+            score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
+        if data[k] < worth:
+            score *= 1e-3
+        if score > best:
+            best, node = score, k
+    return node
+
+
+@njit(cache=True, nogil=True)
+def _teammate_is_nearer(mission, team, i, x, y, slots):
+    for j in range(mission.uavs):
+        o = team[j]
+        if j != i and o.active and not o.charging:
+            other = abs(o.x - x) + abs(o.y - y)
+            if other < slots or (other == slots and j < i):
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _circuit_position(mission, i, position):
+    """Steps along the circuit from where the stretch of UAV ``i`` begins."""
+    begin = i * mission.nodes // mission.uavs
+    return (position - begin) % mission.nodes
+
+
+_NO_CIRCUIT = np.zeros(0, np.int64)
+
+
+@lru_cache(maxsize=64)
+def _circuit(nodes: bytes) -> np.ndarray:
+    """(K,) position of each node on a short round trip: nearest neighbour, then 2-opt."""
+    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
+    return _round_trip(np.abs(cells[:, None] - cells[None]).sum(2))
+
+
+@njit(cache=True)
+def _round_trip(slots):
+    count = len(slots)
+    order = np.arange(count)
+    for step in range(1, count):
+        nearest = step
+        for other in range(step, count):
+            if slots[order[step - 1], order[other]] < slots[order[step - 1], order[nearest]]:
+                nearest = other
+        order[step], order[nearest] = order[nearest], order[step]
+    shorter = True
+    while shorter:
+        shorter = False
+        for a in range(1, count - 1):
+            for b in range(a + 1, count):
+                before, after = order[a - 1], order[(b + 1) % count]
+                gain = slots[before, order[a]] + slots[order[b], after]
+                gain -= slots[before, order[b]] + slots[order[a], after]
+                if gain > 0:
+                    order[a : b + 1] = order[a : b + 1][::-1].copy()
+                    shorter = True
+    position = np.empty(count, np.int64)
+    for step in range(count):
+        position[order[step]] = step
+    return position
