@@ -11,9 +11,9 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from dess import rules
+from dess.compiled import kernel
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
@@ -26,7 +26,7 @@ from dess.state import (
     spaces_of,
     world_of,
 )
-from dess.view import View, act, acting_rows
+from dess.view import decide, team_of
 
 LANES = 256  # missions in flight: enough to hide Python's share, few enough for the cache
 
@@ -59,25 +59,30 @@ def simulate_batch(
         InputError: If the seed or a replication is out of range.
         ValueError: If a policy returns something that is no action.
     """
-    numbers = np.arange(replications) if isinstance(replications, int) else np.array(replications)
+    numbers = _numbers(replications)
     for number in (numbers.min(), numbers.max()) if len(numbers) else ():
         check_seed(seed, int(number))
-    team = list(policy) if isinstance(policy, list | tuple) else [policy]
+    if workers < 1 or lanes < 1:
+        raise ValueError(f"workers and lanes must be at least 1, not {workers} and {lanes}")
+    team = team_of(policy)
     one = isinstance(scenario, Scenario | ScenarioSpace)
     spaces = spaces_of([scenario] if one else scenario)
-    which = np.zeros(len(numbers), np.int64) if one else np.arange(len(numbers))
+    if not one and len(spaces) != len(numbers):
+        raise ValueError(f"{len(spaces)} scenarios for {len(numbers)} replications")
+    kinds = np.zeros(len(numbers), np.int64) if one else np.arange(len(numbers))
     records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
 
-    def run(jobs: np.ndarray, group: list[ScenarioSpace], world: World) -> None:
+    def run(jobs: np.ndarray, world: World, group: list[ScenarioSpace], which: np.ndarray) -> None:
         _Batch(group, world, team, seed, lanes).run(jobs, which, numbers, records, progress)
 
     tasks = []
     for world, members in _by_world(spaces):
-        chosen = np.isin(which, members)
-        jobs = np.nonzero(chosen)[0]
-        which[jobs] = np.searchsorted(members, which[jobs])
+        jobs = np.nonzero(np.isin(kinds, members))[0]
+        which = np.searchsorted(members, kinds)  # read at the jobs of this world only
         group = [spaces[member] for member in members]
-        tasks += [(part, group, world) for part in np.array_split(jobs, workers) if len(part)]
+        tasks += [
+            (part, world, group, which) for part in np.array_split(jobs, workers) if len(part)
+        ]
     if workers == 1:
         for task in tasks:
             run(*task)
@@ -86,6 +91,16 @@ def simulate_batch(
             for future in [pool.submit(run, *task) for task in tasks]:
                 future.result()
     return records
+
+
+def _numbers(replications: Sequence[int] | int) -> np.ndarray:
+    """The replication numbers as an array of integers."""
+    if isinstance(replications, int | np.integer):
+        return np.arange(replications)
+    numbers = np.asarray(replications)
+    if len(numbers) and numbers.dtype.kind not in "iu":
+        raise ValueError(f"replications must be integers, not {numbers.dtype}")
+    return numbers.astype(np.int64)
 
 
 def _by_world(spaces: list[ScenarioSpace]) -> list[tuple[World, np.ndarray]]:
@@ -123,19 +138,16 @@ class _Batch:
         source = (self.constants, self.ranges, which, numbers, jobs)
         for lane in range(lanes):
             _next_mission(lane, job_of_lane, queue, source, state)
-        parties, told = len(self.team), 0
+        told = 0
         while queue[1] < len(jobs):
-            for party, policy in enumerate(self.team):
-                mission, uav = acting_rows(state.missions, state.uavs, parties, party)
-                if len(mission):
-                    act(policy, View(state, self.world, mission, uav))
+            decide(self.team, state, self.world)
             _advance(job_of_lane, queue, source, state, self.world, scratch, records)
             if progress and queue[1] > told:
                 progress(int(queue[1]) - told)
                 told = int(queue[1])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _next_mission(lane, job_of_lane, queue, source, state):
     """Put the next job into a lane; without one the lane stays empty."""
     constants, ranges, which, numbers, jobs = source
@@ -152,7 +164,7 @@ def _next_mission(lane, job_of_lane, queue, source, state):
     rules.launch(mission, ranges[which[job]], state.uavs[lane], state.residual[lane])
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _advance(job_of_lane, queue, source, state, world, scratch, records):
     """One mission slot of every lane; finished missions leave their record and make room."""
     for lane in range(len(state.missions)):

@@ -25,7 +25,7 @@ from dess.state import (
     spaces_of,
     world_of,
 )
-from dess.view import View, act, acting_rows
+from dess.view import decide, team_of
 
 Process = Generator[simpy.Event, Any, None]
 
@@ -52,9 +52,8 @@ def simulate(
         ValueError: If a policy returns something that is no action.
     """
     check_seed(seed, replication)
-    team = list(policy) if isinstance(policy, list | tuple) else [policy]
     log = EventLog() if events else None
-    return Mission(spaces_of([scenario])[0], team, seed, replication, log).run()
+    return Mission(spaces_of([scenario])[0], team_of(policy), seed, replication, log).run()
 
 
 class ChargingZone(simpy.Resource):
@@ -113,8 +112,10 @@ class Mission:
         m = int(mission["communication_slots"])
         while mission["active"] > 0:
             start = int(mission["slot"])
-            yield env.timeout(0)  # the UAVs wait for the slot, those done have given back their pads
-            self._decide()
+            yield env.timeout(
+                0
+            )  # the UAVs wait for the slot, those done have given back their pads
+            decide(self.team, self.state, self.world)
             rules.resolve(mission, uavs)
             opened, self.slot_opens = self.slot_opens, env.event()
             opened.succeed()
@@ -169,13 +170,6 @@ class Mission:
             if pad is not None and pad.triggered and not u["charging"]:
                 u["charging"] = True
                 self.zone.record("charge_start", float(self.mission["slot"]), i, u)
-
-    def _decide(self) -> None:
-        parties = len(self.team)
-        for party, policy in enumerate(self.team):
-            mission, uav = acting_rows(self.state.missions, self.state.uavs, parties, party)
-            if len(mission):
-                act(policy, View(self.state, self.world, mission, uav))
 
     def _settle(self) -> None:
         """Close the slot; log the charging sessions and the UAVs that ended with it."""

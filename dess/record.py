@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from dess.compiled import kernel
 from dess.state import END_NAMES, QUOTA
 
 # One mission. Data in data units, rewards summed over the slots and the UAVs (eq. 14).
@@ -66,7 +66,7 @@ class Records(NamedTuple):
     uavs: np.ndarray
 
 
-@njit(cache=True)
+@kernel
 def write_record(mission, uavs, residual, record, uav_records):
     """Write the record of a finished mission into a ``MISSION_RECORD`` and (I,) ``UAV_RECORD``."""
     record.seed = mission.seed
@@ -100,7 +100,8 @@ def write_record(mission, uavs, residual, record, uav_records):
         if u.end != QUOTA:
             record.success = 0
     total = record.initial + record.arrived
-    record.collection_ratio = record.collected / total if total > 0.0 else 1.0
+    # Rounding may lift a sea harvested to the last unit above 1; an empty sea is fully harvested.
+    record.collection_ratio = min(record.collected / total, 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
 
 

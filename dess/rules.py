@@ -1,8 +1,8 @@
 """The consequences: what one mission slot does to one mission.
 
 Compiled functions on one mission's arrays, shared by both engines: no engine, no random generator
-object, no globals. A slot is, in this order (Section III-C): ``order`` and ``resolve`` (the UAVs
-act, the safety controller resolves), the grant of charging pads (the engine's: a SimPy resource, or
+object, no globals. A slot is, in this order (Section III-C): ``resolve`` (the UAVs act, the
+safety controller resolves), the grant of charging pads (the engine's: a SimPy resource, or
 ``grant_pads``), ``spend`` (energy), ``communicate`` for each communication slot, ``arrive`` (new
 data) and ``settle`` (rewards and operational status).
 """
@@ -10,9 +10,9 @@ data) and ``settle`` (rewards and operational status).
 import math
 
 import numpy as np
-from numba import njit
 
 from dess import streams
+from dess.compiled import kernel
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -28,7 +28,7 @@ _DB_TO_LOG = math.log(10.0) / 10.0
 _PER_LOG_2 = 1.0 / math.log(2.0)
 
 
-@njit(cache=True)
+@kernel
 def launch(mission, ranges, uavs, residual):
     """Start a mission: parameters, start cells and initial data, all drawn.
 
@@ -54,7 +54,7 @@ def launch(mission, ranges, uavs, residual):
         mission.initial += residual[k]
 
 
-@njit(cache=True)
+@kernel
 def _launch_uavs(mission, uavs):
     """Distinct start cells of the zone, drawn one after another from those that are left."""
     cells = mission.zone_width * mission.zone_height
@@ -76,10 +76,10 @@ def _launch_uavs(mission, uavs):
             left[i], left[pick] = left[pick], left[i]
             u.x = u.from_x = mission.zone_x + left[i] % mission.zone_width
             u.y = u.from_y = mission.zone_y + left[i] // mission.zone_width
-            _judge_latch(mission, u)
+            _judge_latch(mission, u)  # slot 0 is judged like any other
 
 
-@njit(cache=True)
+@kernel
 def _judge_latch(mission, u):
     """Charging latch iota (eq. 3), judged on the battery at the start of a slot."""
     if u.battery <= mission.charge_start:
@@ -88,7 +88,7 @@ def _judge_latch(mission, u):
         u.latch = False
 
 
-@njit(cache=True)
+@kernel
 def resolve(mission, uavs):
     """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at once.
 
@@ -128,7 +128,7 @@ def resolve(mission, uavs):
                 changed = True
 
 
-@njit(cache=True)
+@kernel
 def _collide(mission, u, other):
     """Whether the move of ``u`` must be cancelled because of ``other``."""
     if u.x == other.x and u.y == other.y:
@@ -143,26 +143,29 @@ def _collide(mission, u, other):
     )
 
 
-@njit(cache=True)
+@kernel
 def _cancel(u):
     u.x, u.y = u.from_x, u.from_y
     u.executed = HOVER
     u.overruled = True
 
 
-@njit(cache=True)
+@kernel
 def may_charge(mission, u):
-    """Charging condition (eq. 4): active, in the zone, latched, hovering."""
+    """Charging condition (eq. 4): active, in the zone, latched, hovering of its own will.
+
+    A move that the safety controller cancelled is no wish to charge.
+    """
     return (
         u.active
         and u.latch
-        and u.executed == HOVER
+        and u.action == HOVER
         and mission.zone_x <= u.x < mission.zone_x + mission.zone_width
         and mission.zone_y <= u.y < mission.zone_y + mission.zone_height
     )
 
 
-@njit(cache=True)
+@kernel
 def grant_pads(mission, uavs):
     """Grant free charging pads, first come first served, ties in the order of the UAVs.
 
@@ -191,7 +194,7 @@ def grant_pads(mission, uavs):
         uavs[first].charging = True
 
 
-@njit(cache=True)
+@kernel
 def spend(mission, uavs):
     """Energy of one slot (eq. 8): a charging slot gains, any other active slot costs 1."""
     for i in range(mission.uavs):
@@ -209,7 +212,7 @@ def spend(mission, uavs):
     mission.slot_collected = 0.0
 
 
-@njit(cache=True)
+@kernel
 def communicate(mission, uavs, residual, nodes, path_loss, scratch, n):
     """Communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
@@ -227,7 +230,9 @@ def communicate(mission, uavs, residual, nodes, path_loss, scratch, n):
         best, node = _best_node(mission, i, u, residual, nodes, path_loss, scratch, n)
         if node < 0:
             continue
-        rate = mission.communication_slot_length * _PER_LOG_2 * math.log1p(math.exp(best * _DB_TO_LOG))
+        rate = (
+            mission.communication_slot_length * _PER_LOG_2 * math.log1p(math.exp(best * _DB_TO_LOG))
+        )
         amount = min(rate, residual[node])
         residual[node] -= amount
         u.served = node
@@ -237,7 +242,7 @@ def communicate(mission, uavs, residual, nodes, path_loss, scratch, n):
         mission.slot_collected += amount
 
 
-@njit(cache=True)
+@kernel
 def _best_node(mission, i, u, residual, nodes, path_loss, scratch, n):
     """Highest SNR [dB] of UAV ``i`` among the nodes with data, and its node; -1 without any.
 
@@ -248,7 +253,9 @@ def _best_node(mission, i, u, residual, nodes, path_loss, scratch, n):
     nearest, mean = -1, -math.inf
     for k in range(mission.nodes):
         if residual[k] > 0.0:
-            value = _mean_snr(m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss)
+            value = _mean_snr(
+                m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss
+            )
             if value > mean:
                 nearest, mean = k, value
     if nearest < 0 or mission.shadowing_deviation == 0.0:
@@ -258,7 +265,9 @@ def _best_node(mission, i, u, residual, nodes, path_loss, scratch, n):
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
     for k in range(mission.nodes):
         if residual[k] > 0.0 and k != nearest:
-            value = _mean_snr(m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss)
+            value = _mean_snr(
+                m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss
+            )
             if value + reach >= best:
                 value += _shadowing(mission, i, k, scratch, n)
                 if value > best or (value == best and k < node):
@@ -266,7 +275,7 @@ def _best_node(mission, i, u, residual, nodes, path_loss, scratch, n):
     return best, node
 
 
-@njit(cache=True)
+@kernel
 def _mean_snr(m, dx, dy, step_x, step_y, n, path_loss):
     """Mean SNR [dB] at the position of communication slot ``n``, of the cells between."""
     if step_y != 0:
@@ -274,7 +283,7 @@ def _mean_snr(m, dx, dy, step_x, step_y, n, path_loss):
     return path_loss[abs(dy), abs(m * dx + n * step_x)]
 
 
-@njit(cache=True)
+@kernel
 def _shadowing(mission, i, k, scratch, n):
     """Shadowing eta [dB] between UAV ``i`` and node ``k`` in communication slot ``n``."""
     group, word = (n - 1) // 4, (n - 1) % 4
@@ -295,7 +304,7 @@ def _shadowing(mission, i, k, scratch, n):
     return mission.shadowing_deviation * streams.normal(scratch.words[i, k, word])
 
 
-@njit(cache=True)
+@kernel
 def arrive(mission, residual, scratch):
     """New data of one slot (eq. 12): Poisson packets per node, left in ``scratch.arrivals``."""
     if mission.arrival_rate == 0.0:
@@ -311,7 +320,7 @@ def arrive(mission, residual, scratch):
         mission.arrived += packets
 
 
-@njit(cache=True)
+@kernel
 def settle(mission, uavs):
     """Rewards (eq. 14-18) and operational status (eq. 6, 7) at the end of a slot."""
     mission.collected += mission.slot_collected
@@ -345,7 +354,7 @@ def settle(mission, uavs):
         _judge_latch(mission, u)
 
 
-@njit(cache=True)
+@kernel
 def advance(mission, uavs, residual, nodes, path_loss, scratch):
     """One whole mission slot, the actions being entered; the order of Section III-C."""
     resolve(mission, uavs)

@@ -30,7 +30,9 @@ class _Constants(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     # World
-    grid: Integer = Field(32, ge=2, le=256, description="cells along one side of the square grid (M)")
+    grid: Integer = Field(
+        32, ge=2, le=256, description="cells along one side of the square grid (M)"
+    )
     cell_size: Number = Field(800.0, gt=0, description="side of a cell [m] (c)")
     altitude: Number = Field(10.0, gt=0, description="flying altitude [m] (h)")
     nodes: tuple[Cell, ...] = Field(
@@ -54,12 +56,18 @@ class _Constants(BaseModel):
     )
 
     # Energy
-    charge_rate: Integer = Field(10, ge=1, le=100, description="battery gained in a charging slot [%]")
+    charge_rate: Integer = Field(
+        10, ge=1, le=100, description="battery gained in a charging slot [%]"
+    )
 
     # Channel
-    edge_snr: Number = Field(-25.0, description="mean SNR at half the grid's diagonal [dB]")
+    edge_snr: Number = Field(
+        -25.0, ge=-300, le=300, description="mean SNR at half the grid's diagonal [dB]"
+    )
     path_loss_exponent: Number = Field(2.27, gt=0, le=10, description="path loss exponent (alpha)")
-    shadowing_variance: Number = Field(2.0, ge=0, le=400, description="variance of shadowing [dB^2]")
+    shadowing_variance: Number = Field(
+        2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
+    )
 
     # Data
     initial_data: tuple[Number, Number] = Field(
@@ -136,7 +144,7 @@ class Scenario(_Constants):
         InputError: From ``Scenario.of``, for unknown keys, wrong types and values out of range.
     """
 
-    uavs: Integer = Field(2, ge=1, le=64, description="number of UAVs (I)")
+    uavs: Integer = Field(2, ge=1, description="number of UAVs (I)")
     flying_time: Integer = Field(75, ge=1, le=100, description="battery at the start [%] (b(0))")
     charge_start: Integer = Field(
         30, ge=10, le=100, description="battery at which charging may start [%] (C_S)"
@@ -190,7 +198,9 @@ class ScenarioSpace(_Constants):
         return self
 
     @classmethod
-    def of(cls, scenario: "Scenario | ScenarioSpace | None" = None, **values: Any) -> "ScenarioSpace":
+    def of(
+        cls, scenario: "Scenario | ScenarioSpace | None" = None, **values: Any
+    ) -> "ScenarioSpace":
         """A space of the given values, on top of a scenario or space (default: the paper's)."""
         base = scenario.model_dump() if scenario is not None else {}
         return _validated(cls, base | values, "scenario")
@@ -278,7 +288,7 @@ def _tuples(value: Any) -> Any:
 def _check_ranges(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
     """The rules between sampled parameters, which every combination must keep (eq. 1)."""
     limits = {
-        "uavs": (1, zone_cells, "number of cells of the zone"),
+        "uavs": (1, min(zone_cells, 64), "cells of the zone, at most 64"),
         "flying_time": (1, 100, "battery capacity"),
         "charge_start": (10, 100, "eq. 1"),
         "charge_complete": (10, 100, "eq. 1"),

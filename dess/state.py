@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
+from operator import index
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from dess import streams
+from dess.compiled import kernel
 from dess.errors import InputError
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 
@@ -178,7 +179,9 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
             value = getattr(scenario, field)
             mission[field] = scenario.zone_cells if field == "pads" and value is None else value
     mission["nodes"] = len(scenario.nodes)
-    for field, value in zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True):
+    for field, value in zip(
+        ("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True
+    ):
         mission[field] = value
     mission["initial_low"], mission["initial_high"] = scenario.initial_data
     mission["communication_slot_length"] = scenario.slot_length / scenario.communication_slots
@@ -191,7 +194,7 @@ def ranges_of(scenario: ScenarioSpace) -> np.ndarray:
     return np.array([getattr(scenario, name) for name in SAMPLED], np.int64)
 
 
-@njit(cache=True)
+@kernel
 def draw_parameters(mission, ranges):
     """Draw the sampled parameters of a mission from their ranges (Table II)."""
     w0, w1, w2, w3 = streams.block(mission.seed, mission.replication, streams.PARAMETERS, 0, 0, 0)
@@ -215,7 +218,9 @@ def check_seed(seed: int, replication: int) -> None:
 
     Raises:
         InputError: If one is out of range.
+        TypeError: If one is no integer.
     """
+    seed, replication = index(seed), index(replication)
     if not 0 <= seed <= streams.MAX_SEED:
         raise InputError(f"seed: {seed} is out of range; allowed: 0..2**64-1")
     if not 0 <= replication <= streams.MAX_REPLICATION:

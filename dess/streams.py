@@ -12,7 +12,8 @@ One Philox block is four 32-bit words. The seed is the key; the counter words ar
 import math
 
 import numpy as np
-from numba import njit
+
+from dess.compiled import kernel
 
 # Streams: the purpose of a draw. Each is a separate, never overlapping part of the counter space.
 PARAMETERS = 0  # the sampled parameters of a mission's scenario
@@ -33,7 +34,7 @@ _WEYL_0 = np.uint64(0x9E3779B9)
 _WEYL_1 = np.uint64(0xBB67AE85)
 
 
-@njit(cache=True)
+@kernel
 def philox(c0, c1, c2, c3, k0, k1):
     """Philox 4x32-10: four random 32-bit words of a counter and a key.
 
@@ -56,7 +57,7 @@ def philox(c0, c1, c2, c3, k0, k1):
     return c0, c1, c2, c3
 
 
-@njit(cache=True)
+@kernel
 def block(seed, replication, stream, lane, slot, index):
     """Four random 32-bit words of the coordinates of a draw.
 
@@ -82,20 +83,20 @@ def block(seed, replication, stream, lane, slot, index):
     )
 
 
-@njit(cache=True)
+@kernel
 def uniform(word):
     """A number in the open interval (0, 1) of a 32-bit word."""
     return (np.float64(word) + 0.5) * 2.0**-32
 
 
-@njit(cache=True)
+@kernel
 def integer(word, low, high):
     """An integer in ``low..high``, both included, of a 32-bit word (bias below (high-low)/2**32)."""
     span = np.uint64(high - low + 1)
     return low + np.int64((np.uint64(word) * span) >> _SHIFT)
 
 
-@njit(cache=True)
+@kernel
 def poisson(word, rate):
     """A Poisson deviate of a 32-bit word, by inversion.
 
@@ -117,7 +118,7 @@ def poisson(word, rate):
     return count
 
 
-@njit(cache=True)
+@kernel
 def normal(word):
     """A standard normal deviate of a 32-bit word, by inversion.
 

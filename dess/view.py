@@ -1,11 +1,12 @@
 """What the UAVs that must act may know, and how their actions enter the state."""
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from dess.compiled import kernel
 from dess.state import HOVER, STEP_X, STEP_Y, State, World
 
 
@@ -53,7 +54,7 @@ class View:
         return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)
 
 
-@njit(cache=True)
+@kernel
 def legal_actions(missions, uavs, rows_mission, rows_uav):
     """(R, 5) mask of the actions that stay on the grid; a charging UAV has Hover alone."""
     legal = np.zeros((len(rows_mission), 5), np.bool_)
@@ -69,7 +70,7 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
     return legal
 
 
-@njit(cache=True)
+@kernel
 def acting_rows(missions, uavs, parties, party):
     """(R,) mission and (R,) UAV index of the UAVs that must act: active and not charging.
 
@@ -89,20 +90,44 @@ def acting_rows(missions, uavs, parties, party):
     return rows_mission[:count], rows_uav[:count]
 
 
-def act(policy: Any, view: View) -> None:
-    """Ask a policy for the actions of a view's rows and enter them into the state.
+def team_of(policy: Any) -> list[Any]:
+    """One policy or a sequence of them as a team.
 
     Raises:
-        ValueError: If what it returns is no action for every row.
+        ValueError: If the sequence is empty.
     """
-    actions = np.asarray(policy.act(view))
-    if actions.shape != (len(view),) or not _enter(view.state.uavs, view.mission, view.uav, actions):
-        raise ValueError(
-            f"policy {policy.name}: act returned no actions 0..4 for each of {len(view)} rows"
-        )
+    team = list(policy) if isinstance(policy, list | tuple) else [policy]
+    if not team:
+        raise ValueError("a team needs at least one policy")
+    return team
 
 
-@njit(cache=True, nogil=True)
+def decide(team: Sequence[Any], state: State, world: World) -> None:
+    """Ask the policies of a team for the actions of all UAVs that must act, and enter them.
+
+    UAV i follows ``team[i % len(team)]``. All are asked before any action is entered: nobody sees
+    what a teammate has just decided.
+
+    Raises:
+        ValueError: If what a policy returns is no action for every row.
+    """
+    orders = []
+    for party, policy in enumerate(team):
+        mission, uav = acting_rows(state.missions, state.uavs, len(team), party)
+        if len(mission):
+            actions = np.asarray(policy.act(View(state, world, mission, uav)))
+            if actions.shape != mission.shape or actions.dtype.kind not in "iu":
+                raise ValueError(
+                    f"policy {policy.name}: act must return {len(mission)} integers, "
+                    f"not {actions.dtype} of shape {actions.shape}"
+                )
+            orders.append((policy, mission, uav, actions))
+    for policy, mission, uav, actions in orders:
+        if not _enter(state.uavs, mission, uav, actions):
+            raise ValueError(f"policy {policy.name}: act must return actions 0..4")
+
+
+@kernel
 def _enter(uavs, mission, uav, actions):
     for row in range(len(mission)):
         action = np.int64(actions[row])

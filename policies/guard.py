@@ -5,9 +5,9 @@ must be able to reach a free zone cell of its own, a few slots early if teammate
 """
 
 import numpy as np
-from numba import njit
 
-from dess.state import STEP_X, STEP_Y
+from dess.compiled import kernel
+from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
 # Slots in hand on the way home: per active teammate, since each may cost a detour.
@@ -16,14 +16,14 @@ MARGIN_PER_TEAMMATE = 2
 SCARCE_SLOTS = 6
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def slots_needed(mission, u):
     """Flying slots until the quota of UAV ``u`` is filled if it communicates in all of them."""
     m = mission.communication_slots
     return (mission.quota - u.communications + m - 1) // m
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota on its battery; ``data`` is all residual data.
 
@@ -36,7 +36,7 @@ def must_charge(mission, u, data):
     return u.battery < needed
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def is_parked(mission, u):
     """Whether an active UAV in the zone is charging or about to: an obstacle to the others."""
     return (
@@ -47,7 +47,7 @@ def is_parked(mission, u):
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def path_length(mission, uavs, i, x, y, to_x, to_y):
     """Slots of UAV ``i`` from cell to cell, with the detour around a teammate parked between."""
     length = abs(x - to_x) + abs(y - to_y)
@@ -61,7 +61,7 @@ def path_length(mission, uavs, i, x, y, to_x, to_y):
     return length
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def parking_cell(mission, uavs, i, taken):
     """The zone cell where UAV ``i`` will charge: the nearest one that no teammate has or chooses.
 
@@ -91,7 +91,11 @@ def parking_cell(mission, uavs, i, taken):
         chooser = -1
         for j in range(mission.uavs):
             o = uavs[j]
-            if not o.active or o.battery < last_battery or (o.battery == last_battery and j <= last):
+            if (
+                not o.active
+                or o.battery < last_battery
+                or (o.battery == last_battery and j <= last)
+            ):
                 continue
             if chooser < 0 or o.battery < uavs[chooser].battery:
                 chooser = j
@@ -105,7 +109,7 @@ def parking_cell(mission, uavs, i, taken):
             taken[(y - mission.zone_y) * width + x - mission.zone_x] = True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _nearest_free(mission, uavs, i, taken):
     """The nearest zone cell that is not taken, and the slots to it (-1 without any)."""
     u = uavs[i]
@@ -121,13 +125,13 @@ def _nearest_free(mission, uavs, i, taken):
     return best_x, best_y, best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def margin(mission):
     """Slots to keep in hand on the way home for the teammates that may stand in it."""
     return MARGIN_PER_TEAMMATE * (mission.active - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def contest(mission, uavs, i, x, y):
     """How a cell is contested by teammates of UAV ``i`` in the next slot.
 
@@ -152,7 +156,7 @@ def contest(mission, uavs, i, x, y):
     return level
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
     """Which actions keep the charger of UAV ``i`` reachable in time.
 
@@ -180,11 +184,14 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
             late[action] = max(home + 1 + margin(mission) - (u.battery - 1), 0)
             least = min(least, late[action])
     if charge:
+        # Waiting for a teammate to pass is what the margin is for.
+        may_wait = late[HOVER] <= margin(mission)
         for action in range(5):
-            safe[action] = safe[action] and late[action] == least
+            nearest = late[action] == least
+            safe[action] = safe[action] and (nearest or (action == HOVER and may_wait))
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _mask(missions, uavs, residual, rows_mission, rows_uav):
     masks = np.zeros((len(rows_mission), 5), np.bool_)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)

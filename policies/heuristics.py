@@ -7,10 +7,10 @@ of teammates. Everything is a compiled function of one mission's arrays.
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from dess import streams
-from dess.state import STEP_X, STEP_Y
+from dess.compiled import kernel
+from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 from policies.guard import (
     contest,
@@ -84,7 +84,7 @@ class Tour(_Heuristic):
     _kind = _TOUR
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_uav):
     actions = np.empty(len(rows_mission), np.int64)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
@@ -108,31 +108,30 @@ def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_u
     return actions
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _random_action(mission, team, i, safe):
-    """One of the safe actions, those into uncontested cells if there are any."""
+    """A random safe move clear of teammates; Hover if there is none."""
     u = team[i]
-    clear = np.zeros(5, np.bool_)
-    for action in range(5):
+    choices = np.zeros(4, np.bool_)
+    for action in range(4):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        clear[action] = safe[action] and contest(mission, team, i, x, y) == 0
-    choices = clear if clear.any() else safe
-    words = streams.block(
-        mission.seed, mission.replication, streams.POLICY, 0, mission.slot, i
-    )
+        choices[action] = safe[action] and contest(mission, team, i, x, y) == 0
+    if not choices.any():
+        return HOVER
+    words = streams.block(mission.seed, mission.replication, streams.POLICY, 0, mission.slot, i)
     pick = streams.integer(words[0], 0, choices.sum() - 1)
-    for action in range(5):
+    for action in range(4):
         pick -= choices[action]
         if pick < 0:
             return action
-    return 4
+    return HOVER
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _step(mission, team, i, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal, clear of teammates."""
     u = team[i]
-    best, least = 4, 1e18
+    best, least = HOVER, 1e18
     for action in range(5):
         if not safe[action]:
             continue
@@ -144,7 +143,7 @@ def _step(mission, team, i, safe, goal_x, goal_y):
     return best
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
     """The node that UAV ``i`` makes for: the best of those in reach, -1 without any."""
     u = team[i]
@@ -173,7 +172,7 @@ def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
     return node
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
@@ -184,7 +183,7 @@ def _teammate_is_nearer(mission, team, i, x, y, slots):
     return False
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _circuit_position(mission, i, position):
     """Steps along the circuit from where the stretch of UAV ``i`` begins."""
     begin = i * mission.nodes // mission.uavs
@@ -201,7 +200,7 @@ def _circuit(nodes: bytes) -> np.ndarray:
     return _round_trip(np.abs(cells[:, None] - cells[None]).sum(2))
 
 
-@njit(cache=True)
+@kernel
 def _round_trip(slots):
     count = len(slots)
     order = np.arange(count)

@@ -37,7 +37,9 @@ def load(name: str) -> Policy:
     try:
         policy = outside[name].load()()
     except Exception as error:  # somebody else's code: whatever it raises, say whose it was
-        raise InputError(f"policy: {name} of {outside[name].value} cannot be loaded: {error}") from error
+        raise InputError(
+            f"policy: {name} of {outside[name].value} cannot be loaded: {error}"
+        ) from error
     if not isinstance(policy, Policy):
         raise InputError(f"policy: {name} of {outside[name].value} has no name and act(view)")
     return policy
