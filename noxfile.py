@@ -14,7 +14,7 @@ RESULTS, REPORTS = Path("results"), Path("build/reports")
 
 
 def install(session: nox.Session, extras: str = "") -> None:
-    """Install the project, editable so that compiled code stays cached, and its pinned libraries."""
+    """Install the project and its pinned libraries; editable, so compiled code stays cached."""
     session.log("Installing dess and its libraries; the first time this takes some minutes.")
     session.install("-e", f".{extras}", "-c", "constraints.txt")
 

@@ -5,7 +5,7 @@ Functions of a mission take its event log (a data frame, or the columns, of
 ``_figure`` and those of a study return a figure of their own. Nothing touches pyplot's state.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import matplotlib as mpl
@@ -17,8 +17,10 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from analysis.paper import METRICS
 from analysis.slots import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
 
@@ -27,21 +29,24 @@ LINES = ("-", "--", ":", "-.")
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
 DPI = 150
+_PRINTED: dict = {"color": INK, "linestyle": "--", "linewidth": 1.3}
 
 
 def node_colours(count: int) -> list[str]:
     """A colour per node: nine colour-blind safe hues in three shades; neighbours differ in hue."""
     hues = [c for c in sns.color_palette("colorblind") if np.ptp(c) > 0.05]  # all but the grey
-    mixes = (("black", 0.0), ("black", 0.42), ("white", 0.42))
+    hues = [min(c, sns.set_hls_values(c, l=0.5), key=sum) for c in hues]  # readable on white
+    mixes = (("white", 0.0), ("black", 0.45), ("white", 0.33))
     shades = [(1 - share) * np.array(hues) + share * np.array(to_rgb(c)) for c, share in mixes]
     palette = np.concatenate(shades)
     return [to_hex(palette[k % len(palette)]) for k in range(count)]
 
 
 def uav_colours(count: int) -> list[str]:
-    """A dark colour per UAV, apart in lightness too."""
+    """A dark colour per UAV."""
     few = ["#1b1b1b", "#b3123f", "#1f5fbf"]
-    return few[:count] if count <= len(few) else [to_hex(c) for c in sns.husl_palette(count, l=0.45)]
+    many = [to_hex(c) for c in sns.husl_palette(count, l=0.45)]
+    return few[:count] if count <= len(few) else many
 
 
 @contextmanager
@@ -88,11 +93,11 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
             angles="xy",
             scale_units="xy",
             scale=1,
-            width=0.12,
+            width=0.15,
             units="xy",
-            headwidth=4.2,
-            headlength=4,
-            headaxislength=3.6,
+            headwidth=3.8,
+            headlength=3.4,
+            headaxislength=3.2,
             zorder=4,
             gid=f"moves-{uav}",
         )
@@ -125,12 +130,13 @@ def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
     levels = battery_levels(events)
     for uav, own in levels.groupby("uav"):
-        ax.plot(own["time"], own["battery"], label=f"UAV {uav + 1}", **_uav_line(uav, scenario))
+        name = f"UAV {uav + 1}" if scenario.uavs <= 3 else f"{uav + 1}"
+        ax.plot(own["time"], own["battery"], label=name, **_uav_line(uav, scenario))
     for level, name in ((scenario.charge_start, "$C_S$"), (scenario.charge_complete, "$C_C$")):
         ax.axhline(level, color=MUTED, linewidth=0.9, zorder=1)
         _margin_note(f"{name} {level}", level, ax)
     ax.set(title="Battery", ylabel="battery [%]", ylim=(0, 103))
-    if scenario.uavs <= 6:  # more do not fit beside the title, and the map numbers them all
+    if scenario.uavs <= 6:  # more do not fit beside the title
         ax.legend(loc="lower right", bbox_to_anchor=(1.02, 0.97), ncols=6, handlelength=2.2,
                   handletextpad=0.5, columnspacing=1.1)  # fmt: skip
     _time_axis(events, ax)
@@ -152,18 +158,23 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     """UAVs that charge, stacked in their colours, and those that wait for a pad, over time."""
     slots, edges = uav_slots(events), np.arange(duration(events) + 1)
     base = np.zeros(len(edges))
-    for state, looks in (("charging", {"alpha": 0.85}), ("waiting", {"hatch": "////", "fill": False})):
+    for state in ("charging", "waiting"):
         for uav, own in slots[slots[state]].groupby("uav"):
             top = base + np.isin(edges, own["slot"])
             colour = uav_colours(scenario.uavs)[uav]
-            ax.fill_between(edges, base, top, step="post", color=colour, linewidth=0, **looks)
+            face, hatch = (colour, None) if state == "charging" else ("none", "/////")
+            ax.fill_between(
+                edges, base, top, step="post", facecolor=face, edgecolor=colour, hatch=hatch,
+                linewidth=0, alpha=0.85,
+            )  # fmt: skip
             base = top
     ax.step(edges, base, where="post", color=INK, linewidth=1, gid="occupancy")
     pads = scenario.zone_cells if scenario.pads is None else scenario.pads
     if pads <= scenario.uavs:
         ax.axhline(pads, color=MUTED, linewidth=0.9)
+    hatched = "; hatched: waiting" if slots["waiting"].any() else ""
     ax.set(
-        title=f"Charging zone, {pads} pads (hatched: waiting)",
+        title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}",
         ylabel="UAVs",
         ylim=(0, scenario.uavs + 0.3),
     )
@@ -185,7 +196,8 @@ def map_figure(events: Events, scenario: Scenario, title: str = "") -> Figure:
 def mission_figure(events: Events, scenario: Scenario, title: str = "") -> Figure:
     """A mission: its map, and under it battery, residual data and charging zone over time."""
     with style():
-        figure = Figure(figsize=(5.6, 11), dpi=DPI, layout="constrained")
+        figure = Figure(figsize=(5.6, 11), dpi=DPI)
+        figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
         axes = figure.subplots(4, height_ratios=(5.6, 1.6, 1.6, 1.1))
         trajectories(events, scenario, axes[0])
         axes[0].set_title(title)
@@ -195,6 +207,100 @@ def mission_figure(events: Events, scenario: Scenario, title: str = "") -> Figur
             ax.set_xlabel("")
         axes[-1].set_xlabel("time [mission slots]")
     return figure
+
+
+def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
+    """A metric of every policy: means with intervals, and the paper's figure as a line.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy``.
+        metric: One of ``METRICS``.
+        printed: The paper's figure.
+    """
+    rows = summary[summary["metric"] == metric].reset_index(drop=True)
+    with style():
+        figure = Figure(figsize=(5.2, 1.15 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        colours = _policy_colours(rows["policy"])
+        for y, row in rows.iterrows():
+            ax.errorbar(row["mean"], y, xerr=_arms(row), **_dot(row["policy"], colours))
+            ax.annotate(
+                f"{row['mean']:.1%}",
+                (row["high"], y),
+                xytext=(5, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=9,
+                path_effects=[withStroke(linewidth=3, foreground="white")],
+            )
+        if printed is not None:
+            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
+            ax.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98))
+        ax.set_yticks(range(len(rows)), rows["policy"])
+        ax.set(title=METRICS[metric], xlim=(-0.02, 1.16), ylim=(len(rows) - 0.4, -0.6))
+        ax.set_xticks(np.linspace(0, 1, 6))
+        ax.xaxis.set_major_formatter(PercentFormatter(1))
+        ax.grid(axis="y", visible=False)
+        sns.despine(ax=ax, left=True)
+    return figure
+
+
+def by_fleet(
+    summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
+) -> Figure:
+    """A metric of every policy against the number of UAVs, with intervals.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
+        metric: One of ``METRICS``.
+        printed: The paper's figures by number of UAVs.
+    """
+    rows = summary[summary["metric"] == metric]
+    with style():
+        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        colours = _policy_colours(rows["policy"])
+        offsets = np.linspace(-0.12, 0.12, len(colours)) if len(colours) > 1 else [0.0]
+        for offset, (policy, own) in zip(offsets, rows.groupby("policy", sort=False), strict=True):
+            own = own.sort_values("uavs")
+            ax.errorbar(
+                own["uavs"] + offset,
+                own["mean"],
+                yerr=_arms(own),
+                **_dot(policy, colours),
+                linewidth=1,
+                alpha=0.9,
+                label=policy,
+            )
+        if printed:
+            ax.plot(*zip(*sorted(printed.items()), strict=True), marker="D", markersize=6,
+                    label="paper", **_PRINTED)  # fmt: skip
+        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+        ax.set_xticks(sorted(rows["uavs"].unique()))
+        ax.set_yticks(np.linspace(0, 1, 6))
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        ax.grid(axis="x", visible=False)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=5, columnspacing=1.1,
+                  handletextpad=0.5)  # fmt: skip
+        sns.despine(ax=ax)
+    return figure
+
+
+def _policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
+    """Colour and marker of every policy."""
+    names = list(dict.fromkeys(policies))
+    palette = sns.color_palette("colorblind", len(names)).as_hex()
+    return {name: (palette[n], "os^vPX*"[n % 7]) for n, name in enumerate(names)}
+
+
+def _dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
+    colour, marker = colours[policy]
+    return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
+
+
+def _arms(rows: pd.DataFrame | pd.Series) -> np.ndarray:
+    """Lengths of the arms of error bars, (2, N)."""
+    return np.array([rows["mean"] - rows["low"], rows["high"] - rows["mean"]]).reshape(2, -1)
 
 
 def _sea(scenario: Scenario, ax: Axes) -> None:
@@ -239,7 +345,7 @@ def _trail(own: pd.DataFrame, shift: float, colour: str, ax: Axes) -> None:
         np.array(x) + shift,
         np.array(y) + shift,
         color=colour,
-        alpha=0.22,
+        alpha=0.16,
         linewidth=4.5,
         solid_joinstyle="round",
         zorder=2,
@@ -294,8 +400,8 @@ def _map_legend(ax: Axes) -> None:
         Line2D([], [], linestyle="", marker=r"$\rightarrow$", markersize=13, color=MUTED,
                label="no node served"),
     ]  # fmt: skip
-    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.46, -0.1), ncols=3,
-              handletextpad=0.5, columnspacing=1.2)  # fmt: skip
+    ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.48, -0.1), ncols=3,
+              handletextpad=0.4, columnspacing=1.0, fontsize=8.5)  # fmt: skip
 
 
 def _uav_line(uav: int, scenario: Scenario) -> dict:
@@ -308,8 +414,9 @@ def _uav_line(uav: int, scenario: Scenario) -> dict:
 
 def _margin_note(text: str, level: float, ax: Axes) -> None:
     """A note in the right margin, at a level of the y axis."""
-    ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
-                textcoords="offset points", va="center", fontsize=8.5)  # fmt: skip
+    note = ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
+                       textcoords="offset points", va="center", fontsize=8.5)  # fmt: skip
+    note.set_in_layout(False)  # maps of one gallery are equally large, whatever the notes say
 
 
 def _time_axis(events: Events, ax: Axes) -> None:

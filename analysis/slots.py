@@ -45,7 +45,7 @@ def uav_slots(events: Events) -> pd.DataFrame:
 
 
 def battery_levels(events: Events) -> pd.DataFrame:
-    """Battery [%] of every UAV: ``uav``, ``time`` [mission slots] from the start on, ``battery``."""
+    """Battery [%] of every UAV at every slot's start and at its end: ``uav, time, battery``."""
     log = pd.DataFrame(events)
     start, moves = _of_uavs(log, "mission_start"), log[log["event"] == "move"]
     return pd.DataFrame(

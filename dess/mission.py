@@ -119,7 +119,8 @@ class Mission:
             rules.resolve(mission, uavs)
             opened, self.slot_opens = self.slot_opens, env.event()
             opened.succeed()
-            yield env.timeout(0)  # the UAVs have asked for pads or left the queue
+            yield env.timeout(0)  # the UAVs have asked for pads or left
+            yield env.timeout(0)  # pads that were given up went to the next in the queue
             self._start_charging()
             rules.spend(mission, uavs)
             self._log_moves()

@@ -1,0 +1,48 @@
+"""A picture of one mission as it stands, for the environment's ``render``."""
+
+from typing import Any
+
+import numpy as np
+
+from dess.scenario import ScenarioSpace
+from dess.state import State
+
+_CELL = 16  # pixels
+_SEA, _LINES, _ZONE = (233, 241, 247), (212, 224, 234), (190, 205, 190)
+_NO_DATA, _FULL = np.array((255, 255, 255)), np.array((31, 78, 121))
+_IDLE, _CHARGING = (255, 255, 255), (0, 0, 0)
+# Colours that the colour-blind tell apart, after Okabe and Ito.
+_FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
+
+
+def draw(space: ScenarioSpace, state: State, lane: int = 0) -> np.ndarray:
+    """Draw the zone, the nodes (dark: full of data) and the active UAVs (black frame: charging).
+
+    Args:
+        space: The scenario of the mission.
+        state: The state that holds it.
+        lane: Its number there.
+
+    Returns:
+        (16 M, 16 M, 3) of uint8, north on top.
+    """
+    uavs, residual = state.uavs[lane], state.residual[lane]
+    image = np.full((space.grid * _CELL, space.grid * _CELL, 3), _SEA, np.uint8)
+    x, y, width, height = (value * _CELL for value in space.zone)
+    image[y : y + height, x : x + width] = _ZONE
+    image[::_CELL] = image[:, ::_CELL] = _LINES
+    full = max(space.initial_data[1], float(residual.max()), 1.0)
+    for (x, y), data in zip(space.nodes, residual, strict=True):
+        _square(image, x, y, 3, _FULL)
+        _square(image, x, y, 4, _NO_DATA + (_FULL - _NO_DATA) * (data / full))
+    for i, u in enumerate(uavs):
+        if u["active"]:
+            _square(image, u["x"], u["y"], 1, _CHARGING if u["charging"] else _IDLE)
+            _square(image, u["x"], u["y"], 3, _FLEET[i % len(_FLEET)])
+    return image
+
+
+def _square(image: np.ndarray, x: int, y: int, margin: int, colour: Any) -> None:
+    """Paint a cell but for a margin [pixels]."""
+    top, left, size = y * _CELL + margin, x * _CELL + margin, _CELL + 1 - 2 * margin
+    image[top : top + size, left : left + size] = colour

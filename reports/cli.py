@@ -1,0 +1,400 @@
+"""The ``dess`` command.
+
+Only what the help needs is imported at once; the rest is imported by the command that uses it.
+"""
+
+import json
+import sys
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+from typer.exceptions import TyperException
+
+from dess.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from dess import ScenarioSpace
+    from dess.record import EventLog, MissionRecord
+
+RESULTS, REPORTS = Path("results"), Path("build/reports")
+INTERRUPTED = 130  # what typer returns after Ctrl-C
+FIGURES = (".png", ".pdf", ".svg")
+
+# Metrics of ``simulate --json``, between who flew and the UAVs.
+MISSION_KEYS = (
+    "slots",
+    "success",
+    "collection_ratio",
+    "collection_ratio_and_communication",
+    "initial",
+    "arrived",
+    "collected",
+    "residual",
+)
+
+app = typer.Typer(
+    help="Discrete-event simulation of UAV data harvesting with charging at sea.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+study_app = typer.Typer(help="Run studies: policies x design points x replications.")
+app.add_typer(study_app, name="study")
+
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a field of the scenario, the value in TOML syntax; repeatable.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all randomness.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="How many to work at once.")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        arguments: Without the name of the program; those of the process by default.
+
+    Returns:
+        The exit code: 0 done, 2 bad input, 1 anything else.
+    """
+    try:
+        code = app(arguments, prog_name="dess", standalone_mode=False)
+    except TyperException as error:
+        return _fail(f"dess: error: {error.format_message()}", error.exit_code)
+    except InputError as error:
+        return _fail(f"dess: error: {error}", 2)
+    return _fail("interrupted", 1) if code == INTERRUPTED else code or 0
+
+
+def _fail(message: str, code: int) -> int:
+    """Say in one line on stderr why the command ends with this exit code."""
+    print(" ".join(message.split()), file=sys.stderr)
+    return code
+
+
+@app.command()
+def simulate(
+    scenario: ScenarioOption = "paper",
+    settings: SetOption = None,
+    policy: Annotated[
+        str, typer.Option(metavar="P[,P...]", help="A policy, or one for each UAV in turn.")
+    ] = "greedy",
+    seed: SeedOption = 0,
+    replication: Annotated[int, typer.Option(help="Number of the replication.")] = 0,
+    events: Annotated[
+        Path | None, typer.Option(metavar="FILE.parquet", help="Write the event log.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the mission.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate one mission with the SimPy model."""
+    from analysis.store import replacing
+    from dess import simulate
+    from dess.state import check_seed
+    from policies import load_team
+
+    space, team = _scenario(scenario, settings), load_team(policy)
+    check_seed(seed, replication)
+    if figure and figure.suffix not in FIGURES:
+        raise InputError(f"--figure: {figure} is no picture; allowed: {', '.join(FIGURES)}")
+    with ExitStack() as files:
+        log_file = files.enter_context(replacing(events)) if events else None
+        figure_file = files.enter_context(replacing(figure)) if figure else None
+        with _compile_notice():
+            record = simulate(space, team, seed, replication, events=bool(log_file or figure_file))
+        if log_file and record.events:
+            _write_log(record.events, log_file)
+        if figure and figure_file and record.events:
+            _draw(record, space, figure_file, figure.suffix[1:])
+    if as_json:
+        who = {"policy": policy, "scenario": scenario, "seed": seed, "replication": replication}
+        metrics = {key: getattr(record, key) for key in MISSION_KEYS}
+        print(json.dumps(who | metrics | {"uavs": record.uav_rows()}, indent=2))
+    else:
+        _print_mission(record)
+
+
+@app.command()
+def evaluate(
+    policy: Annotated[
+        list[str], typer.Option(metavar="P[,P...]", help="A policy or a team; repeatable.")
+    ],
+    scenario: ScenarioOption = "paper",
+    settings: SetOption = None,
+    missions: Annotated[int, typer.Option(min=1, help="Replications 0, 1, ... to run.")] = 1000,
+    seed: SeedOption = 0,
+    engine: Annotated[
+        Literal["batch", "events"], typer.Option(help="Both engines give the same records.")
+    ] = "batch",
+    workers: WorkersOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Metrics of many missions, with 95 % intervals."""
+    from analysis.runner import evaluate
+    from dess.state import check_seed
+    from policies import load_team
+
+    space = _scenario(scenario, settings)
+    for team in policy:
+        load_team(team)
+    check_seed(seed, missions - 1)
+    with _compile_notice(), _progress(missions * len(policy)) as progress:
+        evaluations = [
+            evaluate(space, team, missions, seed, engine, workers, progress) for team in policy
+        ]
+    rows = [
+        {
+            "policy": done.policy,
+            "missions": missions,
+            "seed": seed,
+            "engine": engine,
+            "uav_slots": done.uav_slots,
+            "seconds": done.seconds,
+        }
+        | _intervals(done.records.missions)
+        for done in evaluations
+    ]
+    if as_json:
+        print(json.dumps(rows, indent=2))
+    else:
+        _print_evaluations(rows)
+
+
+@study_app.command("run")
+def study_run(
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help=f"Results folder.  [default: {RESULTS}/NAME]"),
+    ] = None,
+    workers: WorkersOption = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on this dask.distributed scheduler."),
+    ] = None,
+    missions: Annotated[
+        int | None, typer.Option(min=1, help="Missions per design point and policy.")
+    ] = None,
+    policy: Annotated[
+        list[str] | None, typer.Option(metavar="P[,P...]", help="Policies instead; repeatable.")
+    ] = None,
+) -> None:
+    """Run a study into a results folder; run again to resume or to top up."""
+    from analysis.runner import run_study
+    from analysis.study import load_study
+
+    changes = {"missions": missions, "policies": policy}
+    study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
+    out = out or RESULTS / study.name
+    total = study.missions * len(study.policies) * len(study.points)
+    try:
+        with _compile_notice(), _progress(total) as progress:
+            run_study(study, out, workers, scheduler, progress)
+    except KeyboardInterrupt:
+        line = "interrupted: run the same command again to complete it"
+        raise typer.Exit(_fail(line, 1)) from None
+    print(
+        f"{out}: {total} missions of study {study.name} ({len(study.policies)} policies "
+        f"x {len(study.points)} design points x {study.missions} replications)"
+    )
+
+
+@app.command()
+def report(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Reports; all by default.")
+    ] = None,
+    results: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
+    ] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = REPORTS,
+) -> None:
+    """Run the notebooks on the results and render them to HTML, with an index."""
+    from reports.render import ReportError, render
+
+    try:
+        with _cells() as progress:
+            print(render(names or [], results, out, progress=progress))
+    except ReportError as error:
+        raise typer.Exit(_fail(f"dess: error: {error}", 1)) from error
+
+
+@app.command()
+def policies() -> None:
+    """List the policies."""
+    from policies.registry import SHIPPED, names
+
+    outside = ("", "of another package")
+    _print_list((name, SHIPPED.get(name, outside)[1]) for name in names())
+
+
+@app.command()
+def scenarios() -> None:
+    """List the shipped scenarios."""
+    from dess import scenario_names
+
+    _print_list((name, "") for name in scenario_names())
+
+
+@app.command()
+def studies() -> None:
+    """List the shipped studies."""
+    from analysis.study import load_study, study_names
+
+    _print_list((name, load_study(name).description) for name in study_names())
+
+
+def _scenario(name: str, settings: list[str] | None) -> "ScenarioSpace":
+    """The scenario with the fields that ``--set`` sets."""
+    from dess import load_scenario
+
+    return load_scenario(name, **dict(_setting(text) for text in settings or []))
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    """``KEY=VALUE`` as key and value."""
+    key, equals, value = text.partition("=")
+    try:
+        parsed = tomllib.loads(f"value = {value}")
+    except tomllib.TOMLDecodeError as error:
+        parsed = {"error": error}
+    if not equals or parsed.keys() != {"value"}:
+        raise InputError(
+            f"--set: {text!r} is not KEY=VALUE; allowed: a field of the scenario and a value in "
+            "TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
+        )
+    return key.strip(), parsed["value"]
+
+
+def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:
+    """The metrics of missions: mean, low and high of each."""
+    import pandas as pd
+
+    from analysis.statistics import summary
+
+    rows = summary(pd.DataFrame(missions), by=[]).set_index("metric")[["mean", "low", "high"]]
+    return rows.to_dict("index")
+
+
+def _write_log(log: "EventLog", path: Path) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    pq.write_table(pa.table(log.columns()), path)
+
+
+def _draw(record: "MissionRecord", space: "ScenarioSpace", path: Path, kind: str) -> None:
+    import pandas as pd
+
+    from analysis.figures import mission_figure
+    from dess.state import sample_scenario
+
+    assert record.events is not None
+    scenario = sample_scenario(space, record.seed, record.replication)
+    mission_figure(pd.DataFrame(record.events.columns()), scenario).savefig(path, format=kind)
+
+
+def _print_list(entries: Iterable[tuple[str, str]]) -> None:
+    for name, description in entries:
+        print(f"{name:12} {description}".rstrip())
+
+
+def _print_mission(record: "MissionRecord") -> None:
+    metrics = record.metrics
+    _print_table(["", "mission"], [[m, f"{metrics[m].item():g}"] for m in metrics.dtype.names])
+    uavs = record.uav_rows()
+    rows = [[str(i), *map(str, row.values())] for i, row in enumerate(uavs)]
+    _print_table(["UAV", *uavs[0]], rows)
+
+
+def _print_evaluations(evaluations: list[dict[str, Any]]) -> None:
+    for done in evaluations:
+        intervals = {m: value for m, value in done.items() if isinstance(value, dict)}
+        rows = [[m, *(f"{x:.4f}" for x in value.values())] for m, value in intervals.items()]
+        _print_table([done["policy"], "mean", "low", "high"], rows)
+        speed = done["uav_slots"] / done["seconds"]
+        print(
+            f" {done['missions']} missions, {done['uav_slots']} UAV-slots in "
+            f"{done['seconds']:.2f} s: {speed:,.0f} UAV-slots/s"
+        )
+
+
+def _print_table(header: list[str], rows: list[list[str]]) -> None:
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=SIMPLE_HEAD)
+    for number, title in enumerate(header):
+        table.add_column(Text(title), justify="right" if number else "left")
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console().print(table)
+
+
+@contextmanager
+def _progress(missions: int) -> "Iterator[Callable[[int], object]]":
+    """A progress bar on stderr for what takes longer than a second."""
+    from tqdm import tqdm
+
+    interval = 0.1 if sys.stderr.isatty() else 10
+    with tqdm(total=missions, unit="mission", delay=1, mininterval=interval) as bar:
+        yield bar.update
+
+
+@contextmanager
+def _cells() -> "Iterator[Callable[[str, int, int], None]]":
+    """Progress of the reports on stderr, cell by cell."""
+    from tqdm import tqdm
+
+    with tqdm(unit="cell") as bar:
+
+        def show(name: str, done: int, total: int) -> None:
+            if done == 1:
+                bar.reset(total)
+            bar.set_description(name, refresh=False)
+            bar.update(done - bar.n)
+
+        yield show
+
+
+@contextmanager
+def _compile_notice() -> Iterator[None]:
+    """Say it, once, if numba compiles something that its cache has not."""
+    from numba.core.event import Event, Listener, install_listener
+
+    class Notice(Listener):
+        said = False
+
+        def on_start(self, event: Event) -> None:
+            if not self.said:
+                print("compiling the simulator (first run only) ...", file=sys.stderr)
+            self.said = True
+
+        def on_end(self, event: Event) -> None:
+            pass
+
+    with install_listener("numba:compile", Notice()):
+        yield
+
+
+if __name__ == "__main__":
+    sys.exit(main())

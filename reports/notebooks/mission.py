@@ -1,0 +1,164 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [fig4]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Missions
+#
+# Where one, two and three UAVs fly, which sensor node they serve on the way, when they charge and
+# what they leave behind: the missions of the paper's Fig. 4, flown by one policy.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder that holds the results folder of the study fig4
+policy = None  # the policy to show; None for the best by collection ratio and communication
+replication = 0  # the replication to show, one whose event log is kept
+
+# %%
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import Markdown, display
+
+from analysis import figures, load_results, paper, summary
+from dess.state import sample_scenario
+from reports import page
+
+study = load_results(Path(results) / "fig4")
+means = summary(study.missions, by=["policy"])
+product = means[means["metric"] == "collection_ratio_and_communication"].set_index("policy")
+policy = policy or product["mean"].idxmax()
+ratios = summary(study.missions.query("policy == @policy"), by=["point"])
+ratios = ratios[ratios["metric"] == "collection_ratio"].set_index("point")
+
+points = range(len(study.manifest["points"]))
+seed = study.manifest["seed"]
+logs = [study.events(policy, point, replication) for point in points]
+scenarios = [sample_scenario(study.scenario(point), seed, replication) for point in points]
+shown = "policy == @policy and replication == @replication"
+missions = study.missions.query(shown).set_index("point")
+uavs = study.uavs.query(shown)
+
+# %%
+best = " the best of the study by" if policy == product["mean"].idxmax() else ""
+display(
+    Markdown(
+        f"The policy is **{policy}**,{best} collection ratio and communication "
+        f"{page.interval(*product.loc[policy, ['mean', 'low', 'high']])} over "
+        f"{product.loc[policy, 'n']:,} missions. Each column is a single mission, replication "
+        f"{replication} of seed {seed}: an example, not an average. All three meet the same sea: "
+        "initial data, arrivals and shadowing are equal, only the number of UAVs differs."
+    )
+)
+
+
+# %%
+printed = [paper.FIG_4[uavs]["collection_ratio"] for uavs in missions["uavs"]]
+
+
+def captioned(point):
+    mission, ratio = missions.loc[point], ratios.loc[point]
+    outcome = "all quotas filled" if mission["success"] else "not all quotas filled"
+    title = f"I = {mission['uavs']}: {page.percent(mission['collection_ratio'])} collected, {outcome}"
+    caption = (
+        f"{mission['slots']} mission slots; {mission['collected']:.0f} of "
+        f"{mission['initial'] + mission['arrived']:.0f} data units collected. Mean of this policy "
+        f"over {ratio['n']:,} missions {page.interval(*ratio[['mean', 'low', 'high']])}, "
+        f"the paper's {page.percent(printed[point])}."
+    )
+    figure = figures.mission_figure(logs[point], scenarios[point], title)
+    alt = f"Map of the mission with I = {mission['uavs']}; battery, residual data and charging"
+    return figure, alt, caption
+
+
+page.gallery([captioned(point) for point in points])
+
+# %% [markdown]
+# **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
+# in the colour of the node that was served in most of the slot's communication slots (the last of
+# them on a tie); grey where none was. A cross is a slot of hovering, in the same colours, a star a
+# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs that
+# share a path are drawn side by side. y grows south.
+#
+# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to charge, C<sub>C</sub>
+# the one at which charging ends. A band of residual data is one node, in its colour; bands that stay
+# are nodes that nobody has emptied.
+
+# %% [markdown]
+# ## What one sees
+
+
+# %%
+def sights(point):
+    log, mission = logs[point], missions.loc[point]
+    served = set(log.loc[log["event"] == "communication", "node"])
+    ends = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
+    fullest = ends.loc[ends["value"].idxmax()]
+    return {
+        "UAVs": mission["uavs"],
+        "Success": "yes" if mission["success"] else "no",
+        "Collected": page.percent(mission["collection_ratio"]),
+        "Mission slots": mission["slots"],
+        "Charging sessions": (log["event"] == "charge_start").sum(),
+        "Nodes never served": f"{len(ends) - len(served)} of {len(ends)}",
+        "Data left": f"{mission['residual']:.1f}",
+        "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
+    }
+
+
+seen = pd.DataFrame([sights(point) for point in points])
+first, last = seen.iloc[0], seen.iloc[-1]
+display(
+    Markdown(
+        f"From {first['UAVs']} to {last['UAVs']} UAVs, what is collected goes from "
+        f"{first['Collected']} to {last['Collected']} in these missions, from "
+        f"{page.percent(ratios['mean'].iloc[0])} to {page.percent(ratios['mean'].iloc[-1])} in the "
+        f"mean of {policy}, and from {page.percent(printed[0])} to {page.percent(printed[-1])} in "
+        "the paper."
+    )
+)
+page.table(seen, "The three missions; data in data units")
+
+# %% [markdown]
+# ## Every UAV
+
+# %%
+page.table(
+    pd.DataFrame(
+        {
+            "UAVs": uavs["point"].map(missions["uavs"]),
+            "UAV": uavs["uav"] + 1,
+            "Communications": [f"{n} of {scenarios[0].quota}" for n in uavs["quota"]],
+            "Data collected": uavs["collected"].map("{:.1f}".format),
+            "Slots flying": uavs["slots_flying"],
+            "Slots charging": uavs["slots_charging"],
+            "Slots waiting": uavs["slots_waiting"],
+            "Battery at the end": uavs["battery"].map("{} %".format),
+            "End": uavs["end"].map(
+                {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
+            ),
+        }
+    ),
+    "Communications are the communication slots that count toward the quota",
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+command = (
+    f"dess simulate --scenario {study.manifest['study']['scenario']} --set uavs={{}} "
+    f"--policy {policy} --seed {seed} --replication {replication}"
+)
+display(
+    Markdown(
+        "Each mission can be flown again:\n"
+        + "".join(f"\n- `{command.format(uavs)}`" for uavs in missions["uavs"])
+    )
+)
+page.provenance([study.manifest])

@@ -1,0 +1,18 @@
+"""Set-up of the whole test session: the hypothesis profiles.
+
+By default properties draw few examples, always the same. With ``--hypothesis-profile=verify`` they
+draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs them too.
+"""
+
+import pytest
+from hypothesis import is_hypothesis_test, settings
+
+settings.register_profile("default", max_examples=40, deadline=None, derandomize=True)
+settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
+settings.load_profile("default")
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    deep = item.config.getoption("hypothesis_profile") == "verify"
+    if deep and is_hypothesis_test(getattr(item, "obj", None)):
+        item.add_marker(pytest.mark.slow)

@@ -1,0 +1,366 @@
+"""Both engines, any grouping: the same mission is the same record, bit for bit."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+from dess.batch import simulate_batch
+from dess.errors import InputError
+from dess.mission import simulate
+from dess.record import EVENT_NAMES, MissionRecord, Records
+from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
+from dess.view import View
+from tests.drawn import (
+    Commuter,
+    Fidget,
+    Script,
+    Wanderer,
+    replications,
+    seeds,
+    spaces,
+    teams,
+)
+
+# Few pads, many UAVs, short batteries: everything happens that can happen.
+BUSY = ScenarioSpace.of(
+    grid=7,
+    zone=[2, 3, 3, 2],
+    uavs=[1, 6],
+    pads=2,
+    nodes=[[0, 0], [3, 1], [6, 6], [1, 5]],
+    flying_time=[15, 40],
+    charge_start=[12, 20],
+    charge_complete=[25, 45],
+    charge_rate=4,
+    communication_slots=5,
+    quota=280,
+    max_slots=70,
+)
+
+
+def _is(records: Records, job: int, single: MissionRecord) -> bool:
+    """Whether a row of a batch is a single mission, to the last bit."""
+    fleet = len(single.uavs)
+    absent = records.uavs[job, fleet:]
+    return (
+        records.missions[job].tobytes() == single.metrics.tobytes()
+        and records.uavs[job, :fleet].tobytes() == single.uavs.tobytes()
+        and absent.tobytes() == np.zeros_like(absent).tobytes()
+    )
+
+
+def _equal(one: Records, other: Records) -> bool:
+    return all(a.tobytes() == b.tobytes() for a, b in zip(one, other, strict=True))
+
+
+@given(spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4))
+def test_both_engines_give_the_same_record(
+    space: ScenarioSpace, team: Sequence[Any], seed: int, numbers: list[int]
+) -> None:
+    records = simulate_batch(space, team, seed, numbers, lanes=2)
+    for job, replication in enumerate(numbers):
+        assert _is(records, job, simulate(space, team, seed, replication))
+    for name, code in (("quota", QUOTA), ("battery", BATTERY), ("truncated", TRUNCATED)):
+        if (records.uavs["end"] == code).any():
+            event(f"end {name}")
+    if records.uavs["slots_waiting"].any():
+        event("queue")
+    if records.uavs["slots_charging"].any():
+        event("charging")
+
+
+@pytest.mark.parametrize("forbid_swaps", [False, True])
+def test_both_engines_agree_where_everything_happens(forbid_swaps: bool) -> None:
+    space = ScenarioSpace.of(BUSY, forbid_swaps=forbid_swaps)
+    seen, ends, fleets, waited = set(), set(), set(), 0
+    for policy in (Wanderer(), Commuter(), Fidget()):
+        records = simulate_batch(space, policy, 2**64 - 1, 25)
+        for job in range(25):
+            single = simulate(space, policy, 2**64 - 1, job, events=True)
+            assert _is(records, job, single)
+            assert single.events is not None
+            seen.update(single.events.event)
+            ends.update(single.uavs["end"].tolist())
+            fleets.add(len(single.uavs))
+            waited += int(single.uavs["slots_waiting"].sum())
+    assert seen == set(EVENT_NAMES)
+    assert ends == {QUOTA, BATTERY, TRUNCATED}
+    assert fleets == {1, 2, 3, 4, 5, 6}
+    assert waited > 100
+
+
+def test_a_pad_given_back_inside_a_slot_is_handed_on_in_that_slot() -> None:
+    """UAV 2 waits, gets the pad when UAV 0 is full, flies off; UAV 1 asks in that very slot.
+
+    Battery 12, C_S 11: from slot 1 on all are latched. UAV 0 charges in slots 1 and 2
+    (11 -> 16 -> 20 = C_C). UAV 2 waits in slots 1 and 2 and leaves in slot 3. UAV 1 is away until
+    slot 2 and asks in slot 3: its battery is 12 - 3 = 9 then, and 9 + 5 = 14 after it.
+    """
+    scenario = Scenario.of(
+        grid=4,
+        zone=[0, 1, 3, 1],
+        uavs=3,
+        pads=1,
+        nodes=[[3, 3]],
+        flying_time=12,
+        charge_start=11,
+        charge_complete=20,
+        charge_rate=5,
+        max_slots=4,
+    )
+    script = Script("....", "NS..", "...N")
+    single = simulate(scenario, script, 0, 0, events=True)
+    assert single.events is not None
+    log = single.events.columns()
+    begun = log["event"] == "charge_start"
+    assert list(zip(log["time"][begun], log["uav"][begun], strict=True)) == [(1.0, 0), (3.0, 1)]
+    assert single.uavs["slots_charging"].tolist() == [2, 1, 0]
+    assert single.uavs["slots_waiting"].tolist() == [0, 1, 2]
+    assert single.uavs["battery"].tolist() == [19, 14, 8]
+    assert _is(simulate_batch(scenario, script, 0, 1), 0, single)
+
+
+# --- batches ---
+
+
+def test_a_batch_is_its_missions_in_any_order_and_grouping() -> None:
+    numbers = np.array([5, 3, 2**32 - 1, 0, 77, 3, 12, 8])
+    whole = simulate_batch(BUSY, Fidget(), 9, numbers)
+    assert whole.missions["replication"].tolist() == numbers.tolist()
+    for lanes in (1, 3, 100):
+        assert _equal(simulate_batch(BUSY, Fidget(), 9, numbers, lanes=lanes), whole)
+    order = np.random.default_rng(1).permutation(len(numbers))
+    shuffled = simulate_batch(BUSY, Fidget(), 9, numbers[order], lanes=4)
+    assert _equal(shuffled, Records(whole.missions[order], whole.uavs[order]))
+    for job, number in enumerate(numbers):
+        alone = simulate_batch(BUSY, Fidget(), 9, [number])
+        assert _equal(alone, Records(whole.missions[[job]], whole.uavs[[job]]))
+
+
+@pytest.mark.parametrize("workers", [2, 3, 20])
+def test_workers_change_nothing(workers: int) -> None:
+    one = simulate_batch(BUSY, [Fidget(), Wanderer()], 4, 13, workers=1)
+    assert _equal(simulate_batch(BUSY, [Fidget(), Wanderer()], 4, 13, workers=workers), one)
+
+
+@given(st.lists(spaces(), min_size=2, max_size=5), st.data(), seeds)
+def test_scenarios_of_different_worlds_fly_in_one_batch(
+    worlds: list[ScenarioSpace], data: st.DataObject, seed: int
+) -> None:
+    # The same worlds again with other fleets, so that some missions share a world.
+    mixed = worlds + [ScenarioSpace.of(space, uavs=1) for space in worlds]
+    mixed = data.draw(st.permutations(mixed))
+    workers = data.draw(st.integers(1, 2))
+    records = simulate_batch(mixed, Fidget(), seed, range(len(mixed)), workers=workers, lanes=2)
+    for job, space in enumerate(mixed):
+        assert _is(records, job, simulate(space, Fidget(), seed, job))
+
+
+def test_scenarios_must_match_the_replications() -> None:
+    with pytest.raises(ValueError, match="2 scenarios for 4 replications"):
+        simulate_batch([BUSY, BUSY], Wanderer(), 0, 4)
+
+
+def test_a_count_of_replications_counts_from_0() -> None:
+    for count in (3, np.int64(3)):
+        records = simulate_batch(BUSY, Wanderer(), 1, count)
+        assert records.missions["replication"].tolist() == [0, 1, 2]
+        assert (records.missions["seed"] == 1).all()
+    assert len(simulate_batch(BUSY, Wanderer(), 1, []).missions) == 0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_progress_counts_every_mission_once(workers: int) -> None:
+    finished: list[int] = []
+    simulate_batch(BUSY, Wanderer(), 1, 30, lanes=4, workers=workers, progress=finished.append)
+    assert sum(finished) == 30
+    assert len(finished) > 1
+    assert min(finished) > 0
+
+
+def test_another_seed_or_replication_is_another_mission() -> None:
+    one = simulate_batch(BUSY, Wanderer(), 1, 40).missions["initial"]
+    other = simulate_batch(BUSY, Wanderer(), 2, 40).missions["initial"]
+    assert len(set(one) | set(other)) == 80
+
+
+# --- spaces ---
+
+
+@given(spaces(), seeds, replications)
+def test_a_mission_of_a_space_is_the_mission_of_its_drawn_scenario(
+    space: ScenarioSpace, seed: int, replication: int
+) -> None:
+    drawn = sample_scenario(space, seed, replication)
+    one = simulate(space, Fidget(), seed, replication)
+    other = simulate(drawn, Fidget(), seed, replication)
+    assert one.metrics.tobytes() == other.metrics.tobytes()
+    assert one.uavs.tobytes() == other.uavs.tobytes()
+    assert one.metrics["uavs"] == drawn.uavs == len(one.uavs)
+    assert one.flying_time == drawn.flying_time
+
+
+# --- common random numbers ---
+
+
+def _arrivals(record: MissionRecord) -> dict[tuple[float, int], float]:
+    assert record.events is not None
+    log = record.events.columns()
+    arrival = log["event"] == "arrival"
+    keys = zip(log["time"][arrival].tolist(), log["node"][arrival].tolist(), strict=True)
+    return dict(zip(keys, log["value"][arrival].tolist(), strict=True))
+
+
+@given(spaces(arrival_rate=0.3), seeds, replications)
+def test_two_policies_meet_the_same_sea(space: ScenarioSpace, seed: int, replication: int) -> None:
+    one = simulate(space, Wanderer(), seed, replication, events=True)
+    other = simulate(space, Commuter(), seed, replication, events=True)
+    assert one.events is not None
+    assert other.events is not None
+    count = one.events.event.count("mission_start")
+    for name in ("uav", "node", "value", "x", "y"):  # start cells and initial data
+        assert getattr(one.events, name)[:count] == getattr(other.events, name)[:count]
+    assert one.initial == other.initial
+    until = min(one.slots, other.slots)
+    assert {key: n for key, n in _arrivals(one).items() if key[0] <= until} == {
+        key: n for key, n in _arrivals(other).items() if key[0] <= until
+    }
+
+
+def test_shadowing_does_not_depend_on_teammates() -> None:
+    """With data without end UAV 0 serves the same nodes at the same rates, whoever flies beside it."""
+    scenario = Scenario.of(
+        grid=12,
+        zone=[4, 4, 3, 3],
+        uavs=3,
+        altitude=3000,
+        shadowing_variance=9,
+        initial_data=1e9,
+        nodes=[[x, y] for x in range(0, 12, 2) for y in range(0, 12, 2)],
+        max_slots=25,
+    )
+
+    def flight(*routes: str) -> list[tuple[float, int, float]]:
+        log = simulate(scenario, Script(*routes), 6, 7, events=True).events
+        assert log is not None
+        table = log.columns()
+        mine = (table["event"] == "communication") & (table["uav"] == 0)
+        columns = [table[name][mine].tolist() for name in ("time", "node", "value")]
+        return list(zip(*columns, strict=True))
+
+    # UAV 0 keeps clear of the others, who leave the zone southward or stay out of its way.
+    alone = flight("N" * 3, "....", "....")
+    beside = flight("N" * 3, "SSSSSSSS", "EEE")
+    assert len(alone) == 25 * 4
+    assert [row[:2] for row in alone] == [row[:2] for row in beside]
+    assert len({row[1] for row in alone}) > 3  # shadowing decides whom it serves
+    # What it takes: the difference of two numbers near 1e9 in neither case, so equal to the bit.
+    assert alone == beside
+
+
+# --- teams ---
+
+
+class _Watcher:
+    """Hovers, and remembers whom it was asked for."""
+
+    def __init__(self, name: str):
+        self.name, self.asked_for = name, set()  # type: ignore[var-annotated]
+
+    def act(self, view: View) -> np.ndarray:
+        self.asked_for.update(view.uav.tolist())
+        return np.full(len(view), HOVER)
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_batch])
+def test_uav_i_has_policy_i_modulo_the_team(run: Any) -> None:
+    team = [_Watcher("a"), _Watcher("b")]
+    run(ScenarioSpace.of(BUSY, uavs=5), team, 0)
+    assert team[0].asked_for == {0, 2, 4}
+    assert team[1].asked_for == {1, 3}
+
+
+class _Spy(_Watcher):
+    """Notes what a team mate's entry says of the present slot's decision."""
+
+    def act(self, view: View) -> np.ndarray:
+        self.asked_for.update(view.team["action"][:, 0].tolist())
+        return np.full(len(view), HOVER)
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_batch])
+def test_nobody_sees_what_a_teammate_has_just_decided(run: Any) -> None:
+    spy = _Spy("spy")
+    run(ScenarioSpace.of(BUSY, uavs=2, max_slots=1), [Script("N"), spy], 0)
+    assert spy.asked_for == {HOVER}
+
+
+def test_a_team_of_equals_is_one_policy() -> None:
+    alone = simulate_batch(BUSY, Fidget(), 3, 10)
+    assert _equal(simulate_batch(BUSY, [Fidget(), Fidget(), Fidget()], 3, 10), alone)
+    assert not _equal(simulate_batch(BUSY, [Fidget(), Wanderer()], 3, 10), alone)
+
+
+# --- what is refused ---
+
+
+class _Answer:
+    name = "answer"
+
+    def __init__(self, actions: Any):
+        self.actions = actions
+
+    def act(self, view: View) -> Any:
+        return self.actions(len(view))
+
+
+NO_ACTIONS = {
+    "too large": lambda rows: np.full(rows, 5),
+    "negative": lambda rows: np.full(rows, -1),
+    "too many": lambda rows: np.full(rows + 1, 0),
+    "a scalar": lambda rows: 0,
+    "real": lambda rows: np.full(rows, 1.0),
+    "truth": lambda rows: np.full(rows, True),
+    "none": lambda rows: None,
+}
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_batch])
+@pytest.mark.parametrize("actions", NO_ACTIONS.values(), ids=NO_ACTIONS.keys())
+def test_what_is_no_action_is_refused(run: Any, actions: Any) -> None:
+    with pytest.raises(ValueError, match="policy answer: act must return"):
+        run(BUSY, _Answer(actions), 0)
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_batch])
+def test_bad_arguments_are_refused(run: Any) -> None:
+    with pytest.raises(InputError, match="seed: -1 is out of range"):
+        run(BUSY, Wanderer(), -1)
+    with pytest.raises(ValueError, match="at least one policy"):
+        run(BUSY, [], 0)
+    with pytest.raises((InputError, TypeError)):
+        run(BUSY, Wanderer(), 1.5)
+
+
+def test_bad_replications_and_workers_are_refused() -> None:
+    with pytest.raises(InputError, match="replication: 4294967296 is out of range"):
+        simulate_batch(BUSY, Wanderer(), 0, [0, 2**32])
+    with pytest.raises(InputError, match="replication: -1 is out of range"):
+        simulate_batch(BUSY, Wanderer(), 0, [-1, 4])
+    with pytest.raises(ValueError, match="integers"):
+        simulate_batch(BUSY, Wanderer(), 0, [0.5])
+    for wrong in ({"workers": 0}, {"lanes": 0}):
+        with pytest.raises(ValueError, match="at least 1"):
+            simulate_batch(BUSY, Wanderer(), 0, 3, **wrong)
+
+
+def test_the_paper_scenario_on_both_engines() -> None:
+    paper = load_scenario("paper")
+    records = simulate_batch(paper, Commuter(), 20_000, 6)
+    for replication in range(6):
+        assert _is(records, replication, simulate(paper, Commuter(), 20_000, replication))

@@ -1,0 +1,287 @@
+"""Scenarios: TOML in and out, refusals in one clear line, and the draws of a space."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.drawn import replications, scenarios, seeds, spaces
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from dess import streams
+from dess.errors import InputError
+from dess.scenario import (
+    SAMPLED,
+    Scenario,
+    ScenarioSpace,
+    load_scenario,
+    parse_toml,
+    scenario_names,
+)
+from dess.state import check_seed, constants_of, sample_scenario, spaces_of, world_of
+
+
+def _load_text(text: str, folder: Path) -> ScenarioSpace:
+    path = folder / "scenario.toml"
+    path.write_text(text, "utf-8")
+    return load_scenario(path)
+
+
+# --- TOML ---
+
+
+@given(spaces())
+def test_a_space_survives_toml(space: ScenarioSpace) -> None:
+    values = parse_toml(space.to_toml(), "text")
+    assert ScenarioSpace.of(**values) == space
+
+
+@given(scenarios())
+def test_a_scenario_survives_toml(scenario: Scenario) -> None:
+    values = parse_toml(scenario.to_toml(), "text")
+    assert Scenario.of(**values) == scenario
+    assert ScenarioSpace.of(**values) == ScenarioSpace.of(scenario)
+
+
+def test_a_file_is_read_back(tmp_path: Path) -> None:
+    space = load_scenario("paper", uavs=[2, 4], pads=3, nodes=[[1, 2], [30, 31]])
+    assert _load_text(space.to_toml(), tmp_path) == space
+
+
+def test_the_shipped_scenarios_are_the_papers() -> None:
+    assert scenario_names() == ["fig4", "paper"]
+    paper, fig4 = load_scenario("paper"), load_scenario("fig4")
+    assert paper == ScenarioSpace.of()  # Section VI-A and Table II are the defaults
+    assert (paper.uavs, paper.initial_data, paper.flying_time) == ((1, 3), (5.0, 20.0), (70, 80))
+    assert (paper.charge_start, paper.charge_complete) == ((10, 50), (60, 100))
+    assert (fig4.uavs, fig4.initial_data, fig4.flying_time) == ((1, 3), (12.5, 12.5), (80, 80))
+    assert (fig4.charge_start, fig4.charge_complete) == ((30, 30), (80, 80))
+    for space in (paper, fig4):
+        assert (space.grid, space.cell_size, space.altitude) == (32, 800.0, 10.0)
+        assert (space.communication_slots, space.quota, space.arrival_rate) == (4, 440, 0.02)
+        assert (space.path_loss_exponent, space.shadowing_variance) == (2.27, 2.0)
+        assert (space.zone, space.max_slots, space.pads) == ((26, 2, 4, 4), 500, None)
+        assert sorted(space.nodes) == [
+            (x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26)
+        ]
+        rewards = (space.reward_data, space.reward_overruled, space.reward_depleted)
+        assert rewards == (1.3, -1.0, -300.0)
+        rewards = (space.reward_charging, space.reward_quota, space.reward_step)
+        assert rewards == (0.05, 100.0, -0.1)
+
+
+def test_scenarios_are_frozen() -> None:
+    with pytest.raises(ValidationError):
+        load_scenario("paper").grid = 10  # type: ignore[misc]
+
+
+# --- refusals ---
+
+REFUSED = [
+    ({"speed": 3}, "speed", "unknown key"),
+    ({"uavs": 2.0}, "uavs", "2.0"),
+    ({"uavs": True}, "uavs", "True"),
+    ({"uavs": "2"}, "uavs", "'2'"),
+    ({"uavs": 0}, "uavs", "1..16"),
+    ({"uavs": 17}, "uavs", "1..16"),
+    ({"uavs": [3, 1]}, "uavs", "1..16"),
+    ({"uavs": [1, 2, 3]}, "uavs", "at most 2"),
+    ({"grid": "32"}, "grid", "integer"),
+    ({"grid": 32.0}, "grid", "integer"),
+    ({"grid": 1}, "grid", "greater than or equal to 2"),
+    ({"cell_size": 0}, "cell_size", "greater than 0"),
+    ({"cell_size": True}, "cell_size", "number"),
+    ({"altitude": float("inf")}, "altitude", "finite"),
+    ({"edge_snr": float("nan")}, "edge_snr", "finite"),
+    ({"nodes": []}, "nodes", "at least 1"),
+    ({"nodes": [[1, 2, 3]]}, "nodes.0", "at most 2"),
+    ({"nodes": [[1.5, 2]]}, "nodes.0.0", "integer"),
+    ({"nodes": [[0, 0], [32, 0]]}, "nodes: [32, 0]", "0 <= x, y < 32"),
+    ({"nodes": [[0, -1]]}, "nodes: [0, -1]", "0 <= x, y < 32"),
+    ({"nodes": [[4, 5], [6, 7], [4, 5]]}, "nodes: [4, 5]", "distinct"),
+    ({"zone": [29, 2, 4, 4]}, "zone: [29, 2, 4, 4]", "x + width"),
+    ({"zone": [-1, 2, 4, 4]}, "zone: [-1, 2, 4, 4]", "0 <= x"),
+    ({"zone": [0, 0, 0, 4]}, "zone: [0, 0, 0, 4]", "allowed"),
+    ({"zone": [1, 2, 3]}, "zone", "required"),
+    ({"pads": 17}, "pads: 17", "1..16"),
+    ({"pads": 0}, "pads", "greater than or equal to 1"),
+    ({"forbid_swaps": 1}, "forbid_swaps", "boolean"),
+    ({"communication_slots": 0}, "communication_slots", "greater than or equal to 1"),
+    ({"max_slots": 0}, "max_slots", "greater than or equal to 1"),
+    ({"shadowing_variance": -0.1}, "shadowing_variance", "greater than or equal to 0"),
+    ({"arrival_rate": 101}, "arrival_rate", "less than or equal to 100"),
+    ({"arrival_rate": -1}, "arrival_rate", "greater than or equal to 0"),
+    ({"quota": 0}, "quota", "greater than or equal to 1"),
+    ({"initial_data": -1}, "initial_data", "0 <= low <= high"),
+    ({"initial_data": [5, 4]}, "initial_data", "0 <= low <= high"),
+    ({"initial_data": True}, "initial_data", "True"),
+    ({"flying_time": 101}, "flying_time", "1..100"),
+    ({"flying_time": [0, 5]}, "flying_time", "1..100"),
+    ({"charge_start": 9}, "charge_start", "10..100"),
+    ({"charge_complete": 101}, "charge_complete", "10..100"),
+    ({"charge_start": 60}, "charge_start: 60", "10 <= charge_start < charge_complete <= 100"),
+    ({"charge_start": [10, 70]}, "charge_start: 70", "charge_complete 60"),
+]
+
+
+@pytest.mark.parametrize(("values", "key", "allowed"), REFUSED, ids=lambda v: str(v)[:40])
+def test_bad_values_are_refused_in_one_line(values: dict, key: str, allowed: str) -> None:
+    with pytest.raises(InputError) as error:
+        load_scenario("paper", **values)
+    line = str(error.value)
+    assert "\n" not in line
+    assert line.startswith(f"scenario paper: {key}")
+    assert allowed in line
+
+
+def test_an_unknown_key_is_told_the_known_ones() -> None:
+    with pytest.raises(InputError) as error:
+        Scenario.of(chargestart=30)
+    assert set(str(error.value).partition("allowed: ")[2].split(", ")) == set(Scenario.model_fields)
+
+
+def test_a_single_scenario_keeps_eq_1_and_its_zone() -> None:
+    with pytest.raises(InputError, match="charge_start: 50 is not below charge_complete 50"):
+        Scenario.of(charge_start=50, charge_complete=50)
+    with pytest.raises(InputError, match=r"uavs: 5 is not within 1\.\.4"):
+        Scenario.of(zone=[0, 0, 2, 2], uavs=5)
+    with pytest.raises(InputError, match="uavs"):
+        Scenario.of(uavs=[1, 2])
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"uavs = [1, 3", "not valid TOML"),
+        (b"uavs = 1\nuavs = 2\n", "not valid TOML"),
+        (b"\xff\xfe\x00", "cannot be read"),
+        (b"quotas = 3\n", "quotas: unknown key"),
+    ],
+)
+def test_bad_files_are_named(tmp_path: Path, content: bytes, complaint: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError) as error:
+        load_scenario(path)
+    assert "\n" not in str(error.value)
+    assert str(error.value).startswith(f"{path}: {complaint}")
+
+
+def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such scenario; allowed: fig4, paper, or a TOML file"):
+        load_scenario("papper")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_scenario(tmp_path)
+
+
+@pytest.mark.parametrize("values", [(-1, 0), (2**64, 0), (0, -1), (0, 2**32)])
+def test_seeds_off_the_counter_are_refused(values: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match="out of range; allowed: 0.."):
+        check_seed(*values)
+    check_seed(streams.MAX_SEED, streams.MAX_REPLICATION)
+
+
+# --- sampling ---
+
+
+def test_setting_a_sampled_field_fixes_it() -> None:
+    space = load_scenario("paper", uavs=2, charge_start=30)
+    assert (space.uavs, space.charge_start) == ((2, 2), (30, 30))
+    for replication in range(20):
+        drawn = sample_scenario(space, 5, replication)
+        assert (drawn.uavs, drawn.charge_start) == (2, 30)
+
+
+def test_both_ends_of_every_range_are_drawn_about_equally_often() -> None:
+    space = load_scenario("paper")
+    drawn = [sample_scenario(space, 11, replication) for replication in range(3000)]
+    for name in SAMPLED:
+        low, high = getattr(space, name)
+        values = np.array([getattr(scenario, name) for scenario in drawn])
+        assert values.min() == low
+        assert values.max() == high
+        counts = np.bincount(values - low, minlength=high - low + 1)
+        expected = len(drawn) / len(counts)
+        # 5 standard deviations of a binomial count: about 1e-6 per value.
+        assert abs(counts - expected).max() < 5 * np.sqrt(expected)
+
+
+def test_sampled_parameters_are_uncorrelated() -> None:
+    space = load_scenario("paper")
+    drawn = [sample_scenario(space, 12, replication) for replication in range(2000)]
+    table = np.array([[getattr(scenario, name) for name in SAMPLED] for scenario in drawn])
+    off_diagonal = np.corrcoef(table.T) - np.eye(len(SAMPLED))
+    assert abs(off_diagonal).max() < 0.1  # 4.5 standard deviations
+
+
+@given(spaces(), seeds, replications, st.sampled_from(SAMPLED))
+def test_fixing_one_field_leaves_the_other_draws(
+    space: ScenarioSpace, seed: int, replication: int, name: str
+) -> None:
+    free = sample_scenario(space, seed, replication)
+    for name_of in SAMPLED:
+        low, high = getattr(space, name_of)
+        assert low <= getattr(free, name_of) <= high
+    fixed = ScenarioSpace.of(space, **{name: getattr(space, name)[1]})
+    drawn = sample_scenario(fixed, seed, replication)
+    assert getattr(drawn, name) == getattr(space, name)[1]
+    for other in set(SAMPLED) - {name}:
+        assert getattr(drawn, other) == getattr(free, other)
+
+
+@given(scenarios(), seeds, replications)
+def test_a_scenario_is_a_space_of_one(scenario: Scenario, seed: int, replication: int) -> None:
+    (space,) = spaces_of([scenario])
+    assert spaces_of([space]) == [space]
+    assert sample_scenario(space, seed, replication) == scenario
+
+
+@given(spaces(), seeds, replications)
+def test_whatever_is_drawn_is_a_valid_scenario(
+    space: ScenarioSpace, seed: int, replication: int
+) -> None:
+    drawn = sample_scenario(space, seed, replication)
+    assert Scenario.of(**drawn.model_dump()) == drawn
+
+
+def test_a_large_zone_takes_a_large_fleet() -> None:
+    space = load_scenario("paper", zone=[0, 0, 9, 9], uavs=[1, 64])
+    assert sample_scenario(ScenarioSpace.of(space, uavs=64), 0, 0).uavs == 64
+    with pytest.raises(InputError, match="uavs"):
+        load_scenario("paper", zone=[0, 0, 9, 9], uavs=65)
+
+
+# --- the arrays made of it ---
+
+
+@given(scenarios())
+def test_constants_are_the_scenarios(scenario: Scenario) -> None:
+    (space,) = spaces_of([scenario])
+    (mission,) = constants_of(space)
+    for name in set(mission.dtype.names) & set(Scenario.model_fields) - {"nodes", "pads"}:
+        assert mission[name] == getattr(scenario, name)
+    assert mission["nodes"] == len(scenario.nodes)
+    assert mission["pads"] == (scenario.pads or scenario.zone[2] * scenario.zone[3])
+    zone = [mission[f"zone_{name}"] for name in ("x", "y", "width", "height")]
+    assert tuple(zone) == scenario.zone
+    assert (mission["initial_low"], mission["initial_high"]) == scenario.initial_data
+    length = scenario.slot_length / scenario.communication_slots
+    assert mission["communication_slot_length"] == length
+    assert mission["shadowing_deviation"] == pytest.approx(scenario.shadowing_variance**0.5)
+
+
+@given(scenarios(), st.data())
+def test_the_path_loss_table_is_eq_10(scenario: Scenario, data: st.DataObject) -> None:
+    (space,) = spaces_of([scenario])
+    m, grid = scenario.communication_slots, scenario.grid
+    coarse = data.draw(st.integers(0, grid - 1))
+    fine = data.draw(st.integers(0, m * (grid - 1)))
+    distance = np.sqrt(
+        (scenario.cell_size * coarse) ** 2
+        + (scenario.cell_size * fine / m) ** 2
+        + scenario.altitude**2
+    )
+    edge = np.sqrt(2) / 2 * grid * scenario.cell_size
+    snr = 10 ** (scenario.edge_snr / 10) * (distance / edge) ** -scenario.path_loss_exponent
+    assert world_of(space).path_loss[coarse, fine] == pytest.approx(10 * np.log10(snr), abs=1e-9)

@@ -1,0 +1,150 @@
+"""Randomness: the generator against its published vectors, the deviates against scipy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import special, stats
+
+from dess import streams
+
+WORDS = st.integers(0, 2**32 - 1)
+EDGES = [0, 1, 2, 3, 2**31 - 1, 2**31, 2**31 + 1, 2**32 - 3, 2**32 - 2, 2**32 - 1]
+
+# Random123, kat_vectors: philox4x32 with 10 rounds; counter, key, words.
+KNOWN_ANSWERS = [
+    (
+        "00000000 00000000 00000000 00000000",
+        "00000000 00000000",
+        "6627e8d5 e169c58d bc57ac4c 9b00dbd8",
+    ),
+    (
+        "ffffffff ffffffff ffffffff ffffffff",
+        "ffffffff ffffffff",
+        "408f276d 41c83b0e a20bc7c6 6d5451fd",
+    ),
+    (
+        "243f6a88 85a308d3 13198a2e 03707344",
+        "a4093822 299f31d0",
+        "d16cfe09 94fdcceb 5001e420 24126ea1",
+    ),
+]
+
+
+def _hex(text: str) -> list[np.uint64]:
+    return [np.uint64(int(word, 16)) for word in text.split()]
+
+
+@pytest.mark.parametrize(("counter", "key", "words"), KNOWN_ANSWERS)
+def test_philox_gives_the_published_answers(counter: str, key: str, words: str) -> None:
+    assert list(streams.philox(*_hex(counter), *_hex(key))) == _hex(words)
+
+
+def test_a_block_is_philox_of_its_coordinates() -> None:
+    seed, replication, stream, lane, slot, index = 2**64 - 2, 2**32 - 3, 4, 2**24 - 5, 6, 7
+    counter = [index, slot, (stream << 24) + lane, replication]
+    key = [seed % 2**32, seed // 2**32]
+    expected = streams.philox(*(np.uint64(word) for word in counter + key))
+    assert streams.block(np.uint64(seed), replication, stream, lane, slot, index) == expected
+
+
+COORDINATES = st.tuples(
+    st.integers(0, streams.MAX_SEED),
+    st.integers(0, streams.MAX_REPLICATION),
+    st.integers(0, streams.POLICY),
+    st.integers(0, 2**24 - 1),
+    st.integers(0, 2**32 - 1),
+    st.integers(0, 2**32 - 1),
+)
+
+
+@given(COORDINATES, COORDINATES)
+def test_distinct_coordinates_give_distinct_blocks(one: tuple, other: tuple) -> None:
+    first = streams.block(np.uint64(one[0]), *one[1:])
+    assert streams.block(np.uint64(one[0]), *one[1:]) == first
+    assert all(0 <= word < 2**32 for word in first)
+    second = streams.block(np.uint64(other[0]), *other[1:])
+    assert (first == second) == (one == other)
+
+
+@given(COORDINATES, st.integers(0, 5), st.integers(0, 23))
+def test_every_bit_of_every_coordinate_counts(one: tuple, position: int, bit: int) -> None:
+    limit = [streams.MAX_SEED, streams.MAX_REPLICATION, 7, 2**24 - 1, 2**32 - 1, 2**32 - 1]
+    other = list(one)
+    other[position] ^= 1 << (bit % limit[position].bit_length())
+    first = streams.block(np.uint64(one[0]), *one[1:])
+    assert first != streams.block(np.uint64(other[0]), *other[1:])
+
+
+def test_uniform_lies_strictly_between_0_and_1() -> None:
+    assert streams.uniform(np.uint64(0)) == 2.0**-33
+    assert streams.uniform(np.uint64(2**32 - 1)) == 1.0 - 2.0**-33
+
+
+@given(WORDS, st.integers(-50, 50), st.integers(0, 100))
+def test_integer_stays_in_its_range(word: int, low: int, span: int) -> None:
+    value = streams.integer(np.uint64(word), low, low + span)
+    assert low <= value <= low + span
+
+
+def test_integer_reaches_both_ends_and_is_uniform() -> None:
+    assert streams.integer(np.uint64(0), 10, 50) == 10
+    assert streams.integer(np.uint64(2**32 - 1), 10, 50) == 50
+    words = np.linspace(0, 2**32 - 1, 41_000).astype(np.uint64)
+    counts = np.bincount([streams.integer(word, 10, 50) for word in words])[10:]
+    assert len(counts) == 41
+    assert abs(counts - 1000).max() <= 1
+
+
+@given(WORDS)
+def test_normal_is_the_inverse_of_the_normal_distribution(word: int) -> None:
+    z = streams.normal(np.uint64(word))
+    expected = special.ndtri((word + 0.5) / 2**32)
+    assert z == pytest.approx(expected, rel=1e-13, abs=1e-15)
+
+
+def test_normal_in_the_tails_is_exact_bounded_and_symmetric() -> None:
+    # Both sides of the switch between the approximations, |q| = 0.425, and the outermost words.
+    switches = [int(p * 2**32) + step for p in (0.075, 0.925) for step in (-1, 0, 1)]
+    words = EDGES + switches + [2**exponent for exponent in range(2, 32)]
+    for word in words:
+        z = streams.normal(np.uint64(word))
+        assert z == pytest.approx(special.ndtri((word + 0.5) / 2**32), rel=1e-13)
+        assert abs(z) <= streams.MAX_NORMAL
+        assert streams.normal(np.uint64(2**32 - 1 - word)) == -z
+    assert streams.normal(np.uint64(2**32 - 1)) > streams.MAX_NORMAL - 0.01
+
+
+@given(WORDS, WORDS)
+def test_normal_rises_with_the_word(one: int, other: int) -> None:
+    low, high = sorted((one, other))
+    assert streams.normal(np.uint64(low)) <= streams.normal(np.uint64(high))
+
+
+@given(WORDS | st.sampled_from(EDGES), st.floats(0.0, 100.0))
+def test_poisson_is_the_inverse_of_the_poisson_distribution(word: int, rate: float) -> None:
+    u = (word + 0.5) / 2**32
+    count = streams.poisson(np.uint64(word), rate)
+    # The least count with u <= F(count), up to the rounding of F.
+    assert u <= stats.poisson.cdf(count, rate) + 1e-13
+    assert count == 0 or u > stats.poisson.cdf(count - 1, rate) - 1e-13
+
+
+@pytest.mark.parametrize("rate", [0.02, 1.0, 7.5, 100.0])
+def test_poisson_matches_scipy(rate: float) -> None:
+    words = np.concatenate([EDGES, np.linspace(0, 2**32 - 1, 2000)]).astype(np.uint64)
+    counts = [streams.poisson(word, rate) for word in words]
+    np.testing.assert_array_equal(counts, stats.poisson.ppf((words + 0.5) / 2**32, rate))
+
+
+def test_deviates_have_their_distributions() -> None:
+    words = np.array(
+        [streams.block(np.uint64(7), 0, streams.SHADOWING, 0, 0, k) for k in range(2500)]
+    ).ravel()
+    normals = np.array([streams.normal(word) for word in words])
+    assert stats.kstest(normals, "norm").pvalue > 0.001
+    counts = np.bincount([streams.poisson(word, 1.0) for word in words], minlength=5)
+    expected = stats.poisson.pmf(range(4), 1.0) * len(words)
+    expected = [*expected, len(words) - expected.sum()]
+    observed = [*counts[:4], counts[4:].sum()]
+    assert stats.chisquare(observed, expected).pvalue > 0.001

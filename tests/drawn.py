@@ -1,0 +1,168 @@
+"""What the tests of the simulator draw: scenarios off the paper's, and policies that stress them."""
+
+from typing import Any
+
+import numpy as np
+from hypothesis import strategies as st
+
+from dess import streams
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import HOVER
+from dess.view import View
+
+NORTH, EAST, SOUTH, WEST = range(4)
+
+seeds = st.integers(0, streams.MAX_SEED)
+replications = st.integers(0, streams.MAX_REPLICATION)
+
+
+def _numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high, allow_subnormal=False)
+
+
+def _ranges(low: int, high: int) -> st.SearchStrategy[tuple[int, int]]:
+    return st.tuples(st.integers(low, high), st.integers(low, high)).map(
+        lambda pair: (min(pair), max(pair))
+    )
+
+
+def cells(grid: int) -> st.SearchStrategy[tuple[int, int]]:
+    """Cells of a grid."""
+    return st.tuples(st.integers(0, grid - 1), st.integers(0, grid - 1))
+
+
+@st.composite
+def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
+    """Small, odd scenario spaces: fleets of up to 6, few pads, all constants off the paper's."""
+    width, height = draw(st.integers(1, 4)), draw(st.integers(1, 3))
+    grid = draw(st.integers(4, 12))
+    zone = (draw(st.integers(0, grid - width)), draw(st.integers(0, grid - height)), width, height)
+    spots = width * height
+    start = draw(_ranges(10, 50))
+    values = {
+        "grid": grid,
+        "zone": zone,
+        "uavs": draw(_ranges(1, min(6, spots))),
+        "pads": draw(st.sampled_from([1, min(2, spots), None])),
+        "nodes": tuple(draw(st.lists(cells(grid), min_size=1, max_size=9, unique=True))),
+        "cell_size": draw(_numbers(1.0, 1000.0)),
+        "altitude": draw(_numbers(1.0, 200.0)),
+        "forbid_swaps": draw(st.booleans()),
+        "slot_length": draw(_numbers(0.2, 3.0)),
+        "communication_slots": draw(st.integers(1, 9)),
+        "max_slots": draw(st.integers(20, 120)),
+        "charge_rate": draw(st.integers(1, 25)),
+        "edge_snr": draw(_numbers(-30.0, 10.0)),
+        "path_loss_exponent": draw(_numbers(1.5, 4.0)),
+        "shadowing_variance": draw(st.just(0.0) | _numbers(0.5, 30.0)),
+        "initial_data": (0.0, draw(_numbers(0.0, 40.0))),
+        "arrival_rate": draw(st.just(0.0) | _numbers(0.01, 1.0)),
+        "quota": draw(st.integers(5, 600)),
+        "reward_data": draw(_numbers(-2.0, 2.0)),
+        "reward_overruled": draw(_numbers(-5.0, 0.0)),
+        "reward_depleted": draw(_numbers(-300.0, 0.0)),
+        "reward_charging": draw(_numbers(0.0, 1.0)),
+        "reward_quota": draw(_numbers(0.0, 100.0)),
+        "reward_step": draw(_numbers(-1.0, 0.0)),
+        "flying_time": draw(_ranges(8, 80)),
+        "charge_start": start,
+        "charge_complete": draw(_ranges(start[1] + 1, 100)),
+    }
+    return ScenarioSpace.of(**(values | fixed))
+
+
+@st.composite
+def scenarios(draw: st.DrawFn, **fixed: Any) -> Scenario:
+    """Single scenarios: a corner of a drawn space."""
+    space = draw(spaces(**fixed))
+    low = {name: getattr(space, name)[0] for name in ("flying_time", "charge_start")}
+    high = {name: getattr(space, name)[1] for name in ("uavs", "charge_complete")}
+    return space.scenario_at(**low, **high)
+
+
+def random_actions(view: View) -> np.ndarray:
+    """(R,) random legal actions, from the policies' own stream."""
+    constants = view.constants
+    words = [
+        streams.block(c["seed"], c["replication"], streams.POLICY, 0, c["slot"], i)[0]
+        for c, i in zip(constants, view.uav, strict=True)
+    ]
+    choices = view.legal.sum(1)
+    pick = np.array([streams.integer(w, 0, n - 1) for w, n in zip(words, choices, strict=True)])
+    return np.argmax(view.legal.cumsum(1) > pick[:, None], 1)
+
+
+class Wanderer:
+    """Random legal moves: the neighbours are always in the way."""
+
+    name = "wanderer"
+
+    def act(self, view: View) -> np.ndarray:
+        return random_actions(view)
+
+
+class Commuter:
+    """Wanders while the battery lasts, then makes for the zone and hovers there until charged.
+
+    With fewer pads than UAVs it queues; all make for their own cell but take no notice of others.
+    """
+
+    name = "commuter"
+
+    def act(self, view: View) -> np.ndarray:
+        own, c = view.own, view.constants
+        spot = view.uav % (c["zone_width"] * c["zone_height"])
+        dx = c["zone_x"] + spot % c["zone_width"] - own["x"]
+        dy = c["zone_y"] + spot // c["zone_width"] - own["y"]
+        home = np.select([dx > 0, dx < 0, dy > 0, dy < 0], [EAST, WEST, SOUTH, NORTH], HOVER)
+        distance = np.abs(dx) + np.abs(dy)
+        must = own["latch"] | (own["battery"] <= distance + 3)
+        return np.where(must, home, random_actions(view))
+
+
+class Fidget(Commuter):
+    """Commutes, but now and then does something else: it leaves queues, even with a pad granted."""
+
+    name = "fidget"
+
+    def act(self, view: View) -> np.ndarray:
+        restless = (view.constants["slot"] + 3 * view.uav) % 4 == 0
+        return np.where(restless, random_actions(view), super().act(view))
+
+
+class Script:
+    """Flies a fixed list of actions per UAV, e.g. ``Script("NESW.", "....")``; then hovers.
+
+    The letters are N, E, S, W and ``.`` for Hover.
+    """
+
+    name = "script"
+
+    def __init__(self, *routes: str):
+        self.routes = routes
+
+    def act(self, view: View) -> np.ndarray:
+        slots = view.constants["slot"]
+        routes = [self.routes[i] for i in view.uav]
+        return np.array(
+            ["NESW.".index(r[t]) if t < len(r) else HOVER for r, t in zip(routes, slots, strict=True)]
+        )
+
+
+class Recorder:
+    """Another policy, and what it asked for: ``asked[slot, uav]`` is the action."""
+
+    def __init__(self, policy: Any):
+        self.policy, self.name = policy, policy.name
+        self.asked: dict[tuple[int, int], int] = {}
+
+    def act(self, view: View) -> np.ndarray:
+        actions = self.policy.act(view)
+        slots = view.constants["slot"]
+        for slot, uav, action in zip(slots, view.uav, actions, strict=True):
+            self.asked[int(slot), int(uav)] = int(action)
+        return actions
+
+
+policies = st.sampled_from([Wanderer(), Commuter(), Fidget()])
+teams = policies.map(lambda policy: [policy]) | st.lists(policies, min_size=2, max_size=3)
