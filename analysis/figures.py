@@ -66,7 +66,9 @@ def style() -> Iterator[None]:
         "legend.fontsize": 9,
         "grid.color": "#dde4e9",
     }
-    with mpl.rc_context(), sns.axes_style("whitegrid", rc=look), sns.plotting_context(rc=look):
+    with mpl.rc_context():
+        mpl.rcdefaults()  # whatever the user's matplotlibrc says
+        sns.set_style("whitegrid")
         mpl.rcParams.update(look)
         yield
 
@@ -182,25 +184,14 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
-def map_figure(events: Events, scenario: Scenario, title: str = "") -> Figure:
-    """The map of a mission alone."""
-    with style():
-        figure = Figure(figsize=(5.6, 6.2), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
-        trajectories(events, scenario, ax)
-        ax.set_title(title)
-        _map_legend(ax)
-    return figure
-
-
-def mission_figure(events: Events, scenario: Scenario, title: str = "") -> Figure:
+def mission_figure(events: Events, scenario: Scenario) -> Figure:
     """A mission: its map, and under it battery, residual data and charging zone over time."""
     with style():
         figure = Figure(figsize=(5.6, 11), dpi=DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
         axes = figure.subplots(4, height_ratios=(5.6, 1.6, 1.6, 1.1))
         trajectories(events, scenario, axes[0])
-        axes[0].set_title(title)
+        axes[0].set_title(_outcome(events, scenario))
         _map_legend(axes[0])
         for panel, ax in zip((battery, residual, occupancy), axes[1:], strict=True):
             panel(events, scenario, ax)
@@ -303,6 +294,15 @@ def _arms(rows: pd.DataFrame | pd.Series) -> np.ndarray:
     return np.array([rows["mean"] - rows["low"], rows["high"] - rows["mean"]]).reshape(2, -1)
 
 
+def _outcome(events: Events, scenario: Scenario) -> str:
+    log = pd.DataFrame(events)
+    data = log[log["node"] >= 0].groupby("event")["value"].sum()
+    total = data["mission_start"] + data.get("arrival", 0.0)
+    share = data.get("communication", 0.0) / total if total else 1.0
+    filled = (log["event"] == "quota_filled").sum()
+    return f"I = {scenario.uavs}: {share:.1%} collected, {filled} of {scenario.uavs} quotas filled"
+
+
 def _sea(scenario: Scenario, ax: Axes) -> None:
     """The grid, its zone and its nodes; y grows south."""
     x, y, width, height = scenario.zone
@@ -313,7 +313,8 @@ def _sea(scenario: Scenario, ax: Axes) -> None:
     )
     nodes = np.array(scenario.nodes)
     ax.scatter(
-        *nodes.T,
+        nodes[:, 0],
+        nodes[:, 1],
         c=node_colours(len(nodes)),
         s=95,
         edgecolors="white",

@@ -26,7 +26,7 @@ from policies import load_team
 # Missions of a chunk, by engine: enough to fill the batch, few enough to lose little.
 CHUNK = {"batch": 250, "events": 50}
 
-Progress = Callable[[int], None]
+Progress = Callable[[int], object]
 
 
 @dataclass(frozen=True)
@@ -267,11 +267,13 @@ class _Cluster:
     def __init__(self, address: str):
         try:
             from distributed import Client
+            from distributed.comm import get_address_host_port
         except ModuleNotFoundError:
             raise InputError(
                 "scheduler: needs the package distributed: pip install dess[distributed]"
             ) from None
         try:
+            get_address_host_port(address)  # a Client that fails on it would hang when it is closed
             self.client = Client(address, timeout="10s", set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(

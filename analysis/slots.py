@@ -4,12 +4,12 @@
 """
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
 
-Events = pd.DataFrame | Mapping[str, Any]
+Events: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 
 def uav_slots(events: Events) -> pd.DataFrame:

@@ -3,6 +3,7 @@
 Replications are independent, so missions are the sampling unit. Intervals are two-sided.
 """
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -76,8 +77,8 @@ def bootstrap_interval(
         resamples: Number of resamples.
 
     Returns:
-        The statistic of the samples as ``mean``, and its interval; degenerate (low = mean = high)
-        if there is one replication or no resample can differ.
+        The statistic of the samples as ``mean``, and its interval: by percentiles where BCa is not
+        defined, degenerate (low = mean = high) where all resamples agree.
 
     Raises:
         ValueError: If there are no values.
@@ -86,19 +87,24 @@ def bootstrap_interval(
     if not len(arrays[0]):
         raise ValueError("bootstrap_interval: no values")
     estimate = float(statistic(*arrays))
-    if all(np.ptp(array) == 0 for array in arrays):
+    if len(arrays[0]) == 1:
         return Interval(estimate, estimate, estimate)
-    ends = stats.bootstrap(
-        arrays,
-        statistic,
-        n_resamples=resamples,
-        confidence_level=level,
-        method=method,
-        paired=True,
-        vectorized=False,
-        rng=generator,
-    ).confidence_interval
-    return Interval(estimate, float(ends.low), float(ends.high))
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        result = stats.bootstrap(
+            arrays,
+            statistic,
+            n_resamples=resamples,
+            confidence_level=level,
+            method=method,
+            paired=True,
+            vectorized=False,
+            rng=generator,
+        )
+    ends = tuple(result.confidence_interval)
+    if np.isnan(ends).any():
+        ends = np.quantile(result.bootstrap_distribution, [(1 - level) / 2, (1 + level) / 2])
+    return Interval(estimate, float(ends[0]), float(ends[1]))
 
 
 def summary(

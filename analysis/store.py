@@ -130,7 +130,8 @@ class Store:
         uavs = _read(self._chunk("uavs", cell, part), cell)
         if missions is None or uavs is None:
             return None
-        return missions, uavs
+        in_place = np.array_equal(missions["replication"], part)
+        return (missions, uavs) if in_place else None
 
     def _chunk(self, kind: str, cell: Cell, part: range) -> Path:
         return self.folder / kind / f"{cell.key}-{part.start:06}-{part.stop:06}.parquet"

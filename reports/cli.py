@@ -75,7 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code = app(arguments, prog_name="dess", standalone_mode=False)
     except TyperException as error:
-        return _fail(f"dess: error: {error.format_message()}", error.exit_code)
+        context = getattr(error, "ctx", None)
+        hint = f" (see {context.command_path} --help)" if context else ""
+        return _fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
     except InputError as error:
         return _fail(f"dess: error: {error}", 2)
     return _fail("interrupted", 1) if code == INTERRUPTED else code or 0
@@ -318,7 +320,9 @@ def _print_list(entries: Iterable[tuple[str, str]]) -> None:
 
 def _print_mission(record: "MissionRecord") -> None:
     metrics = record.metrics
-    _print_table(["", "mission"], [[m, f"{metrics[m].item():g}"] for m in metrics.dtype.names])
+    _print_table(
+        ["", "mission"], [[m, f"{metrics[m].item():g}"] for m in metrics.dtype.names or ()]
+    )
     uavs = record.uav_rows()
     rows = [[str(i), *map(str, row.values())] for i, row in enumerate(uavs)]
     _print_table(["UAV", *uavs[0]], rows)
@@ -352,20 +356,15 @@ def _print_table(header: list[str], rows: list[list[str]]) -> None:
 
 @contextmanager
 def _progress(missions: int) -> "Iterator[Callable[[int], object]]":
-    """A progress bar on stderr for what takes longer than a second."""
-    from tqdm import tqdm
-
-    interval = 0.1 if sys.stderr.isatty() else 10
-    with tqdm(total=missions, unit="mission", delay=1, mininterval=interval) as bar:
+    """Progress in missions on stderr, if they take longer than a second."""
+    with _bar("mission", missions) as bar:
         yield bar.update
 
 
 @contextmanager
 def _cells() -> "Iterator[Callable[[str, int, int], None]]":
     """Progress of the reports on stderr, cell by cell."""
-    from tqdm import tqdm
-
-    with tqdm(unit="cell") as bar:
+    with _bar("cell") as bar:
 
         def show(name: str, done: int, total: int) -> None:
             if done == 1:
@@ -374,6 +373,14 @@ def _cells() -> "Iterator[Callable[[str, int, int], None]]":
             bar.update(done - bar.n)
 
         yield show
+
+
+def _bar(unit: str, total: int | None = None) -> Any:
+    """A progress bar on stderr; outside a terminal it seldom prints."""
+    from tqdm import tqdm
+
+    interval = 0.1 if sys.stderr.isatty() else 10
+    return tqdm(total=total, unit=unit, delay=1, mininterval=interval)
 
 
 @contextmanager

@@ -30,9 +30,7 @@ def difference(value: float, reference: float) -> str:
 
 
 def words(names: Sequence[str]) -> str:
-    """``a, b and c``; ``none`` without any."""
-    if not names:
-        return "none"
+    """``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
@@ -76,7 +74,9 @@ def gallery(drawings: list[tuple[Figure, str, str]]) -> HTML:
 def svg(drawing: Figure) -> bytes:
     """A figure as SVG that is the same, byte for byte, whenever and wherever it is drawn."""
     buffer = io.BytesIO()
-    with mpl.rc_context({"svg.hashsalt": "dess"}):
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams["svg.hashsalt"] = "dess"
         drawing.savefig(buffer, format="svg", metadata=_NO_METADATA)
     return buffer.getvalue()
 

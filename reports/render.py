@@ -1,13 +1,15 @@
 """Reports: notebooks run on results, each rendered to one self-contained page, and an index."""
 
 import ast
+import atexit
 import logging
 import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -51,10 +53,10 @@ class Report:
     """A notebook: what the index says of it, and the studies whose results it reads."""
 
     name: str
+    title: str
+    description: str
+    studies: list[str]
     notebook: NotebookNode
-    title: str = ""
-    description: str = ""
-    studies: list[str] = field(default_factory=list)
     body: str = ""
 
     @property
@@ -77,7 +79,7 @@ class Report:
 
 def report_names() -> list[str]:
     """The names of the shipped reports, in the order of the index."""
-    return [name for name in ("mission", "performance") if _source(name).is_file()]
+    return ["mission", "performance"]
 
 
 def render(
@@ -138,21 +140,18 @@ def _writing(out: Path) -> Iterator[None]:
         raise InputError(f"out: {out} cannot be written: {error.strerror}") from error
 
 
-def _source(name: str) -> Any:
-    return resources.files("reports").joinpath(f"notebooks/{name}.py")
-
-
 def _read(name: str) -> Report:
     """A report from its notebook: the heading is its title, the paragraph below describes it."""
     if name not in report_names():
         raise InputError(f"report: {name!r} is unknown; allowed: {', '.join(report_names())}")
-    notebook = jupytext.reads(_source(name).read_text("utf-8"), fmt="py:percent")
+    source = resources.files("reports").joinpath(f"notebooks/{name}.py").read_text("utf-8")
+    notebook = jupytext.reads(source, fmt="py:percent")
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number}"
     title, description = notebook.cells[0].source.removeprefix("# ").split("\n\n", 1)
     del notebook.cells[0]  # the page has them in its header
     studies = notebook.metadata["dess"]["studies"]
-    return Report(name, notebook, title, " ".join(description.split()), studies)
+    return Report(name, title, " ".join(description.split()), studies, notebook)
 
 
 def _manifest(folder: Path) -> dict[str, Any]:
@@ -213,9 +212,8 @@ def _execute(report: Report, folder: Path, progress: Progress | None) -> None:
     for attempt in (1, 2):
         try:
             with TemporaryDirectory() as home:
-                _client(report.notebook, folder, Path(home), count).execute(
-                    env=_environment(Path(home)), cleanup_kc=True
-                )
+                client = _client(report.notebook, folder, Path(home), count)
+                _run(client, _environment(Path(home)))
             return
         except CellExecutionError as error:
             if error.ename == InputError.__name__:
@@ -226,6 +224,23 @@ def _execute(report: Report, folder: Path, progress: Progress | None) -> None:
                 raise ReportError(f"report {report.name}: {error}") from error
 
 
+def _run(client: NotebookClient, environment: dict[str, str]) -> None:
+    """Run a notebook in a thread: in this one, nbclient would take Ctrl-C for itself."""
+    kernel: Any = client.km
+    with ThreadPoolExecutor(1) as pool:
+        running = pool.submit(client.execute, env=environment, cleanup_kc=True)
+        try:
+            running.result()
+        except KeyboardInterrupt:
+            while not running.done():
+                if kernel.has_kernel:
+                    kernel.provisioner.process.kill()
+                wait([running], timeout=0.2)
+            raise
+        finally:  # nbclient leaves its exit handler behind when a kernel dies at its start
+            atexit.unregister(client._cleanup_kernel)
+
+
 def _client(notebook: NotebookNode, folder: Path, home: Path, count: Any) -> NotebookClient:
     # No kernel specs but the built-in one: an installed "python3" may be another interpreter's.
     kernel = AsyncKernelManager(
@@ -233,8 +248,9 @@ def _client(notebook: NotebookNode, folder: Path, home: Path, count: Any) -> Not
         kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),
         connection_file=str(home / "kernel.json"),
     )
-    if os.name == "posix":  # sockets of our own: no ports to clash on
-        kernel.transport, kernel.ip = "ipc", str(home / "kernel")
+    sockets = home / "kernel"
+    if os.name == "posix" and len(str(sockets)) < 90:  # no ports to clash on; paths must be short
+        kernel.transport, kernel.ip = "ipc", str(sockets)
     return NotebookClient(
         notebook,
         km=kernel,
@@ -243,7 +259,6 @@ def _client(notebook: NotebookNode, folder: Path, home: Path, count: Any) -> Not
         timeout=None,
         record_timing=False,
         coalesce_streams=True,
-        ipython_hist_file="",
     )
 
 
@@ -267,7 +282,12 @@ def _body(notebook: NotebookNode) -> str:
         for stream in streams:
             log.warning(stream.text.rstrip())
             cell.outputs.remove(stream)
-    exporter = HTMLExporter(template_name="basic", exclude_input=True, exclude_output_prompt=True)
+    exporter = HTMLExporter(
+        template_name="basic",
+        exclude_input=True,
+        exclude_output_prompt=True,
+        exclude_anchor_links=True,
+    )
     return exporter.from_notebook_node(notebook)[0]
 
 

@@ -7,7 +7,7 @@ draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs th
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
-settings.register_profile("default", max_examples=40, deadline=None, derandomize=True)
+settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
 settings.load_profile("default")
 

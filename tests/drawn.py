@@ -1,4 +1,4 @@
-"""What the tests of the simulator draw: scenarios off the paper's, and policies that stress them."""
+"""What the tests draw: scenarios off the paper's, and policies that stress them."""
 
 from typing import Any
 
@@ -145,7 +145,10 @@ class Script:
         slots = view.constants["slot"]
         routes = [self.routes[i] for i in view.uav]
         return np.array(
-            ["NESW.".index(r[t]) if t < len(r) else HOVER for r, t in zip(routes, slots, strict=True)]
+            [
+                "NESW.".index(r[t]) if t < len(r) else HOVER
+                for r, t in zip(routes, slots, strict=True)
+            ]
         )
 
 

@@ -26,7 +26,7 @@ import pandas as pd
 from IPython.display import Markdown, display
 
 from analysis import figures, load_results, paper, summary
-from dess.state import sample_scenario
+from dess.scenario import SAMPLED
 from reports import page
 
 study = load_results(Path(results) / "fig4")
@@ -38,11 +38,14 @@ ratios = ratios[ratios["metric"] == "collection_ratio"].set_index("point")
 
 points = range(len(study.manifest["points"]))
 seed = study.manifest["seed"]
-logs = [study.events(policy, point, replication) for point in points]
-scenarios = [sample_scenario(study.scenario(point), seed, replication) for point in points]
 shown = "policy == @policy and replication == @replication"
 missions = study.missions.query(shown).set_index("point")
 uavs = study.uavs.query(shown)
+logs = [study.events(policy, point, replication) for point in points]
+scenarios = [
+    study.scenario(point).scenario_at(**{key: int(missions.loc[point, key]) for key in SAMPLED})
+    for point in points
+]
 
 # %%
 best = " the best of the study by" if policy == product["mean"].idxmax() else ""
@@ -63,15 +66,13 @@ printed = [paper.FIG_4[uavs]["collection_ratio"] for uavs in missions["uavs"]]
 
 def captioned(point):
     mission, ratio = missions.loc[point], ratios.loc[point]
-    outcome = "all quotas filled" if mission["success"] else "not all quotas filled"
-    title = f"I = {mission['uavs']}: {page.percent(mission['collection_ratio'])} collected, {outcome}"
     caption = (
         f"{mission['slots']} mission slots; {mission['collected']:.0f} of "
         f"{mission['initial'] + mission['arrived']:.0f} data units collected. Mean of this policy "
         f"over {ratio['n']:,} missions {page.interval(*ratio[['mean', 'low', 'high']])}, "
         f"the paper's {page.percent(printed[point])}."
     )
-    figure = figures.mission_figure(logs[point], scenarios[point], title)
+    figure = figures.mission_figure(logs[point], scenarios[point])
     alt = f"Map of the mission with I = {mission['uavs']}; battery, residual data and charging"
     return figure, alt, caption
 
@@ -82,12 +83,12 @@ page.gallery([captioned(point) for point in points])
 # **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
 # in the colour of the node that was served in most of the slot's communication slots (the last of
 # them on a tie); grey where none was. A cross is a slot of hovering, in the same colours, a star a
-# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs that
-# share a path are drawn side by side. y grows south.
+# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs
+# that share a path are drawn side by side. y grows south.
 #
-# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to charge, C<sub>C</sub>
-# the one at which charging ends. A band of residual data is one node, in its colour; bands that stay
-# are nodes that nobody has emptied.
+# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to
+# charge, C<sub>C</sub> the one at which charging ends. A band of residual data is one node, in its
+# colour; bands that stay are nodes that nobody has emptied.
 
 # %% [markdown]
 # ## What one sees

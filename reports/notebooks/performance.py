@@ -85,23 +85,18 @@ page.table(
 # %%
 def sorted_out(metric):
     """In words, how every policy compares to the paper in a metric."""
-    verdicts = {
-        p: paper.verdict(*rows.loc[(p, metric), ["low", "high"]], paper.TABLE_IV[metric])
-        for p in policies
-    }
-    groups = (
-        f"{verdict} {page.words([p for p in policies if verdicts[p] == verdict])}"
-        for verdict in marks
-    )
+    groups = {verdict: [] for verdict in marks}
+    for p in policies:
+        low, high = rows.loc[(p, metric), ["low", "high"]]
+        groups[paper.verdict(low, high, paper.TABLE_IV[metric])].append(p)
+    found = (f"{verdict}: {page.words(those)}" for verdict, those in groups.items() if those)
     name, figure = paper.METRICS[metric], page.percent(paper.TABLE_IV[metric])
-    return f"- **{name}** (paper {figure}): {'; '.join(groups)}."
+    return f"- **{name}** (paper {figure}), {'; '.join(found)}."
 
 
 product = "collection_ratio_and_communication"
 best = rows.xs(product, level="metric")["mean"].idxmax()
-spread = wilson(
-    round(paper.TABLE_IV["success"] * paper.TABLE_IV_MISSIONS), paper.TABLE_IV_MISSIONS
-)
+spread = wilson(round(paper.TABLE_IV["success"] * paper.TABLE_IV_MISSIONS), paper.TABLE_IV_MISSIONS)
 display(
     Markdown(
         f"The best policy by collection ratio and communication is **{best}**: "
@@ -109,8 +104,8 @@ display(
         "Against the paper's figures, by the whole interval:\n\n"
         + "\n".join(sorted_out(metric) for metric in paper.METRICS)
         + "\n\nThe paper prints no intervals. Its figures are themselves means of "
-        f"{paper.TABLE_IV_MISSIONS:,} missions: a success of that size alone has a 95 % interval of "
-        f"{page.interval(*spread)}. And where the paper is silent, such as on the place of the "
+        f"{paper.TABLE_IV_MISSIONS:,} missions: a success of that size alone has a 95 % interval "
+        f"of {page.interval(*spread)}. And where the paper is silent, such as on the place of the "
         "charging zone or the transmit power, the scenario here decides."
     )
 )
@@ -183,7 +178,7 @@ lines = [
 head = [("", "Policy"), *((printed_metrics[metric], f"I = {uavs}") for metric, uavs in columns)]
 page.table(
     pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(head)),
-    "Means with 95 % intervals; ▲ wholly above the paper's figure, ▼ below it, ≈ not distinguishable",
+    "Means with 95 % intervals; ▲ wholly above the paper's figure, ▼ below it, ≈ around it",
 )
 
 # %% [markdown]

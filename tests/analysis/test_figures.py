@@ -3,9 +3,11 @@
 from collections import Counter
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -31,7 +33,7 @@ def mission() -> tuple[Any, pd.DataFrame, dess.Scenario]:
 def parts(mission: Any) -> list[Axes]:
     """Map, battery, residual data and occupancy of the mission's figure."""
     _, log, scenario = mission
-    return figures.mission_figure(log, scenario, "a mission").axes
+    return figures.mission_figure(log, scenario).axes
 
 
 def drawn(ax: Axes, what: str) -> list[Any]:
@@ -93,6 +95,15 @@ def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> Non
     assert top < bottom  # y grows south
 
 
+def test_the_title_says_how_the_mission_ended(mission: Any, parts: Any) -> None:
+    record, _, scenario = mission
+    filled = [row["end"] for row in record.uav_rows()].count("quota")
+    assert 0 < filled < scenario.uavs
+    assert parts[0].get_title(loc="left") == (
+        f"I = 3: {record.collection_ratio:.1%} collected, {filled} of 3 quotas filled"
+    )
+
+
 def test_battery_ends_as_recorded(mission: Any, parts: Any) -> None:
     record, _, scenario = mission
     lines = {line.get_label(): line for line in parts[1].lines}
@@ -125,12 +136,9 @@ def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) ->
 
 
 def test_figures_leave_no_state_behind(mission: Any) -> None:
-    import matplotlib as mpl
-    from matplotlib import pyplot as plt
-
     before = dict(mpl.rcParams)
     _, log, scenario = mission
-    assert isinstance(figures.map_figure(log, scenario), Figure)
+    assert isinstance(figures.mission_figure(log, scenario), Figure)
     assert dict(mpl.rcParams) == before
     assert plt.get_fignums() == []
 

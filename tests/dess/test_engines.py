@@ -233,7 +233,7 @@ def test_two_policies_meet_the_same_sea(space: ScenarioSpace, seed: int, replica
 
 
 def test_shadowing_does_not_depend_on_teammates() -> None:
-    """With data without end UAV 0 serves the same nodes at the same rates, whoever flies beside it."""
+    """With data without end UAV 0 serves the same nodes at the same rates, whoever is near."""
     scenario = Scenario.of(
         grid=12,
         zone=[4, 4, 3, 3],
@@ -259,7 +259,6 @@ def test_shadowing_does_not_depend_on_teammates() -> None:
     assert len(alone) == 25 * 4
     assert [row[:2] for row in alone] == [row[:2] for row in beside]
     assert len({row[1] for row in alone}) > 3  # shadowing decides whom it serves
-    # What it takes: the difference of two numbers near 1e9 in neither case, so equal to the bit.
     assert alone == beside
 
 

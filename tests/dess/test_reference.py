@@ -70,9 +70,8 @@ def test_nothing_is_lost_and_everything_counted_once(
         return {column: values[chosen] for column, values in log.items()}
 
     # Data, in total and per node.
-    tolerance = TOLERANCE
     balance = record.initial + record.arrived - record.collected - record.residual
-    assert balance == pytest.approx(0.0, abs=tolerance)
+    assert balance == pytest.approx(0.0, abs=TOLERANCE)
     start, end = rows("mission_start"), rows("mission_end")
     arrivals, served = rows("arrival"), rows("communication")
     for k in range(len(scenario.nodes)):
@@ -80,12 +79,12 @@ def test_nothing_is_lost_and_everything_counted_once(
         after = end["value"][end["node"] == k].sum()
         arrived = arrivals["value"][arrivals["node"] == k].sum()
         taken = served["value"][served["node"] == k].sum()
-        assert before + arrived - taken - after == pytest.approx(0.0, abs=tolerance)
+        assert before + arrived - taken - after == pytest.approx(0.0, abs=TOLERANCE)
         assert after >= 0.0
-    assert record.initial == pytest.approx(start["value"][start["node"] >= 0].sum(), abs=tolerance)
+    assert record.initial == pytest.approx(start["value"][start["node"] >= 0].sum(), abs=TOLERANCE)
     assert record.arrived == arrivals["value"].sum()
-    assert record.collected == pytest.approx(served["value"].sum(), abs=tolerance)
-    assert record.collected == pytest.approx(record.uavs["collected"].sum(), abs=tolerance)
+    assert record.collected == pytest.approx(served["value"].sum(), abs=TOLERANCE)
+    assert record.collected == pytest.approx(record.uavs["collected"].sum(), abs=TOLERANCE)
     assert 0.0 <= record.collection_ratio <= 1.0
 
     # Communications: at most one per UAV and communication slot, each counted once, in no slot
@@ -107,7 +106,7 @@ def test_nothing_is_lost_and_everything_counted_once(
         assert flying.sum() == row["slots_flying"]
         assert (~flying).sum() == row["slots_charging"]
         assert levels[-1] == row["battery"]
-        assert 0 <= min(levels)
+        assert min(levels) >= 0
         assert max(levels) <= max(scenario.flying_time, scenario.charge_complete)
         assert row["slots_waiting"] <= row["slots_flying"]
     assert record.uav_slots == len(moves["uav"])

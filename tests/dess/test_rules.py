@@ -88,7 +88,11 @@ def _resolve(
 ) -> tuple[list[tuple[int, int]], list[bool]]:
     """The cells and the overruled flags after UAVs ``(cell, action)`` acted."""
     scenario = Scenario.of(
-        grid=grid, zone=[0, 0, grid, grid], uavs=len(uavs), nodes=[[0, 0]], forbid_swaps=forbid_swaps
+        grid=grid,
+        zone=[0, 0, grid, grid],
+        uavs=len(uavs),
+        nodes=[[0, 0]],
+        forbid_swaps=forbid_swaps,
     )
     state, _, _ = _launched(scenario)
     team = state.uavs[0]
@@ -493,7 +497,9 @@ SETTLED = [
 
 @pytest.mark.parametrize(("progress", "end", "bonus"), SETTLED)
 @pytest.mark.parametrize("overruled", [False, True])
-def test_settlement(progress: tuple[int, int, int], end: int, bonus: float, overruled: bool) -> None:
+def test_settlement(
+    progress: tuple[int, int, int], end: int, bonus: float, overruled: bool
+) -> None:
     state, _, _ = _launched(Scenario.of(uavs=2))
     mission, (u, mate) = state.missions[0], state.uavs[0]
     u["communications"], u["battery"], mission["slot"] = progress

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.drawn import replications, scenarios, seeds, spaces
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
@@ -20,6 +19,7 @@ from dess.scenario import (
     scenario_names,
 )
 from dess.state import check_seed, constants_of, sample_scenario, spaces_of, world_of
+from tests.drawn import replications, scenarios, seeds, spaces
 
 
 def _load_text(text: str, folder: Path) -> ScenarioSpace:

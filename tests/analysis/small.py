@@ -1,0 +1,46 @@
+"""A scenario and a study whose missions take next to no time."""
+
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from analysis import load_study
+from analysis.study import Study
+
+SCENARIO: dict[str, Any] = {
+    "grid": 8,
+    "nodes": [[1, 1], [2, 6], [5, 4]],
+    "zone": [5, 0, 3, 2],
+    "uavs": [1, 3],
+    "flying_time": [20, 30],
+    "charge_start": [10, 15],
+    "charge_complete": [40, 60],
+    "quota": 60,
+}
+
+
+def write_scenario(folder: Path, **changes: Any) -> Path:
+    """The small scenario as a TOML file."""
+    path = folder / "small.toml"
+    path.write_text(tomli_w.dumps(SCENARIO | changes), "utf-8")
+    return path
+
+
+def small_study(folder: Path, **changes: Any) -> Study:
+    """A study of the small scenario."""
+    values = {
+        "scenario": write_scenario(folder).name,
+        "policies": ["greedy", "random"],
+        "missions": 10,
+        "seed": 7,
+    }
+    path = folder / "trial.toml"
+    path.write_text(tomli_w.dumps(values), "utf-8")
+    return load_study(path, **changes)
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """Everything in a folder, by relative path."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}

@@ -1,0 +1,96 @@
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.statistics import bootstrap_interval, mean_interval, summary, wilson
+
+
+def test_wilson_of_nine_in_ten():
+    # z = 1.95996: centre (0.9 + z^2/20) / (1 + z^2/10) = 0.78899,
+    # half width z sqrt(0.009 + z^2/400) / (1 + z^2/10) = 0.19314
+    assert wilson(9, 10) == pytest.approx((0.9, 0.59585, 0.98213), abs=1e-5)
+
+
+def test_wilson_at_the_ends():
+    # n / (n + z^2) for n of n, and its mirror image for none
+    assert wilson(10, 10) == pytest.approx((1.0, 0.72247, 1.0), abs=1e-5)
+    assert wilson(0, 10) == pytest.approx((0.0, 0.0, 0.27753), abs=1e-5)
+
+
+def test_student_of_three_values():
+    # mean 2, s = 1, t(0.975, 2) = 4.30265: 2 -+ 4.30265 / sqrt(3)
+    assert mean_interval([1.0, 2.0, 3.0]) == pytest.approx((2.0, -0.48414, 4.48414), abs=1e-5)
+    # t(0.95, 2) = 2.91999
+    assert mean_interval([1.0, 2.0, 3.0], 0.9) == pytest.approx((2.0, 0.31414, 3.68586), abs=1e-5)
+
+
+@pytest.mark.parametrize("values", [[0.5], [0.5, 0.5, 0.5]])
+def test_without_spread_the_interval_is_degenerate(values):
+    assert mean_interval(values) == (0.5, 0.5, 0.5)
+    sample = np.array(values)
+    assert bootstrap_interval(sample, np.median, np.random.default_rng(1)) == (0.5, 0.5, 0.5)
+
+
+@pytest.mark.parametrize(
+    "estimate",
+    [
+        lambda: wilson(0, 0),
+        lambda: mean_interval([]),
+        lambda: bootstrap_interval(np.array([]), np.mean, np.random.default_rng(1)),
+    ],
+)
+def test_nothing_has_no_mean(estimate):
+    with pytest.raises(ValueError, match="no "):
+        estimate()
+
+
+def test_bootstrap_of_a_mean_is_near_student():
+    sample = np.random.default_rng(3).normal(10.0, 2.0, 400)
+    ours = bootstrap_interval(sample, np.mean, np.random.default_rng(1))
+    assert ours == pytest.approx(mean_interval(sample), abs=0.02)
+
+
+def test_bootstrap_depends_on_its_generator_alone():
+    sample = np.random.default_rng(3).exponential(size=50)
+    one, again, other = (
+        bootstrap_interval(sample, np.median, np.random.default_rng(seed)) for seed in (1, 1, 2)
+    )
+    assert one == again
+    assert one != other
+
+
+def test_bootstrap_keeps_pairs_together():
+    x = np.random.default_rng(3).exponential(size=30)
+    ratio = bootstrap_interval((2 * x, x), lambda a, b: a.sum() / b.sum(), np.random.default_rng(1))
+    assert ratio == pytest.approx((2.0, 2.0, 2.0))
+
+
+MISSIONS = pd.DataFrame(
+    {
+        "policy": ["tour"] * 3 + ["greedy"] * 2,
+        "uavs": [1, 1, 2, 1, 2],
+        "success": [1, 1, 0, 1, 1],
+        "collection_ratio": [0.2, 0.4, 0.6, 0.5, 0.5],
+        "collection_ratio_and_communication": [0.2, 0.4, 0.0, 0.5, 0.5],
+        "reward": [1.0, 2.0, 3.0, -1.0, 1.0],
+    }
+)
+
+
+def test_summary_has_a_row_per_group_and_metric():
+    table = summary(MISSIONS)
+    assert list(table.columns) == ["policy", "metric", "mean", "low", "high", "n"]
+    assert list(table["policy"].unique()) == ["tour", "greedy"]  # as they come, not by alphabet
+    rows = table.set_index(["policy", "metric"])
+    ends = ["mean", "low", "high"]
+    assert tuple(rows.loc[("tour", "success"), ends]) == wilson(2, 3)
+    assert tuple(rows.loc[("tour", "reward"), ends]) == mean_interval([1.0, 2.0, 3.0])
+    assert tuple(rows.loc[("greedy", "collection_ratio"), ends]) == (0.5, 0.5, 0.5)
+    assert rows.loc["tour", "n"].tolist() == [3] * 4
+
+
+def test_summary_by_several_columns_and_by_none():
+    assert len(summary(MISSIONS, by=["policy", "uavs"])) == 4 * 4
+    table = summary(MISSIONS, by=[]).set_index("metric")
+    assert table.loc["success", "mean"] == pytest.approx(0.8)
+    assert table.loc["success", "n"] == 5

@@ -1,0 +1,206 @@
+import json
+
+import pytest
+
+import dess
+from analysis import load_results, manifest, run_study
+from analysis.store import replacing
+from dess import InputError
+from tests.analysis.small import files_of, small_study, write_scenario
+
+
+@pytest.fixture
+def out(tmp_path):
+    """A results folder."""
+    run_study(small_study(tmp_path, logged=1), tmp_path / "out")
+    return tmp_path / "out"
+
+
+def test_the_manifest_says_what_was_run(out):
+    data = load_results(out).manifest
+    assert data == json.loads((out / "manifest.json").read_text())
+    assert data["version"] == dess.__version__
+    assert data["seed"] == 7
+    assert data["study"]["name"] == "trial"
+    assert data["points"][0]["scenario"]["grid"] == 8
+    assert [team["policy"] for team in data["policies"]] == ["greedy", "random"]
+    assert data["policies"][0]["members"][0]["class"] == "policies.heuristics:Greedy"
+    assert data["libraries"].keys() == {"python", *manifest.LIBRARIES}
+
+
+def _cut(path):
+    path.write_bytes(path.read_bytes()[:-9])
+
+
+def _flip(path):
+    content = bytearray(path.read_bytes())
+    content[40] ^= 1  # in the first data page
+    path.write_bytes(content)
+
+
+def _empty(path):
+    path.write_bytes(b"")
+
+
+def _text(path):
+    path.write_text("nothing like parquet")
+
+
+@pytest.mark.parametrize("kind", ["missions", "uavs", "events"])
+@pytest.mark.parametrize("damage", [_cut, _flip, _empty, _text])
+def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_path):
+    whole = files_of(out)
+    path = next((out / kind).iterdir())
+    damage(path)
+    with pytest.raises(InputError, match="run the study again|no event log"):
+        results = load_results(out)
+        for policy in ("greedy", "random"):
+            results.events(policy)
+    run_study(small_study(tmp_path, logged=1), out)
+    assert files_of(out) == whole
+
+
+@pytest.mark.parametrize("other", [1, 3])
+def test_a_file_in_the_place_of_another_does_not_pass(other, out):
+    files = sorted((out / "missions").iterdir())  # three of one cell, then three of the other
+    files[0].write_bytes(files[other].read_bytes())
+    with pytest.raises(InputError, match="damaged"):
+        load_results(out)
+
+
+def _rewrite(out, **changes):
+    path = out / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+FOREIGN = {
+    "truncated": (lambda out: _cut(out / "manifest.json"), "cannot be read"),
+    "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "cannot be read"),
+    "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
+    "other version": (
+        lambda out: _rewrite(out, version="0.0.9"),
+        r"made by dess 0\.0\.9 \(schema 1\), not",
+    ),
+    "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
+    "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
+    "no study": (lambda out: _rewrite(out, study={}), "study: is not the data of a study"),
+}
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_a_foreign_manifest_is_refused(case, out, tmp_path):
+    spoil, line = FOREIGN[case]
+    spoil(out)
+    before = files_of(out)
+    for use in (lambda: load_results(out), lambda: run_study(small_study(tmp_path), out)):
+        with pytest.raises(InputError, match=line) as error:
+            use()
+        assert str(error.value).startswith(str(out / "manifest.json"))
+        assert "allowed: another --out" in str(error.value)
+        assert "\n" not in str(error.value)
+    assert files_of(out) == before
+
+
+OTHERS = {
+    "holds seed 7, not 8": {"seed": 8},
+    "holds study trial, not other": {"name": "other"},
+    "holds other scenarios": {"set": {"quota": 50}},
+    "holds other scenarios than": {"sweep": {"uavs": [1, 2]}},
+    "holds policy random, which study trial has not": {"policies": ["greedy", "tour"]},
+}
+
+
+@pytest.mark.parametrize("line", OTHERS)
+def test_another_study_is_refused(line, out, tmp_path):
+    before = files_of(out)
+    with pytest.raises(InputError, match=line):
+        run_study(small_study(tmp_path, **OTHERS[line]), out)
+    assert files_of(out) == before
+
+
+def test_the_scenario_counts_not_its_name(out, tmp_path):
+    study = small_study(tmp_path)
+    write_scenario(tmp_path, quota=50)
+    with pytest.raises(InputError, match="holds other scenarios"):
+        run_study(small_study_again(tmp_path), out)
+    write_scenario(tmp_path).rename(tmp_path / "renamed.toml")
+    run_study(small_study_again(tmp_path, scenario=str(tmp_path / "renamed.toml")), out)
+    assert study.points[0].scenario == load_results(out).scenario()
+
+
+def small_study_again(folder, **changes):
+    from analysis import load_study
+
+    return load_study(folder / "trial.toml", **changes)
+
+
+def test_other_code_is_refused(out, tmp_path):
+    _rewrite(out, code="0" * 64)
+    with pytest.raises(InputError, match="made by other code of the same version"):
+        run_study(small_study(tmp_path), out)
+
+
+def test_other_code_of_a_policy_is_refused(out, tmp_path):
+    teams = json.loads((out / "manifest.json").read_text())["policies"]
+    teams[1]["members"][0]["code"] = "0" * 64
+    _rewrite(out, policies=teams)
+    with pytest.raises(InputError, match="made by other code of policy random"):
+        run_study(small_study(tmp_path), out)
+
+
+def test_no_results_folder(tmp_path):
+    for path in (tmp_path, tmp_path / "none", write_scenario(tmp_path)):
+        with pytest.raises(InputError, match="no such file; allowed: a results folder"):
+            load_results(path)
+
+
+def test_an_output_that_cannot_be_written(tmp_path):
+    study = small_study(tmp_path)
+    before = files_of(tmp_path)
+    for path in (tmp_path / "trial.toml", tmp_path / "trial.toml" / "out"):
+        with pytest.raises(InputError, match=f"{path}: cannot be written"):
+            run_study(study, path)
+    with pytest.raises(InputError, match="holds other files and no manifest.json"):
+        run_study(study, tmp_path)
+    assert files_of(tmp_path) == before
+
+
+def test_what_a_killed_run_leaves_does_not_matter(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".manifest.json.1.tmp").touch()
+    assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "file"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise ZeroDivisionError
+    assert files_of(tmp_path) == {"file": b"old"}
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    assert files_of(tmp_path) == {"file": b"new"}
+    with pytest.raises(InputError, match="is a folder"), replacing(tmp_path):
+        pass
+
+
+def test_fingerprints_follow_the_sources(tmp_path, monkeypatch):
+    package = tmp_path / "pack"
+    package.mkdir()
+    for name in ("__init__", "brain", "other"):
+        (package / f"{name}.py").write_text("")
+    (tmp_path / "alone.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def fingerprints():
+        manifest.fingerprint.cache_clear()
+        return manifest.fingerprint("pack.brain"), manifest.fingerprint("alone")
+
+    before = fingerprints()
+    (package / "other.py").write_text("x = 1")  # brain may import it
+    after = fingerprints()
+    assert after[0] != before[0]
+    assert after[1] == before[1]
+    (tmp_path / "alone.py").write_text("x = 1")
+    assert fingerprints()[1] != before[1]

@@ -1,0 +1,98 @@
+import pytest
+
+from analysis import load_study, study_names
+from dess import InputError
+from tests.analysis.small import small_study, write_scenario
+
+
+def test_the_shipped_studies():
+    assert study_names() == ["fig4", "table4"]
+    table4, fig4 = load_study("table4"), load_study("fig4")
+    assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
+    assert table4.policies == fig4.policies == ("random", "nearest", "greedy", "tour")
+    assert [point.scenario.uavs for point in fig4.points] == [(1, 1), (2, 2), (3, 3)]
+    assert fig4.logged == 1
+
+
+def test_design_points_are_the_product_in_the_given_order(tmp_path):
+    study = small_study(tmp_path, sweep={"uavs": [2, 1], "quota": [30, 20]}, set={"pads": 1})
+    designs = [(point.values["uavs"], point.values["quota"]) for point in study.points]
+    assert designs == [(2, 30), (2, 20), (1, 30), (1, 20)]
+    for point in study.points:
+        assert point.scenario.uavs == (point.values["uavs"],) * 2
+        assert point.scenario.quota == point.values["quota"]
+        assert point.scenario.pads == 1
+
+
+def test_without_a_sweep_there_is_one_point(tmp_path):
+    (point,) = small_study(tmp_path).points
+    assert point.values == {}
+    assert point.scenario.grid == 8
+
+
+def test_a_file_names_its_study_and_finds_its_scenario_beside_it(tmp_path, monkeypatch):
+    monkeypatch.chdir("/")
+    assert small_study(tmp_path).name == "trial"
+
+
+def test_teams_are_written_alike(tmp_path):
+    assert small_study(tmp_path, policies=["greedy , tour"]).policies == ("greedy,tour",)
+
+
+BAD = {
+    "nonsense = 1": ["nonsense: unknown key", "policies", "missions"],
+    "missions = 0": ["missions", "greater than or equal to 1", "not 0"],
+    "missions = '9'": ["missions", "valid integer", "not '9'"],
+    "missions = true": ["missions", "valid integer"],
+    "seed = -1": ["seed", "greater than or equal to 0"],
+    "engine = 'fast'": ["engine", "'batch' or 'events'", "not 'fast'"],
+    "logged = 2000": ["logged: 2000", "0..1000"],
+    "name = 'a/b'": ["name", "not 'a/b'"],
+    "policies = []": ["policies"],
+    "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "random, nearest, greedy, tour"],
+    "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
+    "policies = 'greedy'": ["policies"],
+    "scenario = 'nope'": ["nope: no such scenario", "paper"],
+    "set.uavs = 99": ["uavs: 99", "1..16"],
+    "set.uavz = 2": ["uavz: unknown key", "flying_time"],
+    "sweep.uavs = [1, 20]": ["at uavs=20", "1..16"],
+    "sweep.uavs = []": ["uavs has no values"],
+    "sweep.uavs = 2": ["sweep.uavs"],
+    "sweep.uavs = [1, 2, 1]": ["uavs=1 is there twice"],
+    "set.uavs = 1\nsweep.uavs = [1, 2]": ["uavs is also in set"],
+    "sweep.charge_start = [30, 70]": ["at charge_start=70", "charge_complete"],
+    "missions = ": ["not valid TOML"],
+    "missions = 1\n[sweep": ["not valid TOML"],
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_study_gets_one_line(text, tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(text if "policies" in text else f"policies = ['greedy']\n{text}")
+    with pytest.raises(InputError) as error:
+        load_study(path)
+    line = str(error.value)
+    assert line.startswith(f"{path}: ")
+    assert "\n" not in line
+    for part in BAD[text]:
+        assert part in line
+
+
+def test_a_study_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="no such study; allowed: fig4, table4, or a TOML file"):
+        load_study(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_study(tmp_path)
+    (tmp_path / "latin.toml").write_bytes(b"name = '\xe9'")
+    with pytest.raises(InputError, match="cannot be read"):
+        load_study(tmp_path / "latin.toml")
+
+
+def test_overrides_are_validated_too(tmp_path):
+    write_scenario(tmp_path)
+    assert load_study("table4", missions=5).missions == 5
+    with pytest.raises(InputError, match="study table4: missions"):
+        load_study("table4", missions=0)
+    with pytest.raises(InputError, match="study table4: speed: unknown key"):
+        load_study("table4", speed=1)

@@ -1,0 +1,122 @@
+"""The return guard: who follows it comes home in time."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+
+from dess import streams
+from dess.batch import simulate_batch
+from dess.mission import simulate
+from dess.scenario import ScenarioSpace, load_scenario
+from dess.state import BATTERY, HOVER, empty_state
+from dess.view import View
+from policies.guard import guard
+from tests.drawn import EAST, NORTH, SOUTH, WEST, Fidget, replications, seeds, spaces
+
+
+class Guarded:
+    """Any action that the guard allows, at random; on the way it checks the mask."""
+
+    name = "guarded"
+
+    def act(self, view: View) -> np.ndarray:
+        mask = guard(view)
+        assert mask.shape == (len(view), 5)
+        assert mask.any(1).all()
+        assert not (mask & ~view.legal).any()
+        constants = zip(view.constants, view.uav, mask.sum(1), strict=True)
+        picks = []
+        for c, i, choices in constants:
+            place = (streams.POLICY, 1, c["slot"], i)
+            word = streams.block(c["seed"], c["replication"], *place)[0]
+            picks.append(streams.integer(word, 0, choices - 1))
+        return np.argmax(mask.cumsum(1) > np.array(picks)[:, None], 1)
+
+
+@given(spaces(uavs=1, initial_data=1e6), seeds, replications)
+def test_a_guarded_lone_uav_never_runs_dry(
+    space: ScenarioSpace, seed: int, replication: int
+) -> None:
+    record = simulate(space, Guarded(), seed, replication)
+    assert (record.uavs["end"] != BATTERY).all()
+    event(f"charged {record.uavs['slots_charging'][0] > 0}")
+
+
+def test_guarded_random_play_on_the_paper_scenario() -> None:
+    records = simulate_batch(load_scenario("paper", uavs=1), Guarded(), 41, 100)
+    assert records.missions["success"].all()
+
+
+@given(spaces(), seeds, replications)
+def test_the_mask_of_any_situation_is_legal_and_never_empty(
+    space: ScenarioSpace, seed: int, replication: int
+) -> None:
+    class Careless(Guarded):
+        """Checks the mask, then does as it likes."""
+
+        def act(self, view: View) -> np.ndarray:
+            super().act(view)
+            return Fidget().act(view)
+
+    simulate(space, Careless(), seed, replication)
+
+
+def _mask(uavs: list[dict[str, Any]], **scenario: Any) -> np.ndarray:
+    """The guard's masks for UAVs in given states, 400 communications short of the quota."""
+    space = ScenarioSpace.of(**({"uavs": len(uavs), "charge_start": 30} | scenario))
+    masks: list[np.ndarray] = []
+
+    class Look:
+        name = "look"
+
+        def act(self, view: View) -> np.ndarray:
+            state = empty_state(1, len(uavs), len(space.nodes))
+            for name, array in zip(state._fields, state, strict=True):
+                array[:] = getattr(view.state, name)
+            state.missions["active"] = len(uavs)
+            for u, values in zip(state.uavs[0], uavs, strict=True):
+                for name, value in ({"battery": 60, "communications": 40} | values).items():
+                    u[name] = value
+            whole = View(state, view.world, np.zeros(len(uavs), int), np.arange(len(uavs)))
+            masks.append(guard(whole))
+            return np.full(len(view), HOVER)
+
+    simulate(ScenarioSpace.of(space, max_slots=1), Look(), 0)
+    return masks[0]
+
+
+def test_at_the_last_moment_only_the_way_home_is_left() -> None:
+    # The corner of the zone (26, 5) is 6 + 5 = 11 steps from (20, 10), then one slot to charge in.
+    (mask,) = _mask([{"x": 20, "y": 10, "battery": 12}])
+    assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
+    # With plenty of battery all is open.
+    (mask,) = _mask([{"x": 20, "y": 10, "battery": 60}])
+    assert mask.all()
+    # Somewhere in between the guard closes in; never before it must.
+    opened = [_mask([{"x": 20, "y": 10, "battery": b}])[0].sum() for b in range(12, 30)]
+    assert opened == sorted(opened)
+    assert opened[3:] == [5] * len(opened[3:])
+
+
+def test_without_need_to_charge_nothing_is_closed() -> None:
+    # Four communications short of the quota, one slot will do: no charge needed.
+    (mask,) = _mask([{"x": 20, "y": 10, "battery": 3, "communications": 436}])
+    assert mask.all()
+
+
+def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
+    (mask,) = _mask([{"x": 0, "y": 0}])
+    assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH, HOVER]
+    parked = {"x": 26, "y": 3, "latch": True, "battery": 20}
+    mask = _mask([{"x": 25, "y": 3}, parked])[0]
+    assert not mask[EAST]
+    assert mask[[NORTH, SOUTH, WEST, HOVER]].all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fleet", [2, 3])
+def test_guarded_random_teams_seldom_fail(fleet: int) -> None:
+    records = simulate_batch(load_scenario("paper", uavs=fleet), Guarded(), 42, 200)
+    assert records.missions["success"].mean() > 0.9

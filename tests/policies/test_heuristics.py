@@ -1,0 +1,172 @@
+"""The heuristics: legal, without memory, independent of grouping, and as good as is claimed."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import policies
+from dess.batch import simulate_batch
+from dess.mission import simulate
+from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.state import HOVER
+from dess.view import View
+from policies.guard import guard
+from tests.drawn import replications, seeds, spaces
+
+NAMES = ("random", "nearest", "greedy", "tour")
+heuristics = st.sampled_from(NAMES).map(policies.load)
+
+
+class _Checked:
+    """A policy whose every answer is checked on the way."""
+
+    def __init__(self, policy: Any):
+        self.policy, self.name = policy, policy.name
+
+    def act(self, view: View) -> np.ndarray:
+        before = [array.tobytes() for array in view.state]
+        actions = self.policy.act(view)
+        assert [array.tobytes() for array in view.state] == before  # it only looks
+        rows = np.arange(len(view))
+        assert view.legal[rows, actions].all()
+        # Random hovers where every safe move is contested, late or not.
+        hovers = (actions == HOVER) & (self.name == "random")
+        assert (guard(view)[rows, actions] | hovers).all()
+        # Any row alone, and all in another order, give the same.
+        for row in rows:
+            alone = View(view.state, view.world, view.mission[[row]], view.uav[[row]])
+            assert self.policy.act(alone).tolist() == [actions[row]]
+        turned = View(view.state, view.world, view.mission[::-1].copy(), view.uav[::-1].copy())
+        assert self.policy.act(turned).tolist() == actions[::-1].tolist()
+        return actions
+
+
+@given(spaces(), heuristics, seeds, replications)
+def test_heuristics_are_legal_safe_and_without_memory(
+    space: ScenarioSpace, policy: Any, seed: int, replication: int
+) -> None:
+    simulate(space, _Checked(policy), seed, replication)
+
+
+@given(
+    spaces(),
+    st.lists(heuristics, min_size=1, max_size=3),
+    seeds,
+    st.lists(replications, min_size=1, max_size=4),
+    st.integers(1, 4),
+)
+def test_heuristics_do_the_same_in_any_batch(
+    space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], lanes: int
+) -> None:
+    records = simulate_batch(space, team, seed, numbers, lanes=lanes, workers=1 + lanes % 2)
+    for job, number in enumerate(numbers):
+        single = simulate(space, team, seed, number)
+        assert single.metrics.tobytes() == records.missions[job].tobytes()
+        assert single.uavs.tobytes() == records.uavs[job, : len(single.uavs)].tobytes()
+
+
+def test_heuristics_check_out_on_the_paper_scenario() -> None:
+    paper = load_scenario("paper", uavs=3)
+    for name in NAMES:
+        simulate(paper, _Checked(policies.load(name)), 21, 0)
+    checked = [_Checked(policies.load(name)) for name in NAMES]
+    simulate_batch(paper, checked, 21, 3)
+
+
+# --- what each of them goes for ---
+
+
+def _path(name: str, slots: int, **scenario: Any) -> list[tuple[float, float]]:
+    """The cells of a lone UAV that starts at (8, 8), slot by slot."""
+    world = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": slots}
+    record = simulate(Scenario.of(**(world | scenario)), policies.load(name), 3, events=True)
+    assert record.events is not None
+    log = record.events.columns()
+    moves = log["event"] == "move"
+    return list(zip(log["x"][moves].tolist(), log["y"][moves].tolist(), strict=True))
+
+
+def test_nearest_flies_to_the_nearest_node_on_the_shortest_way() -> None:
+    for node, away in (([8, 5], [8, 14]), ([11, 8], [2, 8]), ([8, 11], [8, 2]), ([5, 8], [14, 8])):
+        path = _path("nearest", 3, nodes=[away, node], initial_data=100)
+        assert path[-1] == tuple(node)
+
+
+def test_greedy_weighs_data_against_distance() -> None:
+    nodes = [[8, 6], [8, 12]]  # 2 and 4 cells from (8, 8)
+    seen = set()
+    for seed in range(40):
+        world = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "max_slots": 1, "nodes": nodes}
+        scenario = Scenario.of(**world, initial_data=[0.0, 100.0])
+        record = simulate(scenario, policies.load("greedy"), seed, events=True)
+        assert record.events is not None
+        log = record.events.columns()
+        data = log["value"][(log["event"] == "mission_start") & (log["node"] >= 0)]
+        (y,) = log["y"][log["event"] == "move"]
+        near = data[0] / (2 + 1) > data[1] / (4 + 1)
+        if min(data) > 15:  # both worth a visit
+            assert y == (7 if near else 9)
+            seen.add(near)
+    assert seen == {True, False}
+
+
+def test_tour_visits_every_node_once_around() -> None:
+    # Eight nodes on a ring, listed in no order: the circuit takes them one after another.
+    ring = [(2, 2), (8, 2), (14, 2), (14, 8), (14, 14), (8, 14), (2, 14), (2, 8)]
+    nodes = [ring[k] for k in (3, 6, 0, 5, 1, 7, 4, 2)]
+    world = {"nodes": nodes, "initial_data": 20, "flying_time": 100, "quota": 1000}
+    path = _path("tour", 80, **world, arrival_rate=0.0)
+    visits = list(dict.fromkeys(ring.index(cell) for cell in path if cell in ring))
+    assert sorted(visits) == list(range(8))
+    steps = {(b - a) % 8 for a, b in zip(visits, visits[1:], strict=False)}
+    assert steps in ({1}, {7})
+
+
+def test_random_has_its_own_stream_and_goes_everywhere() -> None:
+    open_sea = {"grid": 64, "zone": [30, 30, 4, 4], "nodes": [[0, 0]], "flying_time": 100}
+    space = ScenarioSpace.of(**open_sea, initial_data=1e6, quota=100, max_slots=20)
+    record = simulate(space, policies.load("random"), 5, events=True)
+    again = simulate(space, policies.load("random"), 5, events=True)
+    other = simulate(space, policies.load("random"), 6, events=True)
+    assert record.events == again.events
+    assert record.events != other.events
+    counts = np.zeros(4, int)
+    directions = {(0, -1): 0, (1, 0): 1, (0, 1): 2, (-1, 0): 3}
+    scenario = ScenarioSpace.of(space, uavs=1)
+    for replication in range(60):
+        run = simulate(scenario, policies.load("random"), 5, replication, events=True).events
+        assert run is not None
+        track = [
+            (x, y)
+            for event, i, x, y in zip(run.event, run.uav, run.x, run.y, strict=True)
+            if i == 0 and event in ("mission_start", "move")
+        ]
+        for (a, b), (c, d) in zip(track, track[1:], strict=False):
+            counts[directions[c - a, d - b]] += 1
+    total = counts.sum()
+    assert total == 60 * 20
+    assert abs(counts - total / 4).max() < 5 * np.sqrt(total * 3 / 16)
+
+
+# --- how good they are ---
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_lone_uav_never_fails(name: str) -> None:
+    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 1000)
+    assert records.missions["success"].all()
+    assert (records.uavs["slots_charging"] > 0).all()  # eq. 6: it takes at least one charge
+
+
+def test_the_best_heuristic_is_as_good_as_the_readme_says() -> None:
+    products = {}
+    for name in NAMES:
+        missions = simulate_batch(load_scenario("paper"), policies.load(name), 32, 1000).missions
+        products[name] = missions["collection_ratio_and_communication"].mean()
+        if name != "random":
+            assert missions["success"].mean() >= 0.99
+    assert max(products.values()) >= 0.74
+    assert min(products, key=lambda name: products[name]) == "random"
