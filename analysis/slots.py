@@ -103,13 +103,15 @@ def _charging(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
 
 
 def _waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
-    """A UAV waits from its ``charge_request`` on until it charges or moves off."""
+    """A UAV waits from its ``charge_request`` on until it charges, moves off or tries to."""
+    overruled = log[log["event"] == "collision"]
+    tried = set(zip(overruled["uav"], overruled["time"].astype(int), strict=True))
     requests = log[log["event"] == "charge_request"]
     asked = set(zip(requests["uav"], requests["time"].astype(int), strict=True))
     waiting, queued = np.zeros(len(table), bool), False
     keys = zip(table["uav"], table["slot"], table["moved"], table["charging"], strict=True)
     for row, (uav, slot, moved, charging) in enumerate(keys):
-        stays = queued and slot > 0 and not moved
+        stays = queued and slot > 0 and not moved and (uav, slot) not in tried
         queued = not charging and ((uav, slot) in asked or stays)
         waiting[row] = queued
     return waiting

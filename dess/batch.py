@@ -1,30 +1,29 @@
 """The batch engine: many missions advance slot by slot in compiled code over ``rules.py``.
 
-A lane holds one mission at a time; a finished mission makes room for the next one, so the batch stays
-full. The policies are asked once per slot for all rows that must act. What a mission does never
-depends on the others: B missions in a batch equal B single ones, in any order and grouping.
+A lane holds one mission at a time; a finished mission makes room for the next one, so the batch
+stays full. The policies are asked once per slot for all rows that must act. What a mission does
+never depends on the others: B missions in a batch equal B single ones, in any order and grouping.
 """
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
+from threading import Event
 from typing import Any
 
 import numpy as np
 
 from dess import rules
+from dess.channel import World, empty_scratch, world_of
 from dess.compiled import kernel
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
-    World,
     check_seed,
     constants_of,
-    empty_scratch,
     empty_state,
     ranges_of,
     spaces_of,
-    world_of,
 )
 from dess.view import decide, team_of
 
@@ -65,15 +64,18 @@ def simulate_batch(
     if workers < 1 or lanes < 1:
         raise ValueError(f"workers and lanes must be at least 1, not {workers} and {lanes}")
     team = team_of(policy)
-    one = isinstance(scenario, Scenario | ScenarioSpace)
-    spaces = spaces_of([scenario] if one else scenario)
-    if not one and len(spaces) != len(numbers):
-        raise ValueError(f"{len(spaces)} scenarios for {len(numbers)} replications")
-    kinds = np.zeros(len(numbers), np.int64) if one else np.arange(len(numbers))
+    if isinstance(scenario, Scenario | ScenarioSpace):
+        spaces, kinds = spaces_of([scenario]), np.zeros(len(numbers), np.int64)
+    else:
+        spaces, kinds = spaces_of(scenario), np.arange(len(numbers))
+        if len(spaces) != len(numbers):
+            raise ValueError(f"{len(spaces)} scenarios for {len(numbers)} replications")
     records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
+    stop = Event()
 
     def run(jobs: np.ndarray, world: World, group: list[ScenarioSpace], which: np.ndarray) -> None:
-        _Batch(group, world, team, seed, lanes).run(jobs, which, numbers, records, progress)
+        batch = _Batch(group, world, team, seed, lanes)
+        batch.run(jobs, which, numbers, records, progress, stop)
 
     tasks = []
     for world, members in _by_world(spaces):
@@ -88,8 +90,11 @@ def simulate_batch(
             run(*task)
     else:
         with ThreadPoolExecutor(workers) as pool:
-            for future in [pool.submit(run, *task) for task in tasks]:
-                future.result()
+            try:
+                for future in [pool.submit(run, *task) for task in tasks]:
+                    future.result()
+            finally:  # an error or Ctrl-C here ends the other threads too
+                stop.set()
     return records
 
 
@@ -128,8 +133,8 @@ class _Batch:
         self.ranges = np.stack([ranges_of(space) for space in spaces])
         self.uavs = int(self.ranges[:, 0, 1].max())
 
-    def run(self, jobs, which, numbers, records, progress) -> None:
-        """Simulate the missions ``jobs`` and write their records."""
+    def run(self, jobs, which, numbers, records, progress, stop) -> None:
+        """Simulate the missions ``jobs`` and write their records, until told to stop."""
         lanes, nodes = min(self.lanes, len(jobs)), len(self.world.nodes)
         state = empty_state(lanes, self.uavs, nodes)
         scratch = empty_scratch(self.uavs, nodes)
@@ -139,7 +144,7 @@ class _Batch:
         for lane in range(lanes):
             _next_mission(lane, job_of_lane, queue, source, state)
         told = 0
-        while queue[1] < len(jobs):
+        while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
             _advance(job_of_lane, queue, source, state, self.world, scratch, records)
             if progress and queue[1] > told:
@@ -167,13 +172,19 @@ def _next_mission(lane, job_of_lane, queue, source, state):
 @kernel
 def _advance(job_of_lane, queue, source, state, world, scratch, records):
     """One mission slot of every lane; finished missions leave their record and make room."""
-    for lane in range(len(state.missions)):
+    nodes, path_loss, order, means = world
+    batches, search = scratch
+    missions, uavs, residual = state
+    arrivals = np.empty(len(nodes), np.int64)
+    for lane in range(len(missions)):
         if job_of_lane[lane] < 0:
             continue
-        mission, uavs, residual = state.missions[lane], state.uavs[lane], state.residual[lane]
-        rules.advance(mission, uavs, residual, world.nodes, world.path_loss, scratch)
+        mission, team, data = missions[lane], uavs[lane], residual[lane]
+        rules.advance(
+            mission, team, data, arrivals, nodes, path_loss, order, means, batches, search
+        )  # fmt: skip
         if mission.active == 0:
             job = job_of_lane[lane]
-            write_record(mission, uavs, residual, records.missions[job], records.uavs[job])
+            write_record(mission, team, data, records.missions[job], records.uavs[job])
             queue[1] += 1
             _next_mission(lane, job_of_lane, queue, source, state)

@@ -15,18 +15,38 @@ from typing import Any
 from numba import njit
 
 
-def kernel(function: Callable) -> Any:
+def kernel(function: Callable, **options: Any) -> Any:
     """Compile a function with numba, without Python and its lock, cached on disk.
 
     Where no folder for the cache can be written, it is compiled anew in every process.
     """
     try:
-        compiled = njit(cache=True, nogil=True)(function)
+        compiled = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     except RuntimeError:  # numba: no locator available
-        return njit(nogil=True)(function)
-    folder = Path(inspect.getfile(function)).parent
-    compiled._cache._cache_file._source_stamp = _digest(Path(__file__).parent) + _digest(folder)
+        return njit(nogil=True, error_model="numpy", **options)(function)
+    own = Path(inspect.getfile(function)).parent
+    _keep_fresh(compiled._cache._cache_file, _digest(Path(__file__).parent) + _digest(own))
     return compiled
+
+
+def _keep_fresh(cache: Any, stamp: str) -> None:
+    """Make a disk cache valid for one state of the sources, and empty one of another state.
+
+    Numba reads an old index before it looks at its stamp, and fails where a type has moved since.
+    """
+    cache._source_stamp = stamp
+    index = Path(cache._index_path)
+    if index.exists() and stamp.encode() not in index.read_bytes():
+        cache.flush()
+
+
+def inlined(function: Callable) -> Any:
+    """A ``kernel`` whose code goes into its compiled callers.
+
+    A call between kernels costs reference counts of the arrays that it hands over: for the small
+    functions of a mission slot more than their work.
+    """
+    return kernel(function, forceinline=True)
 
 
 @lru_cache
@@ -36,9 +56,3 @@ def _digest(folder: Path) -> str:
     for path in sorted(folder.glob("*.py")):
         sources.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return sources.hexdigest()
-
-
-def is_cached(compiled: Any) -> bool:
-    """Whether a compiled function is at hand, in memory or in the disk cache."""
-    cache = getattr(compiled._cache, "_cache_file", None)
-    return bool(compiled.signatures) or (cache is not None and bool(cache._load_index()))

@@ -18,7 +18,12 @@ from pettingzoo import ParallelEnv
 
 from dess.errors import InputError
 from dess.lanes import REWARD_TERMS, Lanes, Outcome
-from dess.observation import observation_bounds, observation_names, observation_space, observe
+from dess.observation import (
+    observation_bounds,
+    observation_names,
+    observation_space,
+    observe,
+)
 from dess.picture import draw
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import rules
+from dess.channel import empty_scratch, world_of
 from dess.compiled import kernel
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
@@ -14,11 +15,9 @@ from dess.state import (
     TRUNCATED,
     check_seed,
     constants_of,
-    empty_scratch,
     empty_state,
     ranges_of,
     spaces_of,
-    world_of,
 )
 
 # The parts of a reward (eq. 14-18), in the order in which they are added.
@@ -131,6 +130,7 @@ def _launch(lanes, first, constants, ranges, state):
 def _step(state, world, scratch, actions, out):
     """One mission slot of every mission; what it did goes into an ``Outcome``."""
     fleet = state.uavs.shape[1]
+    arrivals = np.empty(len(world.nodes), np.int64)
     charged, collected = np.empty(fleet, np.int64), np.empty(fleet)
     for b in range(len(state.missions)):
         mission, uavs = state.missions[b], state.uavs[b]
@@ -139,7 +139,7 @@ def _step(state, world, scratch, actions, out):
             u.action = actions[b, i]
             out.acted[b, i] = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
-        rules.advance(mission, uavs, state.residual[b], world.nodes, world.path_loss, scratch)
+        rules.advance(mission, uavs, state.residual[b], arrivals, *world, *scratch)
         out.team_collected[b] = mission.slot_collected
         for i in range(fleet):
             u, acted = uavs[i], out.acted[b, i]

@@ -12,6 +12,7 @@ import numpy as np
 import simpy
 
 from dess import rules
+from dess.channel import empty_scratch, world_of
 from dess.record import EventLog, MissionRecord, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
@@ -19,11 +20,9 @@ from dess.state import (
     QUOTA,
     check_seed,
     constants_of,
-    empty_scratch,
     empty_state,
     ranges_of,
     spaces_of,
-    world_of,
 )
 from dess.view import decide, team_of
 
@@ -83,6 +82,7 @@ class Mission:
         self.team, self.log, self.world = team, log, world_of(scenario)
         self.state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
+        self.arrivals = np.zeros(len(scenario.nodes), np.int64)
         self.state.missions[:] = constants_of(scenario)
         self.state.missions["seed"] = seed
         self.state.missions["replication"] = replication
@@ -126,9 +126,9 @@ class Mission:
             self._log_moves()
             for n in range(1, m + 1):
                 yield env.timeout(start + n / m - env.now)
-                rules.communicate(mission, uavs, self.residual, *self.world, self.scratch, n)
+                rules.communicate(mission, uavs, self.residual, *self.world, *self.scratch, n)
                 self._log_communications(start, n, m)
-            rules.arrive(mission, self.residual, self.scratch)
+            rules.arrive(mission, self.residual, self.arrivals)
             self._log_arrivals()
             self._settle()
             ended, self.slot_ends = self.slot_ends, env.event()
@@ -223,6 +223,6 @@ class Mission:
         if self.log is None or self.mission["arrival_rate"] == 0:
             return
         time = float(self.mission["slot"] + 1)
-        for k in np.nonzero(self.scratch.arrivals)[0]:
+        for k in np.nonzero(self.arrivals)[0].tolist():
             x, y = self.world.nodes[k]
-            self.log.add(time, "arrival", -1, k, self.scratch.arrivals[k], x, y)
+            self.log.add(time, "arrival", -1, k, self.arrivals[k], x, y)

@@ -114,11 +114,13 @@ def empty_records(missions: int, uavs: int) -> Records:
 class EventLog:
     """The events of one mission as columns, in the order in which they happened.
 
-    ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per node
-    (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering included:
-    the cell after the slot's action, ``value`` the battery at the end of the slot. ``communication``
-    and ``arrival`` carry data units, ``quota_filled`` the communications, ``collision`` the
-    action that was overruled, the charging events the battery. ``uav`` and ``node`` are -1 where an event has none.
+    ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per
+    node (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering
+    included: the cell after the slot's action, ``value`` the battery at the end of the slot.
+    ``communication`` and ``arrival`` carry data units, ``quota_filled`` the communications,
+    ``collision`` the action that was overruled, the charging events the battery. A UAV that leaves
+    the queue for a pad has a ``charge_request`` without ``charge_start``. ``uav`` and ``node`` are
+    -1 where an event has none.
     """
 
     time: list[float] = field(default_factory=list)
@@ -172,7 +174,7 @@ class MissionRecord:
     events: EventLog | None = None
 
     def __getattr__(self, name: str) -> Any:
-        if name in MISSION_RECORD.names:
+        if name in (self.metrics.dtype.names or ()):
             return self.metrics[name].item()
         raise AttributeError(name)
 

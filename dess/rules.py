@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from dess import streams
-from dess.compiled import kernel
+from dess import channel, streams
+from dess.compiled import inlined, kernel
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -23,9 +23,6 @@ from dess.state import (
     TRUNCATED,
     draw_parameters,
 )
-
-_DB_TO_LOG = math.log(10.0) / 10.0
-_PER_LOG_2 = 1.0 / math.log(2.0)
 
 
 @kernel
@@ -79,7 +76,7 @@ def _launch_uavs(mission, uavs):
             _judge_latch(mission, u)  # slot 0 is judged like any other
 
 
-@kernel
+@inlined
 def _judge_latch(mission, u):
     """Charging latch iota (eq. 3), judged on the battery at the start of a slot."""
     if u.battery <= mission.charge_start:
@@ -88,7 +85,7 @@ def _judge_latch(mission, u):
         u.latch = False
 
 
-@kernel
+@inlined
 def resolve(mission, uavs):
     """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at once.
 
@@ -128,7 +125,7 @@ def resolve(mission, uavs):
                 changed = True
 
 
-@kernel
+@inlined
 def _collide(mission, u, other):
     """Whether the move of ``u`` must be cancelled because of ``other``."""
     if u.x == other.x and u.y == other.y:
@@ -143,14 +140,14 @@ def _collide(mission, u, other):
     )
 
 
-@kernel
+@inlined
 def _cancel(u):
     u.x, u.y = u.from_x, u.from_y
     u.executed = HOVER
     u.overruled = True
 
 
-@kernel
+@inlined
 def may_charge(mission, u):
     """Charging condition (eq. 4): active, in the zone, latched, hovering of its own will.
 
@@ -165,7 +162,7 @@ def may_charge(mission, u):
     )
 
 
-@kernel
+@inlined
 def grant_pads(mission, uavs):
     """Grant free charging pads, first come first served, ties in the order of the UAVs.
 
@@ -188,13 +185,13 @@ def grant_pads(mission, uavs):
         first = -1
         for i in range(mission.uavs):
             u = uavs[i]
-            if u.pad_request >= 0 and not u.charging:
-                if first < 0 or u.pad_request < uavs[first].pad_request:
-                    first = i
+            waits = u.pad_request >= 0 and not u.charging
+            if waits and (first < 0 or u.pad_request < uavs[first].pad_request):
+                first = i
         uavs[first].charging = True
 
 
-@kernel
+@inlined
 def spend(mission, uavs):
     """Energy of one slot (eq. 8): a charging slot gains, any other active slot costs 1."""
     for i in range(mission.uavs):
@@ -212,28 +209,27 @@ def spend(mission, uavs):
     mission.slot_collected = 0.0
 
 
-@kernel
-def communicate(mission, uavs, residual, nodes, path_loss, scratch, n):
+@inlined
+def communicate(
+    mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+):  # fmt: skip
     """Communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
-    UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR among
-    those with residual data, the lowest index on a tie. What was served stands in ``served`` and
-    ``amount`` of each UAV.
+    UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
+    among those with residual data, the lowest index on a tie. What was served stands in ``served``
+    and ``amount`` of each UAV. After the mission's arrays come those of ``World`` and ``Scratch``.
     """
-    if (n - 1) % 4 == 0:  # one Philox block holds the shadowing of four communication slots
-        scratch.tick[0] += 1
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
         if not u.active or u.charging:
             continue
-        best, node = _best_node(mission, i, u, residual, nodes, path_loss, scratch, n)
+        if (n - 1) % channel.GROUP == 0:
+            channel.open_group(mission, i, u, nodes, path_loss, order, means, search)
+        snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
-        rate = (
-            mission.communication_slot_length * _PER_LOG_2 * math.log1p(math.exp(best * _DB_TO_LOG))
-        )
-        amount = min(rate, residual[node])
+        amount = min(channel.rate(mission, snr), residual[node])
         residual[node] -= amount
         u.served = node
         u.amount = amount
@@ -242,85 +238,23 @@ def communicate(mission, uavs, residual, nodes, path_loss, scratch, n):
         mission.slot_collected += amount
 
 
-@kernel
-def _best_node(mission, i, u, residual, nodes, path_loss, scratch, n):
-    """Highest SNR [dB] of UAV ``i`` among the nodes with data, and its node; -1 without any.
-
-    Shadowing is drawn for those nodes alone that can still win, since deviates are bounded.
-    """
-    m = mission.communication_slots
-    step_x, step_y = u.x - u.from_x, u.y - u.from_y
-    nearest, mean = -1, -math.inf
-    for k in range(mission.nodes):
-        if residual[k] > 0.0:
-            value = _mean_snr(
-                m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss
-            )
-            if value > mean:
-                nearest, mean = k, value
-    if nearest < 0 or mission.shadowing_deviation == 0.0:
-        return mean, nearest
-    node = nearest
-    best = mean + _shadowing(mission, i, node, scratch, n)
-    reach = mission.shadowing_deviation * streams.MAX_NORMAL
-    for k in range(mission.nodes):
-        if residual[k] > 0.0 and k != nearest:
-            value = _mean_snr(
-                m, u.from_x - nodes[k, 0], u.from_y - nodes[k, 1], step_x, step_y, n, path_loss
-            )
-            if value + reach >= best:
-                value += _shadowing(mission, i, k, scratch, n)
-                if value > best or (value == best and k < node):
-                    best, node = value, k
-    return best, node
-
-
-@kernel
-def _mean_snr(m, dx, dy, step_x, step_y, n, path_loss):
-    """Mean SNR [dB] at the position of communication slot ``n``, of the cells between."""
-    if step_y != 0:
-        return path_loss[abs(dx), abs(m * dy + n * step_y)]
-    return path_loss[abs(dy), abs(m * dx + n * step_x)]
-
-
-@kernel
-def _shadowing(mission, i, k, scratch, n):
-    """Shadowing eta [dB] between UAV ``i`` and node ``k`` in communication slot ``n``."""
-    group, word = (n - 1) // 4, (n - 1) % 4
-    if scratch.drawn[i, k] != scratch.tick[0]:
-        scratch.drawn[i, k] = scratch.tick[0]
-        w0, w1, w2, w3 = streams.block(
-            mission.seed,
-            mission.replication,
-            streams.SHADOWING,
-            group * 65536 + i,
-            mission.slot,
-            k,
+@inlined
+def arrive(mission, residual, arrivals):
+    """New data of one slot (eq. 12): Poisson packets per node, left in ``arrivals``."""
+    none = math.exp(-mission.arrival_rate)
+    for k in range(0, mission.nodes, 4):
+        words = streams.block(
+            mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot, k // 4
         )
-        scratch.words[i, k, 0] = w0
-        scratch.words[i, k, 1] = w1
-        scratch.words[i, k, 2] = w2
-        scratch.words[i, k, 3] = w3
-    return mission.shadowing_deviation * streams.normal(scratch.words[i, k, word])
+        for j in range(min(4, mission.nodes - k)):
+            arrivals[k + j] = 0
+            if streams.uniform(words[j]) > none:
+                arrivals[k + j] = streams.poisson(words[j], mission.arrival_rate)
+                residual[k + j] += arrivals[k + j]
+                mission.arrived += arrivals[k + j]
 
 
-@kernel
-def arrive(mission, residual, scratch):
-    """New data of one slot (eq. 12): Poisson packets per node, left in ``scratch.arrivals``."""
-    if mission.arrival_rate == 0.0:
-        return
-    for k in range(mission.nodes):
-        if k % 4 == 0:
-            words = streams.block(
-                mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot, k // 4
-            )
-        packets = streams.poisson(words[k % 4], mission.arrival_rate)
-        scratch.arrivals[k] = packets
-        residual[k] += packets
-        mission.arrived += packets
-
-
-@kernel
+@inlined
 def settle(mission, uavs):
     """Rewards (eq. 14-18) and operational status (eq. 6, 7) at the end of a slot."""
     mission.collected += mission.slot_collected
@@ -355,12 +289,16 @@ def settle(mission, uavs):
 
 
 @kernel
-def advance(mission, uavs, residual, nodes, path_loss, scratch):
+def advance(
+    mission, uavs, residual, arrivals, nodes, path_loss, order, means, batches, search
+):  # fmt: skip
     """One whole mission slot, the actions being entered; the order of Section III-C."""
     resolve(mission, uavs)
     grant_pads(mission, uavs)
     spend(mission, uavs)
     for n in range(1, mission.communication_slots + 1):
-        communicate(mission, uavs, residual, nodes, path_loss, scratch, n)
-    arrive(mission, residual, scratch)
+        communicate(
+            mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+        )  # fmt: skip
+    arrive(mission, residual, arrivals)
     settle(mission, uavs)

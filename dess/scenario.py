@@ -1,4 +1,4 @@
-"""Scenarios: every constant of the model, and the ranges that a mission's scenario is drawn from."""
+"""Scenarios: every constant of the model, and the ranges that a mission draws its own from."""
 
 import tomllib
 from importlib import resources
@@ -6,7 +6,14 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from dess.errors import InputError
 
@@ -17,6 +24,9 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 
 # The parameters that vary from mission to mission (Table II). The order fixes their draws.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
+
+# Entries of the table of the channel (dess.channel): 8 GiB if every step of it were ever made.
+_CHANNEL_LIMIT = 2**30
 
 # An integer as such: neither 2.0 nor true nor "2" is taken for one.
 Integer = Annotated[int, Field(strict=True)]
@@ -115,6 +125,12 @@ class _Constants(BaseModel):
         if len(set(self.nodes)) < len(self.nodes):
             twice = next(node for node in self.nodes if self.nodes.count(node) > 1)
             raise ValueError(f"nodes: {list(twice)} is listed twice; allowed: distinct cells")
+        steps = 5 * self.grid**2 * len(self.nodes) * self.communication_slots
+        if steps > _CHANNEL_LIMIT:
+            raise ValueError(
+                "grid, nodes, communication_slots: too many together; allowed: "
+                f"5 * grid^2 * nodes * communication_slots <= {_CHANNEL_LIMIT}"
+            )
         if self.pads is not None and self.pads > self.zone_cells:
             raise ValueError(
                 f"pads: {self.pads} is more than the zone has cells; allowed: 1..{self.zone_cells}"
@@ -210,7 +226,7 @@ class ScenarioSpace(_Constants):
         return Scenario.of(**(self.model_dump() | parameters))
 
 
-def load_scenario(name_or_path: str | Path = "paper", **overrides: Any) -> ScenarioSpace:
+def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> ScenarioSpace:
     """A shipped scenario by name, or one from a TOML file.
 
     Args:
@@ -254,7 +270,8 @@ def validation_line(error: ValidationError, where: str) -> str:
     key = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
-        model = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}.get(error.title)
+        models: dict[str, type[BaseModel]] = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}
+        model = models.get(error.title)
         allowed = f"; allowed: {', '.join(sorted(model.model_fields))}" if model else ""
         return f"{where}: {key}: unknown key{allowed}"
     if first["type"] == "value_error":
@@ -262,9 +279,9 @@ def validation_line(error: ValidationError, where: str) -> str:
     return f"{where}: {key}: {message}, not {first['input']!r}"
 
 
-def _validated(model: type, values: dict[str, Any], where: str) -> Any:
+def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:
     try:
-        return model.model_validate(values)  # type: ignore[attr-defined]
+        return model.model_validate(values)
     except ValidationError as error:
         raise InputError(validation_line(error, where)) from None
 

@@ -1,7 +1,6 @@
 """The state of B missions x I UAVs x K nodes as plain arrays; one mission is B = 1."""
 
 from collections.abc import Sequence
-from functools import lru_cache
 from operator import index
 from typing import NamedTuple
 
@@ -107,35 +106,6 @@ class State(NamedTuple):
     residual: np.ndarray
 
 
-class World(NamedTuple):
-    """What all missions of a batch share.
-
-    Attributes:
-        nodes: (K, 2) cells of the sensor nodes.
-        path_loss: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
-            and ``b / m`` cells along the other: the lattice of all positions a UAV can serve from.
-    """
-
-    nodes: np.ndarray
-    path_loss: np.ndarray
-
-
-class Scratch(NamedTuple):
-    """Working memory of one mission slot: the shadowing words drawn so far.
-
-    Attributes:
-        words: (I, K, 4) the words of four communication slots per UAV and node.
-        drawn: (I, K) the tick at which they were drawn.
-        tick: (1,) number of the present group of four communication slots.
-        arrivals: (K,) new data of the present slot.
-    """
-
-    words: np.ndarray
-    drawn: np.ndarray
-    tick: np.ndarray
-    arrivals: np.ndarray
-
-
 def empty_state(missions: int, uavs: int, nodes: int) -> State:
     """A zeroed state of that many missions, UAVs per mission and nodes."""
     return State(
@@ -143,36 +113,10 @@ def empty_state(missions: int, uavs: int, nodes: int) -> State:
     )
 
 
-def empty_scratch(uavs: int, nodes: int) -> Scratch:
-    """Working memory for missions of at most that many UAVs and nodes."""
-    return Scratch(
-        np.zeros((uavs, nodes, 4), np.uint64),
-        np.zeros((uavs, nodes), np.int64),
-        np.zeros(1, np.int64),
-        np.zeros(nodes, np.int64),
-    )
-
-
-@lru_cache(maxsize=64)
-def world_of(scenario: ScenarioSpace) -> World:
-    """The nodes and the path loss table of a scenario (eq. 10, in dB)."""
-    m, grid = scenario.communication_slots, scenario.grid
-    coarse = np.arange(grid)[:, None]
-    fine = np.arange(m * (grid - 1) + 1)[None, :] / m
-    horizontal = scenario.cell_size * np.hypot(coarse, fine)
-    distance = np.hypot(horizontal, scenario.altitude)
-    edge = np.sqrt(2) / 2 * grid * scenario.cell_size
-    path_loss = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
-    nodes = np.array(scenario.nodes, np.int64)
-    for array in (nodes, path_loss):
-        array.setflags(write=False)
-    return World(nodes, path_loss)
-
-
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
-    """A (1,) ``MISSION`` array with the constants of a scenario; sampled parameters at their low end."""
+    """A (1,) ``MISSION`` array with the constants of a scenario; sampled ones at their low end."""
     mission = np.zeros(1, MISSION)
-    for field in MISSION.names:
+    for field in MISSION.fields or ():
         if field in SAMPLED:
             mission[field] = getattr(scenario, field)[0]
         elif field != "nodes" and field in type(scenario).model_fields:

@@ -26,6 +26,9 @@ POLICY = 5  # a policy's own randomness
 MAX_SEED = 2**64 - 1
 MAX_REPLICATION = 2**32 - 1
 
+CENTRAL = 0.425  # where AS 241 changes from its central to its tail approximation
+MAX_NORMAL = 6.34  # a bound: normal(2**32 - 1) is 6.33796
+
 _MASK = np.uint64(0xFFFFFFFF)
 _SHIFT = np.uint64(32)
 _MULTIPLIER_0 = np.uint64(0xD2511F53)
@@ -84,6 +87,27 @@ def block(seed, replication, stream, lane, slot, index):
 
 
 @kernel
+def blocks(seed, replication, stream, lane, slot, indices, words, count):
+    """The blocks of many indices at once; the loop becomes vector code for multiples of eight.
+
+    Args:
+        seed, replication, stream, lane, slot: As for ``block``.
+        indices: (R,) running numbers.
+        words: (4, R) their words, overwritten.
+    """
+    key = np.uint64(seed)
+    low, high = key & _MASK, key >> _SHIFT
+    c1, c3 = np.uint64(slot), np.uint64(replication)
+    c2 = (np.uint64(stream) << np.uint64(24)) | np.uint64(lane)
+    for r in range(count):
+        w0, w1, w2, w3 = philox(np.uint64(indices[r]), c1, c2, c3, low, high)
+        words[0, r] = w0
+        words[1, r] = w1
+        words[2, r] = w2
+        words[3, r] = w3
+
+
+@kernel
 def uniform(word):
     """A number in the open interval (0, 1) of a 32-bit word."""
     return (np.float64(word) + 0.5) * 2.0**-32
@@ -91,7 +115,7 @@ def uniform(word):
 
 @kernel
 def integer(word, low, high):
-    """An integer in ``low..high``, both included, of a 32-bit word (bias below (high-low)/2**32)."""
+    """An integer in ``low..high``, ends included, of a 32-bit word (bias: (high - low) / 2**32)."""
     span = np.uint64(high - low + 1)
     return low + np.int64((np.uint64(word) * span) >> _SHIFT)
 
@@ -119,6 +143,43 @@ def poisson(word, rate):
 
 
 @kernel
+def central_normal(q):
+    """The normal deviate of a probability ``0.5 + q``, ``abs(q) <= CENTRAL``; no branches."""
+    r = 0.180625 - q * q
+    numerator = (
+        ((((((2.5090809287301226727e3 * r + 3.3430575583588128105e4) * r
+        + 6.7265770927008700853e4) * r + 4.5921953931549871457e4) * r
+        + 1.3731693765509461125e4) * r + 1.9715909503065514427e3) * r
+        + 1.3314166789178437745e2) * r + 3.3871328727963666080e0
+    )  # fmt: skip
+    denominator = (
+        ((((((5.2264952788528545610e3 * r + 2.8729085735721942674e4) * r
+        + 3.9307895800092710610e4) * r + 2.1213794301586595867e4) * r
+        + 5.3941960214247511077e3) * r + 6.8718700749205790830e2) * r
+        + 4.2313330701600911252e1) * r + 1.0
+    )  # fmt: skip
+    return q * numerator / denominator
+
+
+@kernel
+def normal_or_bound(word):
+    """The normal deviate of a word if it is central, else an upper bound of it; no branches."""
+    q = uniform(word) - 0.5
+    bound = MAX_NORMAL
+    bound = 3.72 if q < 0.4999 else bound
+    bound = 2.33 if q < 0.49 else bound
+    bound = -1.43 if q < 0.0 else bound
+    z = central_normal(q)
+    return z if abs(q) <= CENTRAL else bound
+
+
+@kernel
+def is_central(word):
+    """Whether the deviate of a word is central: ``normal_or_bound`` is exact."""
+    return abs(uniform(word) - 0.5) <= CENTRAL
+
+
+@kernel
 def normal(word):
     """A standard normal deviate of a 32-bit word, by inversion.
 
@@ -127,37 +188,21 @@ def normal(word):
     word and is bounded: ``abs(normal(word)) <= MAX_NORMAL``.
     """
     q = uniform(word) - 0.5
-    if abs(q) <= 0.425:
-        r = 0.180625 - q * q
-        numerator = (
-            (((((((2.5090809287301226727e3 * r + 3.3430575583588128105e4) * r
-            + 6.7265770927008700853e4) * r + 4.5921953931549871457e4) * r
-            + 1.3731693765509461125e4) * r + 1.9715909503065514427e3) * r
-            + 1.3314166789178437745e2) * r + 3.3871328727963666080e0)
-        )  # fmt: skip
-        denominator = (
-            (((((((5.2264952788528545610e3 * r + 2.8729085735721942674e4) * r
-            + 3.9307895800092710610e4) * r + 2.1213794301586595867e4) * r
-            + 5.3941960214247511077e3) * r + 6.8718700749205790830e2) * r
-            + 4.2313330701600911252e1) * r + 1.0)
-        )  # fmt: skip
-        return q * numerator / denominator
+    if abs(q) <= CENTRAL:
+        return central_normal(q)
     r = math.sqrt(-math.log(0.5 - abs(q)))
     r -= 1.6
     numerator = (
-        (((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r
+        ((((((7.74545014278341407640e-4 * r + 2.27238449892691845833e-2) * r
         + 2.41780725177450611770e-1) * r + 1.27045825245236838258e0) * r
         + 3.64784832476320460504e0) * r + 5.76949722146069140550e0) * r
-        + 4.63033784615654529590e0) * r + 1.42343711074968357734e0)
+        + 4.63033784615654529590e0) * r + 1.42343711074968357734e0
     )  # fmt: skip
     denominator = (
-        (((((((1.05075007164441684324e-9 * r + 5.475938084995344946e-4) * r
+        ((((((1.05075007164441684324e-9 * r + 5.475938084995344946e-4) * r
         + 1.51986665636164571966e-2) * r + 1.48103976427480074590e-1) * r
         + 6.89767334985100004550e-1) * r + 1.67638483018380384940e0) * r
-        + 2.05319162663775882187e0) * r + 1.0)
+        + 2.05319162663775882187e0) * r + 1.0
     )  # fmt: skip
     z = numerator / denominator
     return z if q > 0.0 else -z
-
-
-MAX_NORMAL = 6.34  # a bound: normal(2**32 - 1) is 6.33796

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from dess.channel import World
 from dess.compiled import kernel
-from dess.state import HOVER, STEP_X, STEP_Y, State, World
+from dess.state import HOVER, STEP_X, STEP_Y, State
 
 
 class View:
@@ -30,7 +31,7 @@ class View:
 
     @cached_property
     def constants(self) -> np.ndarray:
-        """(R,) ``MISSION`` records: the scenario's constants and the progress of each row's mission."""
+        """(R,) ``MISSION`` records: constants and progress of each row's mission."""
         return self.state.missions[self.mission]
 
     @cached_property
@@ -40,7 +41,7 @@ class View:
 
     @cached_property
     def team(self) -> np.ndarray:
-        """(R, I) ``UAV`` records of each row's whole team, itself included; absent ones inactive."""
+        """(R, I) ``UAV`` records of each row's team, itself included; absent ones inactive."""
         return self.state.uavs[self.mission]
 
     @cached_property

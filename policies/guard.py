@@ -6,7 +6,7 @@ must be able to reach a free zone cell of its own, a few slots early if teammate
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.compiled import inlined, kernel
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
@@ -16,14 +16,14 @@ MARGIN_PER_TEAMMATE = 2
 SCARCE_SLOTS = 6
 
 
-@kernel
+@inlined
 def slots_needed(mission, u):
     """Flying slots until the quota of UAV ``u`` is filled if it communicates in all of them."""
     m = mission.communication_slots
     return (mission.quota - u.communications + m - 1) // m
 
 
-@kernel
+@inlined
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota on its battery; ``data`` is all residual data.
 
@@ -36,7 +36,7 @@ def must_charge(mission, u, data):
     return u.battery < needed
 
 
-@kernel
+@inlined
 def is_parked(mission, u):
     """Whether an active UAV in the zone is charging or about to: an obstacle to the others."""
     return (
@@ -47,7 +47,7 @@ def is_parked(mission, u):
     )
 
 
-@kernel
+@inlined
 def path_length(mission, uavs, i, x, y, to_x, to_y):
     """Slots of UAV ``i`` from cell to cell, with the detour around a teammate parked between."""
     length = abs(x - to_x) + abs(y - to_y)
@@ -109,7 +109,7 @@ def parking_cell(mission, uavs, i, taken):
             taken[(y - mission.zone_y) * width + x - mission.zone_x] = True
 
 
-@kernel
+@inlined
 def _nearest_free(mission, uavs, i, taken):
     """The nearest zone cell that is not taken, and the slots to it (-1 without any)."""
     u = uavs[i]
@@ -125,13 +125,13 @@ def _nearest_free(mission, uavs, i, taken):
     return best_x, best_y, best
 
 
-@kernel
+@inlined
 def margin(mission):
     """Slots to keep in hand on the way home for the teammates that may stand in it."""
     return MARGIN_PER_TEAMMATE * (mission.active - 1)
 
 
-@kernel
+@inlined
 def contest(mission, uavs, i, x, y):
     """How a cell is contested by teammates of UAV ``i`` in the next slot.
 

@@ -1,7 +1,7 @@
 """Heuristic policies: where to go next. The way there is the same for all, under the return guard.
 
-Each policy chooses a goal; ``_step`` takes the safe action that brings the UAV nearer and keeps clear
-of teammates. Everything is a compiled function of one mission's arrays.
+Each policy chooses a goal; ``_step`` takes the safe action that brings the UAV nearer and keeps
+clear of teammates. Everything is a compiled function of one mission's arrays.
 """
 
 from functools import lru_cache
@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from dess import streams
-from dess.compiled import kernel
+from dess.compiled import inlined, kernel
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 from policies.guard import (
@@ -71,7 +71,7 @@ class Nearest(_Heuristic):
 
 
 class Greedy(_Heuristic):
-    """The node with the most residual data for its distance, leaving to teammates what is nearer to them."""
+    """The most residual data for the distance; nodes nearer to a teammate count less."""
 
     name = "greedy"
     _kind = _GREEDY
@@ -127,7 +127,7 @@ def _random_action(mission, team, i, safe):
     return HOVER
 
 
-@kernel
+@inlined
 def _step(mission, team, i, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal, clear of teammates."""
     u = team[i]
@@ -143,7 +143,7 @@ def _step(mission, team, i, safe, goal_x, goal_y):
     return best
 
 
-@kernel
+@inlined
 def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
     """The node that UAV ``i`` makes for: the best of those in reach, -1 without any."""
     u = team[i]
@@ -172,7 +172,7 @@ def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
     return node
 
 
-@kernel
+@inlined
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
@@ -183,7 +183,7 @@ def _teammate_is_nearer(mission, team, i, x, y, slots):
     return False
 
 
-@kernel
+@inlined
 def _circuit_position(mission, i, position):
     """Steps along the circuit from where the stretch of UAV ``i`` begins."""
     begin = i * mission.nodes // mission.uavs

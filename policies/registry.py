@@ -1,4 +1,4 @@
-"""From names to policies. Outside packages add theirs through the entry-point group ``dess.policies``."""
+"""From names to policies; outside packages add theirs by the entry point ``dess.policies``."""
 
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import special
 
 from dess import rules, streams
+from dess.channel import World, empty_scratch, world_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
     ACTIVE,
@@ -19,12 +20,9 @@ from dess.state import (
     STEP_Y,
     TRUNCATED,
     State,
-    World,
     constants_of,
-    empty_scratch,
     empty_state,
     ranges_of,
-    world_of,
 )
 from tests.drawn import EAST, NORTH, SOUTH, WEST, cells, replications, scenarios, seeds, spaces
 
@@ -213,7 +211,15 @@ def _one_slot(u: dict[str, Any], **scenario: Any) -> Any:
     own = state.uavs[0, 0]
     for name, value in u.items():
         own[name] = value
-    rules.advance(state.missions[0], state.uavs[0], state.residual[0], *world, scratch)
+    arrivals = np.zeros(state.residual.shape[1], np.int64)
+    rules.advance(
+        state.missions[0],
+        state.uavs[0],
+        state.residual[0],
+        arrivals,
+        *world,
+        *scratch,
+    )
     return own
 
 
@@ -396,7 +402,7 @@ def _compare_with_reference(
     collected, decided = 0.0, []
     for n in range(1, scenario.communication_slots + 1):
         left = residual.copy()
-        rules.communicate(mission, team, residual, *world, scratch, n)
+        rules.communicate(mission, team, residual, *world, *scratch, n)
         for i, u in enumerate(team):
             if not (left > 0).any():
                 assert u["served"] == -1
@@ -447,10 +453,10 @@ def test_ties_go_to_the_node_of_lowest_index() -> None:
             grid=3, zone=[1, 1, 1, 1], nodes=nodes, uavs=1, shadowing_variance=0.0
         )
         state, world, scratch = _launched(scenario)
-        rules.communicate(state.missions[0], state.uavs[0], state.residual[0], *world, scratch, 1)
+        rules.communicate(state.missions[0], state.uavs[0], state.residual[0], *world, *scratch, 1)
         assert state.uavs[0, 0]["served"] == 0
         state.residual[0, 0] = 0.0
-        rules.communicate(state.missions[0], state.uavs[0], state.residual[0], *world, scratch, 2)
+        rules.communicate(state.missions[0], state.uavs[0], state.residual[0], *world, *scratch, 2)
         assert state.uavs[0, 0]["served"] == 1
 
 
@@ -458,7 +464,7 @@ def test_charging_and_inactive_uavs_do_not_communicate() -> None:
     state, world, scratch = _launched(Scenario.of(uavs=3))
     team = state.uavs[0]
     team["charging"][0], team["active"][1] = True, False
-    rules.communicate(state.missions[0], team, state.residual[0], *world, scratch, 1)
+    rules.communicate(state.missions[0], team, state.residual[0], *world, *scratch, 1)
     assert team["served"].tolist()[:2] == [-1, -1]
     assert team["communications"].tolist() == [0, 0, 1]
 
@@ -468,17 +474,18 @@ def test_charging_and_inactive_uavs_do_not_communicate() -> None:
 
 def test_arrivals_are_the_poisson_deviates_of_their_coordinates() -> None:
     scenario = Scenario.of(arrival_rate=1.5, nodes=[[k, 0] for k in range(7)])
-    state, _, scratch = _launched(scenario, 8, 9)
+    state, _, _ = _launched(scenario, 8, 9)
+    arrivals = np.zeros(state.residual.shape[1], np.int64)
     before = state.residual[0].copy()
     state.missions["slot"] = 33
-    rules.arrive(state.missions[0], state.residual[0], scratch)
+    rules.arrive(state.missions[0], state.residual[0], arrivals)
     words = [
         streams.block(np.uint64(8), 9, streams.ARRIVAL, 0, 33, k // 4)[k % 4] for k in range(7)
     ]
     packets = [streams.poisson(word, 1.5) for word in words]
     assert sum(packets) > 0
     np.testing.assert_array_equal(state.residual[0], before + packets)
-    assert scratch.arrivals.tolist() == packets
+    assert arrivals.tolist() == packets
     assert state.missions[0]["arrived"] == sum(packets)
 
 

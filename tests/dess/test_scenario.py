@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from dess import streams
+from dess.channel import world_of
 from dess.errors import InputError
 from dess.scenario import (
     SAMPLED,
@@ -18,7 +19,7 @@ from dess.scenario import (
     parse_toml,
     scenario_names,
 )
-from dess.state import check_seed, constants_of, sample_scenario, spaces_of, world_of
+from dess.state import check_seed, constants_of, sample_scenario, spaces_of
 from tests.drawn import replications, scenarios, seeds, spaces
 
 

@@ -1,0 +1,239 @@
+"""The channel: what all missions of a world share, and which node a UAV hears best (eq. 9-11).
+
+The mean SNR is a table: for each step that leads to a cell, all nodes in falling order of it.
+Shadowing is drawn for those nodes alone that can still win: deviates are bounded, so the search
+ends at the first batch of nodes whose means lie too far below the best value so far.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dess import streams
+from dess.compiled import inlined, kernel
+from dess.scenario import ScenarioSpace
+from dess.state import STEP_X, STEP_Y
+
+GROUP = 4  # communication slots whose shadowing one Philox block holds
+_BATCH = 8  # nodes drawn together: as many as a vector register holds
+
+_DB_TO_LOG = math.log(10.0) / 10.0
+_PER_LOG_2 = 1.0 / math.log(2.0)
+
+# Eight nodes that a UAV may serve in a group of communication slots.
+BATCH = np.dtype(
+    [
+        ("node", np.int64, _BATCH),
+        ("mean", np.float64, (GROUP, _BATCH)),  # mean SNR per communication slot [dB]
+        ("words", np.uint64, (GROUP, _BATCH)),  # shadowing words per communication slot
+        ("snr", np.float64, (GROUP, _BATCH)),  # SNR [dB], or a bound of it far out in the tail
+        ("top", np.int64, GROUP),  # place of the highest SNR per communication slot
+        ("rest", np.float64),  # highest mean SNR in the slot of all nodes behind these [dB]
+    ]
+)
+
+
+class World(NamedTuple):
+    """What all missions of a batch share: the nodes and the tables of the channel.
+
+    A step is an action and the cell that it leads to; its row is filled when a UAV first makes it.
+
+    Attributes:
+        nodes: (K, 2) cells of the sensor nodes.
+        path_loss: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
+            and ``b / m`` cells along the other: the lattice of all positions a UAV can serve from.
+        order: (5 * M * M, K + 1) per step the nodes by falling mean SNR, its highest in the slot;
+            last whether the row is filled.
+        means: (5 * M * M, K, m) per step their mean SNR per communication slot [dB].
+    """
+
+    nodes: np.ndarray
+    path_loss: np.ndarray
+    order: np.ndarray
+    means: np.ndarray
+
+
+class Scratch(NamedTuple):
+    """Working memory of the search for the best node.
+
+    Attributes:
+        batches: (I, C) ``BATCH`` records: the nodes tried for each UAV, eight at a time.
+        search: (I, 4) per UAV the batches drawn, the rank behind them, the row of its step, and
+            the nodes in a batch, always eight. The compiled code reads that number, since the
+            compiler makes vector code of no loop that it knows to be so short.
+    """
+
+    batches: np.ndarray
+    search: np.ndarray
+
+
+_DRAWN, _RANK, _ROW, _WIDTH = range(4)  # columns of Scratch.search
+
+
+def empty_scratch(uavs: int, nodes: int) -> Scratch:
+    """Working memory for missions of at most that many UAVs and nodes."""
+    search = np.zeros((uavs, 4), np.int64)
+    search[:, _WIDTH] = _BATCH
+    return Scratch(np.zeros((uavs, -(-nodes // _BATCH)), BATCH), search)
+
+
+@lru_cache(maxsize=8)
+def world_of(scenario: ScenarioSpace) -> World:
+    """The nodes of a scenario and the tables of its channel (eq. 10, in dB)."""
+    m, grid = scenario.communication_slots, scenario.grid
+    coarse = np.arange(grid)[:, None]
+    fine = np.arange(m * (grid - 1) + 1)[None, :] / m
+    horizontal = scenario.cell_size * np.hypot(coarse, fine)
+    distance = np.hypot(horizontal, scenario.altitude)
+    edge = np.sqrt(2) / 2 * grid * scenario.cell_size
+    path_loss = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
+    nodes, steps = np.array(scenario.nodes, np.int64), 5 * grid * grid
+    # Memory is taken page by page as the rows are filled.
+    order = np.zeros((steps, len(nodes) + 1), np.int16)
+    return World(nodes, path_loss, order, np.zeros((steps, len(nodes), m)))
+
+
+@kernel
+def _fill_row(u, row, nodes, path_loss, order, means):
+    """Fill the row of a step: its nodes by falling mean SNR (ties: lower index), their means."""
+    count, m = means.shape[1:]
+    step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
+    value = np.empty((count, m))
+    high = np.full(count, -math.inf)
+    for k in range(count):
+        dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
+        fine, coarse = (m * dx, dy) if along_x else (m * dy, dx)
+        for n in range(m):  # short of the cell by the communication slots that are left
+            value[k, n] = path_loss[abs(coarse), abs(fine - (m - 1 - n) * step)]
+            high[k] = max(high[k], value[k, n])
+    ranking = np.argsort(-high, kind="mergesort")
+    for rank in range(count):
+        order[row, rank] = ranking[rank]
+        means[row, rank] = value[ranking[rank]]
+    order[row, count] = 1  # last, for another thread may look
+
+
+@inlined
+def open_group(mission, i, u, nodes, path_loss, order, means, search):
+    """Begin a group of communication slots for UAV ``i``: nothing is drawn."""
+    row = (u.executed * mission.grid + u.y) * mission.grid + u.x
+    search[i, _DRAWN], search[i, _RANK], search[i, _ROW] = 0, 0, row
+    if order[row, mission.nodes] == 0:
+        _fill_row(u, row, nodes, path_loss, order, means)
+
+
+@inlined
+def best_node(mission, i, residual, order, means, batches, search, n):
+    """Highest SNR [dB] of UAV ``i`` among the nodes with data, and its node; -1 without any.
+
+    On a tie the node with the lowest index wins. The arrays of ``World`` and ``Scratch`` come one
+    by one: the reference counts of tuples of them cost more than the search itself.
+
+    Args:
+        mission: ``MISSION`` record.
+        i: Index of the UAV.
+        residual: (K,) residual data [data units].
+        order, means: As in ``World``.
+        batches, search: As in ``Scratch``; ``open_group`` has begun the group of ``n``.
+        n: Communication slot, 1..m.
+    """
+    group, word = (n - 1) // GROUP, (n - 1) % GROUP
+    reach = mission.shadowing_deviation * streams.MAX_NORMAL
+    best, node = -math.inf, -1
+    for count in range(batches.shape[1]):
+        batch = batches[i, count]
+        if count == search[i, _DRAWN]:
+            rank, row = search[i, _RANK], search[i, _ROW]
+            search[i, _DRAWN] += 1
+            search[i, _RANK] = _enter(mission, residual, order, means, row, rank, group, batch)
+            _draw(mission, group * 65536 + i, batch, search[i, _WIDTH])
+        snr, k = _best_of_batch(mission, residual, batch, word, search[i, _WIDTH])
+        if snr > best or (snr == best and k < node):
+            best, node = snr, k
+        if batch.rest + reach < best or batch.rest == -math.inf:
+            break
+    return best, node
+
+
+@inlined
+def _enter(mission, residual, order, means, row, rank, group, batch):
+    """Enter nodes of a row from a rank on; the rank behind them."""
+    node, mean = batch.node, batch.mean
+    first, count = group * GROUP, min(GROUP, mission.communication_slots - group * GROUP)
+    place = 0
+    while place < _BATCH and rank < mission.nodes:
+        k = order[row, rank]
+        node[place] = k
+        for word in range(count):
+            mean[word, place] = means[row, rank, first + word]
+        rank += 1
+        place += residual[k] > 0.0
+    for empty in range(place, _BATCH):
+        node[empty] = 0
+        mean[:, empty] = -math.inf  # never wins
+    batch.rest = -math.inf
+    if rank < mission.nodes:
+        for word in range(count):
+            batch.rest = max(batch.rest, means[row, rank, first + word])
+    return rank
+
+
+@inlined
+def _draw(mission, lane, batch, width):
+    """Draw the shadowing of a batch: the SNR of its nodes [dB], or a bound far out in the tail."""
+    words, mean, snr = batch.words, batch.mean, batch.snr
+    streams.blocks(
+        mission.seed, mission.replication, streams.SHADOWING, lane, mission.slot,
+        batch.node, words, width,
+    )  # fmt: skip
+    for word in range(GROUP):
+        for place in range(width):
+            deviate = streams.normal_or_bound(words[word, place])
+            snr[word, place] = mean[word, place] + mission.shadowing_deviation * deviate
+    for word in range(GROUP):
+        batch.top[word] = _top(batch.node, snr, word, width)
+
+
+@inlined
+def _best_of_batch(mission, residual, batch, word, width):
+    """Highest SNR [dB] in a batch, and its node; -1 without any that has data."""
+    exact = 0  # places whose bound has given way to the true value, as bits
+    while True:
+        place = batch.top[word]
+        node, snr = batch.node[place], batch.snr[word, place]
+        if snr == -math.inf:
+            return snr, -1
+        drawn = batch.words[word, place]
+        if residual[node] <= 0.0:  # drained since it was drawn
+            batch.snr[word, place] = -math.inf
+        elif streams.is_central(drawn) or exact >> place & 1:
+            return snr, node
+        else:
+            deviate = streams.normal(drawn)
+            batch.snr[word, place] = batch.mean[word, place] + mission.shadowing_deviation * deviate
+            exact |= 1 << place
+        batch.top[word] = _top(batch.node, batch.snr, word, width)
+
+
+@inlined
+def _top(node, snr, word, width):
+    """Place of the highest SNR in a communication slot, of the lowest node on a tie."""
+    best = snr[word, 0]
+    for place in range(1, _BATCH):
+        value = snr[word, place]
+        best = value if value > best else best
+    first = 2**62
+    for place in range(width):
+        key = node[place] * 8 + place
+        key = key if snr[word, place] == best else 2**62
+        first = key if key < first else first
+    return first % 8
+
+
+@inlined
+def rate(mission, snr):
+    """Data units per communication slot at an SNR [dB] (eq. 9)."""
+    length = mission.communication_slot_length
+    return length * _PER_LOG_2 * math.log1p(math.exp(snr * _DB_TO_LOG))
