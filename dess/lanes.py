@@ -129,6 +129,8 @@ def _launch(lanes, first, constants, ranges, state):
 @kernel
 def _step(state, world, scratch, actions, out):
     """One mission slot of every mission; what it did goes into an ``Outcome``."""
+    nodes, path_loss, order, means = world
+    batches, search = scratch
     fleet = state.uavs.shape[1]
     arrivals = np.empty(len(world.nodes), np.int64)
     charged, collected = np.empty(fleet, np.int64), np.empty(fleet)
@@ -139,7 +141,10 @@ def _step(state, world, scratch, actions, out):
             u.action = actions[b, i]
             out.acted[b, i] = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
-        rules.advance(mission, uavs, state.residual[b], arrivals, *world, *scratch)
+        rules.advance(
+            mission, uavs, state.residual[b], arrivals,
+            nodes, path_loss, order, means, batches, search,
+        )  # fmt: skip
         out.team_collected[b] = mission.slot_collected
         for i in range(fleet):
             u, acted = uavs[i], out.acted[b, i]

@@ -174,7 +174,7 @@ class MissionRecord:
     events: EventLog | None = None
 
     def __getattr__(self, name: str) -> Any:
-        if name in (self.metrics.dtype.names or ()):
+        if name in (MISSION_RECORD.names or ()):
             return self.metrics[name].item()
         raise AttributeError(name)
 

@@ -398,6 +398,7 @@ def _compare_with_reference(
     for u, (x, y, action) in zip(team, flights, strict=True):
         dx, dy = STEPS[action]
         u["from_x"], u["from_y"], u["x"], u["y"] = x, y, x + dx, y + dy
+        u["executed"] = action
     delta_n = scenario.slot_length / scenario.communication_slots
     collected, decided = 0.0, []
     for n in range(1, scenario.communication_slots + 1):
