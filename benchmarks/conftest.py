@@ -1,0 +1,80 @@
+"""The missions that the benchmarks fly, and the table that they end with."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+import policies
+from dess import load_scenario, simulate_batch
+from dess.compiled import kernel
+from dess.scenario import ScenarioSpace
+from dess.view import View
+
+SEED, MISSIONS = 5, 2000
+
+
+@kernel
+def _look_up(missions, actions, rows_mission, rows_uav):
+    chosen = np.empty(len(rows_mission), np.int8)
+    for row in range(len(rows_mission)):
+        mission = missions[rows_mission[row]]
+        chosen[row] = actions[mission.replication, mission.slot, rows_uav[row]]
+    return chosen
+
+
+class Recorder:
+    """Another policy, whose actions it writes down."""
+
+    name = "recorder"
+
+    def __init__(self, policy, missions: int, slots: int, uavs: int):
+        self.policy, self.actions = policy, np.full((missions, slots, uavs), 4, np.int8)
+
+    def act(self, view: View) -> np.ndarray:
+        actions = self.policy.act(view)
+        c = view.constants
+        self.actions[c["replication"], c["slot"], view.uav] = actions
+        return actions
+
+
+class Replay:
+    """A policy that costs nothing: recorded actions."""
+
+    name = "replay"
+
+    def __init__(self, actions: np.ndarray):
+        self.actions = actions
+
+    def act(self, view: View) -> np.ndarray:
+        return _look_up(view.state.missions, self.actions, view.mission, view.uav)
+
+
+class Flown(NamedTuple):
+    """Missions of greedy on the paper's scenario: what was done, and how much it was."""
+
+    scenario: ScenarioSpace
+    actions: np.ndarray
+    uav_slots: int
+
+
+@pytest.fixture(scope="session")
+def flown() -> Flown:
+    scenario = load_scenario("paper")
+    recorder = Recorder(policies.load("greedy"), MISSIONS, scenario.max_slots, scenario.uavs[1])
+    records = simulate_batch(scenario, recorder, SEED, MISSIONS)
+    return Flown(scenario, recorder.actions, int(records.missions["uav_slots"].sum()))
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """UAV-slots per second of each benchmark (best round), and against the floor."""
+    session = getattr(terminalreporter.config, "_benchmarksession", None)
+    rows = [b for b in session.benchmarks if "uav_slots" in b.extra_info] if session else []
+    speeds = {row.name: row.extra_info["uav_slots"] / row.stats.min for row in rows}
+    if not speeds:
+        return
+    terminalreporter.section("UAV-slots per second, best round")
+    floor = speeds.get("test_floor")
+    for name, speed in speeds.items():
+        share = f"{floor / speed:6.2f} x the floor's time" if floor else ""
+        terminalreporter.write_line(f"{name[5:]:34}{speed:14,.0f}{1e9 / speed:9.0f} ns  {share}")

@@ -1,0 +1,89 @@
+"""The floor under any engine: the time of the draws that missions need, and nothing else.
+
+A deviate is needed if its node could still win, given that deviates are bounded: without it nobody
+can know which node is best. A block is needed if one of its words is.
+"""
+
+import math
+
+import numpy as np
+
+from dess import channel, rules, streams
+from dess.channel import empty_scratch, world_of
+from dess.compiled import kernel
+from dess.scenario import ScenarioSpace
+from dess.state import constants_of, empty_state, ranges_of
+
+
+def needed_draws(
+    scenario: ScenarioSpace, actions: np.ndarray, seed: int, missions: int
+) -> tuple[int, int]:
+    """Blocks and normal deviates that missions need.
+
+    Args:
+        scenario: Their scenario space.
+        actions: (missions, slots, I) the actions of the UAVs.
+        seed: Their seed.
+        missions: Replications 0, 1, ....
+    """
+    state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
+    blocks = deviates = 0
+    for replication in range(missions):
+        state.missions[:] = constants_of(scenario)
+        state.missions["seed"], state.missions["replication"] = seed, replication
+        mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
+        rules.launch(mission, ranges_of(scenario), uavs, residual)
+        scratch = empty_scratch(len(uavs), len(residual))
+        counts = _count(
+            mission, uavs, residual, actions[replication], *world_of(scenario), *scratch
+        )  # fmt: skip
+        blocks, deviates = blocks + counts[0], deviates + counts[1]
+    return blocks, deviates
+
+
+@kernel
+def _count(mission, uavs, residual, actions, nodes, path_loss, order, means, batches, search):
+    """Fly one mission and count."""
+    arrivals = np.empty(len(nodes), np.int64)
+    reach = mission.shadowing_deviation * streams.MAX_NORMAL
+    blocks = deviates = 0
+    while mission.active > 0:
+        for i in range(mission.uavs):
+            uavs[i].action = actions[mission.slot, i]
+        rules.resolve(mission, uavs)
+        rules.grant_pads(mission, uavs)
+        rules.spend(mission, uavs)
+        needed = np.zeros((mission.uavs, len(nodes)), np.bool_)
+        for n in range(1, mission.communication_slots + 1):
+            before = residual.copy()
+            rules.communicate(
+                mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+            )
+            for i in range(mission.uavs):
+                if not uavs[i].active or uavs[i].charging or uavs[i].served < 0:
+                    continue
+                best = channel.best_node(mission, i, before, order, means, batches, search, n)[0]
+                before[uavs[i].served] -= uavs[i].amount
+                row = search[i, 2]
+                for rank in range(len(nodes)):
+                    k = order[row, rank]
+                    if before[k] > 0.0 and means[row, rank, n - 1] + reach >= best:
+                        deviates += 1
+                        needed[i, k] = True
+        blocks += needed.sum() + math.ceil(len(nodes) / 4)
+        rules.arrive(mission, residual, arrivals)
+        rules.settle(mission, uavs)
+    return blocks, deviates
+
+
+@kernel
+def draw(blocks, deviates):
+    """Draw that many blocks and transform that many words, one at a time."""
+    total = 0.0
+    left = deviates
+    for index in range(blocks):
+        words = streams.block(np.uint64(1), 0, streams.SHADOWING, 0, 0, index)
+        for word in range(min(4, left)):
+            total += streams.normal(words[word])
+        left -= min(4, left)
+    return total

@@ -1,0 +1,63 @@
+"""Speed of the engines on the paper's scenario, in UAV-slots per second."""
+
+import numpy as np
+import pytest
+from conftest import MISSIONS, SEED, Flown, Replay
+from floor import draw, needed_draws
+
+import policies
+from dess import simulate, simulate_batch
+
+FLOOR_MISSIONS = 300
+
+
+def test_floor(benchmark, flown: Flown) -> None:
+    """The Philox blocks and normal deviates that the missions need, and nothing else."""
+    blocks, deviates = needed_draws(flown.scenario, flown.actions, SEED, FLOOR_MISSIONS)
+    records = simulate_batch(flown.scenario, Replay(flown.actions), SEED, FLOOR_MISSIONS)
+    uav_slots = int(records.missions["uav_slots"].sum())
+    print(f"{blocks / uav_slots:.2f} blocks, {deviates / uav_slots:.2f} deviates per UAV-slot")
+    draw(1, 1)
+    benchmark.extra_info["uav_slots"] = uav_slots
+    benchmark(draw, blocks, deviates)
+
+
+def _batch(benchmark, flown: Flown, policy, workers: int = 1) -> None:
+    simulate_batch(flown.scenario, policy, SEED, 10)
+    benchmark.extra_info["uav_slots"] = flown.uav_slots
+    replications = np.arange(MISSIONS)
+    records = benchmark(simulate_batch, flown.scenario, policy, SEED, replications, workers=workers)
+    if not isinstance(policy, Replay):
+        benchmark.extra_info["uav_slots"] = int(records.missions["uav_slots"].sum())
+
+
+def test_batch_engine_free_policy(benchmark, flown: Flown) -> None:
+    """Recorded actions of greedy: the engine alone."""
+    _batch(benchmark, flown, Replay(flown.actions))
+
+
+def test_batch_engine_free_policy_two_threads(benchmark, flown: Flown) -> None:
+    """The same on two cores."""
+    _batch(benchmark, flown, Replay(flown.actions), workers=2)
+
+
+@pytest.mark.parametrize("name", ["random", "nearest", "greedy", "tour"])
+def test_batch_engine(benchmark, flown: Flown, name: str) -> None:
+    """The heuristics."""
+    _batch(benchmark, flown, policies.load(name))
+
+
+@pytest.mark.parametrize("events", [False, True], ids=["without_log", "with_log"])
+def test_simpy_engine(benchmark, flown: Flown, events: bool) -> None:
+    """The SimPy model with greedy."""
+    policy, missions = policies.load("greedy"), 40
+    simulate(flown.scenario, policy, SEED)
+
+    def fly() -> int:
+        return sum(
+            simulate(flown.scenario, policy, SEED, replication, events=events).uav_slots
+            for replication in range(missions)
+        )
+
+    benchmark.extra_info["uav_slots"] = fly()
+    benchmark(fly)
