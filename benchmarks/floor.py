@@ -64,7 +64,7 @@ def _count(mission, uavs, residual, actions, nodes, path_loss, order, means, bat
                     continue
                 best = channel.best_node(mission, i, before, order, means, batches, search, n)[0]
                 before[uavs[i].served] -= uavs[i].amount
-                row = search[i, 2]
+                row = search[i, channel.ROW]
                 for rank in range(len(nodes)):
                     k = order[row, rank]
                     if before[k] > 0.0 and means[row, rank, n - 1] + reach >= best:

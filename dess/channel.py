@@ -69,13 +69,13 @@ class Scratch(NamedTuple):
     search: np.ndarray
 
 
-_DRAWN, _RANK, _ROW, _WIDTH = range(4)  # columns of Scratch.search
+DRAWN, RANK, ROW, WIDTH = range(4)  # columns of Scratch.search
 
 
 def empty_scratch(uavs: int, nodes: int) -> Scratch:
     """Working memory for missions of at most that many UAVs and nodes."""
     search = np.zeros((uavs, 4), np.int64)
-    search[:, _WIDTH] = _BATCH
+    search[:, WIDTH] = _BATCH
     return Scratch(np.zeros((uavs, -(-nodes // _BATCH)), BATCH), search)
 
 
@@ -119,7 +119,7 @@ def _fill_row(u, row, nodes, path_loss, order, means):
 def open_group(mission, i, u, nodes, path_loss, order, means, search):
     """Begin a group of communication slots for UAV ``i``: nothing is drawn."""
     row = (u.executed * mission.grid + u.y) * mission.grid + u.x
-    search[i, _DRAWN], search[i, _RANK], search[i, _ROW] = 0, 0, row
+    search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
     if order[row, mission.nodes] == 0:
         _fill_row(u, row, nodes, path_loss, order, means)
 
@@ -144,12 +144,12 @@ def best_node(mission, i, residual, order, means, batches, search, n):
     best, node = -math.inf, -1
     for count in range(batches.shape[1]):
         batch = batches[i, count]
-        if count == search[i, _DRAWN]:
-            rank, row = search[i, _RANK], search[i, _ROW]
-            search[i, _DRAWN] += 1
-            search[i, _RANK] = _enter(mission, residual, order, means, row, rank, group, batch)
-            _draw(mission, group * 65536 + i, batch, search[i, _WIDTH])
-        snr, k = _best_of_batch(mission, residual, batch, word, search[i, _WIDTH])
+        if count == search[i, DRAWN]:
+            rank, row = search[i, RANK], search[i, ROW]
+            search[i, DRAWN] += 1
+            search[i, RANK] = _enter(mission, residual, order, means, row, rank, group, batch)
+            _draw(mission, group * 65536 + i, batch, search[i, WIDTH])
+        snr, k = _best_of_batch(mission, residual, batch, word, search[i, WIDTH])
         if snr > best or (snr == best and k < node):
             best, node = snr, k
         if batch.rest + reach < best or batch.rest == -math.inf:

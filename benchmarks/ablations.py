@@ -1,0 +1,96 @@
+"""What each step of the batch engine's speed buys: the engine without it, measured in turn.
+
+Every variant is a copy of the packages in which one line is changed. All give the same records.
+Run it with ``python benchmarks/ablations.py``; the table goes into docs/performance.md.
+"""
+
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+ROUNDS = 3
+
+# What is taken away: file, line, what stands there instead.
+VARIANTS = {
+    "as it is": (),
+    "no pruning: every node with data is drawn": (
+        ("dess/channel.py", "if batch.rest + reach < best or", "if"),
+    ),
+    "no vector code: the length of a batch is known to the compiler": (
+        ("dess/channel.py", "batch, search[i, WIDTH])", "batch, _BATCH)"),
+        ("dess/channel.py", "word, search[i, WIDTH])", "word, _BATCH)"),
+    ),
+    "no bounds: every deviate is transformed exactly": (
+        ("dess/channel.py", "streams.normal_or_bound(", "streams.normal("),
+    ),
+    "no table of steps: order and means worked out in every slot": (
+        ("dess/channel.py", "if order[row, mission.nodes] == 0:", "if True:"),
+    ),
+    "no inlining: the rules are called": (
+        ("dess/compiled.py", "kernel(function, forceinline=True)", "kernel(function)"),
+    ),
+    "no batch: one mission at a time": (("dess/batch.py", "LANES = 256", "LANES = 1"),),
+}
+
+TIMED = """
+import sys, time
+sys.path[:0] = [".", "benchmarks"]
+import numpy as np, policies
+from conftest import SEED, Recorder, Replay
+from dess import load_scenario, simulate_batch
+scenario, missions = load_scenario("paper"), 600
+recorder = Recorder(policies.load("greedy"), missions, scenario.max_slots, scenario.uavs[1])
+simulate_batch(scenario, recorder, SEED, missions)
+replay, best = Replay(recorder.actions), float("inf")
+for _ in range(4):
+    start = time.perf_counter()
+    records = simulate_batch(scenario, replay, SEED, missions).missions
+    best = min(best, time.perf_counter() - start)
+print(1e9 * best / records["uav_slots"].sum(), records.tobytes().__hash__())
+"""
+
+
+def _copy(folder: Path, changes: tuple) -> Path:
+    """The packages with these lines changed."""
+    for name in ("dess", "policies", "benchmarks"):
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name, line, instead in changes:
+        text = (folder / name).read_text()
+        assert line in text, f"{name} has no {line!r}"
+        (folder / name).write_text(text.replace(line, instead))
+    return folder
+
+
+def main() -> None:
+    """Measure the variants in turn and print a table."""
+    with tempfile.TemporaryDirectory() as base:
+        folders = {
+            name: _copy(Path(base) / str(number), changes)
+            for number, (name, changes) in enumerate(VARIANTS.items())
+        }
+        times: dict[str, list[float]] = {name: [] for name in VARIANTS}
+        seen = set()
+        for _ in range(ROUNDS):
+            for name, folder in folders.items():
+                environment = {"PYTHONHASHSEED": "0", "PATH": ""}
+                done = subprocess.run(
+                    [sys.executable, "-c", TIMED],
+                    cwd=folder, env=environment, capture_output=True, text=True, check=True,
+                )  # fmt: skip
+                nanoseconds, records = done.stdout.split()
+                times[name].append(float(nanoseconds))
+                seen.add(records)
+        assert len(seen) == 1, "the variants give different records"
+    whole = statistics.median(times["as it is"])
+    print("| the engine | ns per UAV-slot | slower by |\n| --- | ---: | ---: |")
+    for name, measured in times.items():
+        median = statistics.median(measured)
+        print(f"| {name} | {median:,.0f} | {median / whole:.2f} x |")
+
+
+if __name__ == "__main__":
+    main()
