@@ -1,0 +1,268 @@
+"""The README and the docs: their commands, links, names, snippets and figures hold."""
+
+import json
+import re
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer.main
+
+import dess
+import policies
+from analysis import load_study, paper
+from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
+from reports import cli
+
+ROOT = Path(__file__).parents[1]
+PATHS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in PATHS}
+README = PAGES["README.md"]
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The fenced blocks of a language."""
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
+
+
+def every(language: str) -> list[Any]:
+    """The fenced blocks of a language in all pages, as parameters."""
+    return [
+        pytest.param(block, id=f"{page}-{number}")
+        for page, text in PAGES.items()
+        for number, block in enumerate(blocks(text, language))
+    ]
+
+
+def command_lines(program: str) -> list[list[str]]:
+    """The arguments of every call of a program in a shell block."""
+    lines = (line for text in PAGES.values() for b in blocks(text, "sh") for line in b.splitlines())
+    parts = (shlex.split(part) for line in lines for part in line.split("&&"))
+    return [words[1:] for words in parts if words and Path(words[0]).name == program]
+
+
+def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
+    """The subcommand that arguments name, and those that are left for it."""
+    command: Any = typer.main.get_command(cli.app)
+    while hasattr(command, "commands"):
+        assert arguments, "no subcommand"
+        name, *arguments = arguments
+        assert name in command.commands, f"dess has no command {name}"
+        command = command.commands[name]
+    return command, arguments
+
+
+def anchors(path: Path) -> set[str]:
+    """What a link can point to inside a page."""
+    headings = re.findall(r"^#+ (.+)$", path.read_text("utf-8"), re.M)
+    return {re.sub(r"[^a-z0-9 -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def table(text: str, heading: str) -> dict[str, list[list[float]]]:
+    """The numbers of a table's rows: per cell those in it."""
+    rows = text.split(f"| {heading} |", 1)[1].split("\n\n", 1)[0].splitlines()[2:]
+    cells = ([cell.strip(" `") for cell in row.strip("|").split("|")] for row in rows)
+    return {
+        name: [[float(n) for n in re.findall(r"[\d.]+", c)] for c in rest] for name, *rest in cells
+    }
+
+
+@pytest.fixture
+def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The README's policy as an installed package; the name of the policy."""
+    source = next(block for block in blocks(README, "python") if "class " in block)
+    project = tomllib.loads(blocks(README, "toml")[0])["project"]
+    ((name, where),) = project["entry-points"]["dess.policies"].items()
+    module = where.split(":")[0]
+    (tmp_path / f"{module}.py").write_text(source)
+    metadata = tmp_path / f"{module}-{project['version']}.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
+    (metadata / "entry_points.txt").write_text(f"[dess.policies]\n{name} = {where}\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    return name
+
+
+# --- commands ---
+
+
+def test_the_readme_opens_with_the_two_commands() -> None:
+    set_up = "python3 -m venv .venv && .venv/bin/pip install nox && .venv/bin/nox -s"
+    assert blocks(README, "sh")[:2] == [f"{set_up} reports\n", f"{set_up} tests\n"]
+
+
+@pytest.mark.usefixtures("outside")
+@pytest.mark.parametrize("arguments", command_lines("dess"), ids=" ".join)
+def test_commands_are_accepted(arguments: list[str]) -> None:
+    command, rest = leaf(arguments)
+    given = command.make_context(command.name, list(rest)).params
+    for team in np.atleast_1d(given.get("policy") or []):
+        assert policies.load_team(str(team))
+    if "scenario" in given:
+        assert cli._scenario(given["scenario"], given["settings"])
+    if "study" in arguments:
+        assert load_study(given["name"])
+
+
+def test_commands_in_the_text_exist() -> None:
+    found = [c for text in PAGES.values() for c in re.findall(r"`(dess [a-z].*?)`", text)]
+    assert found
+    for text in found:
+        leaf(shlex.split(text)[1:])
+
+
+def test_nox_sessions_exist() -> None:
+    defined = re.findall(
+        r"^@nox\.session\ndef (\w+)", (ROOT / "noxfile.py").read_text("utf-8"), re.M
+    )
+    named = {s for text in PAGES.values() for s in re.findall(r"nox -s (\w+)", text)}
+    assert {"tests", "reports"} <= named <= set(defined)
+
+
+def test_the_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
+    arguments = next(a for a in command_lines("dess") if "--figure" in a)
+    place = arguments.index("--figure") + 1
+    picture = ROOT / arguments[place]
+    assert f'src="{arguments[place]}"' in README
+    assert picture.stat().st_size < 300_000
+    again = [*arguments[:place], str(tmp_path / "again.png"), *arguments[place + 1 :]]
+    assert cli.main(again) == 0
+    assert (tmp_path / "again.png").read_bytes()[:24] == picture.read_bytes()[:24]  # type and size
+
+
+# --- links and names ---
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    links = re.findall(r'\]\(([^)\s]+)\)|src="([^"]+)"', PAGES[page])
+    for link in filter(None, (a or b for a, b in links)):
+        if not link.startswith("https://"):
+            name, _, anchor = link.partition("#")
+            target = (ROOT / page).parent / name
+            assert target.exists(), link
+            assert not anchor or anchor in anchors(target), link
+
+
+def test_every_page_is_linked_from_the_readme() -> None:
+    missing = [page for page in PAGES if page != "README.md" and f"]({page})" not in README]
+    assert not missing
+
+
+def test_the_map_names_what_is_there() -> None:
+    rows = README.split("## Map of the repository")[1].split("\n## ")[0].splitlines()
+    columns = [row.split("|")[1:3] for row in rows if row.startswith("| `")]
+    named = [name for where, _ in columns for name in re.findall(r"`([^`]+)`", where)]
+    assert not [name for name in named if not (ROOT / name).exists()]
+    text = " ".join(named) + " ".join(what for _, what in columns)
+    for package in ("dess", "policies", "analysis", "reports"):
+        modules = {path.name for path in (ROOT / package).glob("[a-z]*.py")} - {"errors.py"}
+        assert not {name for name in modules if name not in text}, package
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_tests_that_are_named_exist(page: str) -> None:
+    sources = "".join(path.read_text("utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    defined = set(re.findall(r"^def (test_\w+)", sources, re.M))
+    assert set(re.findall(r"`(test_\w+)`", PAGES[page])) <= defined
+
+
+def test_fields_of_the_scenario_are_named_rightly() -> None:
+    fields = {*dess.Scenario.model_fields}
+    page = PAGES["docs/model.md"]
+    decisions = page.split("## Decisions")[1].split("\n## ")[0]
+    cells = [row.split("|")[3] for row in decisions.splitlines() if row.startswith("| ")][2:]
+    named = {name for cell in cells for name in re.findall(r"`(\w+)`", cell)}
+    assert named <= fields
+    text = re.sub(r"^```.*?^```", "", page, flags=re.M | re.S)
+    code = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`]+)`", text))))
+    assert fields <= code
+
+
+def test_the_columns_of_records_and_events_are_all_explained() -> None:
+    columns = EventLog().columns()
+    for name in (*EVENT_NAMES, *columns, *MISSION_RECORD.names, *UAV_RECORD.names):
+        assert f"`{name}`" in PAGES["docs/model.md"], name
+
+
+# --- snippets ---
+
+
+@pytest.mark.parametrize("source", every("python"))
+def test_snippets_compile(source: str) -> None:
+    compile(source, "snippet", "exec")
+
+
+@pytest.mark.parametrize("source", [p for p in every("python") if "import dess" in p.values[0]])
+def test_snippets_run(
+    source: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(source, "snippet", "exec"), {})
+    assert capsys.readouterr().out
+
+
+def test_the_api_is_shown_in_six_lines() -> None:
+    assert len(blocks(README, "python")[0].splitlines()) == 6
+
+
+def test_the_readmes_policy_takes_ten_lines(outside: str) -> None:
+    source = next(block for block in blocks(README, "python") if "class " in block)
+    body = source[source.index("class ") :].splitlines()
+    assert len(body) == 10
+
+
+def test_the_readmes_policy_flies(outside: str) -> None:
+    policy, scenario = policies.load(outside), dess.load_scenario("paper")
+    assert outside in policies.names()
+    missions = dess.simulate_batch(scenario, policy, 7, 50).missions
+    assert missions["success"].mean() > 0.8
+    random = dess.simulate_batch(scenario, policies.load("random"), 7, 50).missions
+    assert missions["collection_ratio"].mean() > 2 * random["collection_ratio"].mean()
+    single = dess.simulate(scenario, policy, 7, 3).metrics
+    assert single == missions[3]
+
+
+# --- figures ---
+
+METRICS = ("success", "collection_ratio", "collection_ratio_and_communication")
+
+
+def evaluated(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
+    """What ``dess evaluate --json`` prints."""
+    assert cli.main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def shown(interval: dict[str, float]) -> Any:
+    """Mean, low and high in percent, to the last digit that is printed."""
+    return pytest.approx([100 * interval[key] for key in ("mean", "low", "high")], abs=0.06)
+
+
+def test_the_readmes_table_is_what_its_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = table(README, "policy")
+    assert printed.pop("paper") == [[pytest.approx(100 * paper.TABLE_IV[m])] for m in METRICS]
+    arguments = next(a for a in command_lines("dess") if "--missions" in a and "1000" in a)
+    rows = evaluated(arguments, capsys)
+    assert list(printed) == [row["policy"] for row in rows]
+    for row in rows:
+        assert printed[row["policy"]] == [shown(row[m]) for m in METRICS]
+
+
+def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
+    printed = table(PAGES["docs/policies.md"], "policy")
+    by_fleet = [a for a in command_lines("dess") if "tour" in a and a[2].startswith("uavs=")]
+    assert len(by_fleet) == 3
+    for column, arguments in enumerate(by_fleet):
+        for row in evaluated(arguments, capsys):
+            assert printed[row["policy"]][column] == shown(row[METRICS[2]])
