@@ -7,7 +7,7 @@ must be able to reach a free zone cell of its own, a few slots early if teammate
 import numpy as np
 
 from dess.compiled import inlined, kernel
-from dess.state import HOVER, STEP_X, STEP_Y
+from dess.state import STEP_X, STEP_Y
 from dess.view import View
 
 # Slots in hand on the way home: per active teammate, since each may cost a detour.
@@ -160,8 +160,9 @@ def contest(mission, uavs, i, x, y):
 def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
     """Which actions keep the charger of UAV ``i`` reachable in time.
 
-    Without any such action those are left that come nearest to the charger. Hover is always legal;
-    cells off the grid and cells of parked teammates never are.
+    Without any such action those are left that come nearest to the charger, but for cells that a
+    teammate with the right of way may take: to let it pass, the margin may be used.
+    Cells off the grid and cells of parked teammates are never safe.
 
     Args:
         mission: ``MISSION`` record.
@@ -172,23 +173,30 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
-    late = np.empty(5, np.int64)  # slots by which the charger would be reached too late
+    late = np.zeros(5, np.int64)  # slots by which the charger would be reached too late
+    contested = np.empty(5, np.int64)
     least = 1_000_000
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         safe[action] = 0 <= x < mission.grid and 0 <= y < mission.grid
-        safe[action] = safe[action] and contest(mission, uavs, i, x, y) < 3
+        contested[action] = contest(mission, uavs, i, x, y)
+        safe[action] = safe[action] and contested[action] < 3
         if safe[action] and charge:
             home = path_length(mission, uavs, i, x, y, home_x, home_y)
             # One slot is for the charging slot itself: the battery must not be empty by then.
             late[action] = max(home + 1 + margin(mission) - (u.battery - 1), 0)
             least = min(least, late[action])
-    if charge:
-        # Waiting for a teammate to pass is what the margin is for.
-        may_wait = late[HOVER] <= margin(mission)
-        for action in range(5):
-            nearest = late[action] == least
-            safe[action] = safe[action] and (nearest or (action == HOVER and may_wait))
+    if not charge:
+        return
+    nearest = safe & (late == least)
+    clear = safe & (contested < 2)
+    if least == 0 or not clear.any():
+        safe[:] = nearest
+    elif (nearest & clear).any():  # late: straight home, but not where others have right of way
+        safe[:] = nearest & clear
+    else:  # to wait or step aside until the teammate has passed is what the margin is for
+        wait = clear & (late <= margin(mission))
+        safe[:] = wait if wait.any() else nearest
 
 
 @kernel

@@ -10,7 +10,7 @@ GROUP = "dess.policies"
 
 # Name -> (where it is, what it does).
 SHIPPED = {
-    "random": ("policies.heuristics:Random", "a random legal action"),
+    "random": ("policies.heuristics:Random", "a random safe move, clear of teammates"),
     "nearest": ("policies.heuristics:Nearest", "the nearest node with enough data"),
     "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),

@@ -213,13 +213,14 @@ def test_snippets_run(
 
 
 def test_the_api_is_shown_in_six_lines() -> None:
-    assert len(blocks(README, "python")[0].splitlines()) == 6
+    lines = blocks(README, "python")[0].splitlines()
+    assert len([line for line in lines if line]) == 6
 
 
 def test_the_readmes_policy_takes_ten_lines(outside: str) -> None:
     source = next(block for block in blocks(README, "python") if "class " in block)
     body = source[source.index("class ") :].splitlines()
-    assert len(body) == 10
+    assert len([line for line in body if line]) == 10
 
 
 def test_the_readmes_policy_flies(outside: str) -> None:
