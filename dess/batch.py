@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dess import rules
-from dess.channel import World, empty_scratch, world_of
+from dess.channel import empty_scratch, world_of
 from dess.compiled import kernel
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
@@ -73,18 +73,16 @@ def simulate_batch(
     records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
     stop = Event()
 
-    def run(jobs: np.ndarray, world: World, group: list[ScenarioSpace], which: np.ndarray) -> None:
-        batch = _Batch(group, world, team, seed, lanes)
+    def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:
+        batch = _Batch(group, team, seed, lanes)
         batch.run(jobs, which, numbers, records, progress, stop)
 
     tasks = []
-    for world, members in _by_world(spaces):
+    for members in _by_world(spaces):
         jobs = np.nonzero(np.isin(kinds, members))[0]
         which = np.searchsorted(members, kinds)  # read at the jobs of this world only
         group = [spaces[member] for member in members]
-        tasks += [
-            (part, world, group, which) for part in np.array_split(jobs, workers) if len(part)
-        ]
+        tasks += [(part, group, which) for part in np.array_split(jobs, workers) if len(part)]
     if workers == 1:
         for task in tasks:
             run(*task)
@@ -108,8 +106,8 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     return numbers.astype(np.int64)
 
 
-def _by_world(spaces: list[ScenarioSpace]) -> list[tuple[World, np.ndarray]]:
-    """The scenarios grouped by what a batch must have in common."""
+def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
+    """The indices of the scenarios, grouped by what a batch must have in common."""
 
     def key(index: int) -> tuple:
         s = spaces[index]
@@ -117,17 +115,14 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[tuple[World, np.ndarray]]:
         return (s.grid, s.communication_slots, channel, s.nodes)
 
     ordered = sorted(range(len(spaces)), key=key)
-    groups = [np.array(sorted(members)) for _, members in groupby(ordered, key)]
-    return [(world_of(spaces[members[0]]), members) for members in groups]
+    return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
 
 
 class _Batch:
     """Lanes of missions over one world."""
 
-    def __init__(
-        self, spaces: list[ScenarioSpace], world: World, team: list, seed: int, lanes: int
-    ):
-        self.world, self.team, self.seed, self.lanes = world, team, seed, lanes
+    def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, lanes: int):
+        self.world, self.team, self.lanes = world_of(spaces[0]), team, lanes
         self.constants = np.concatenate([constants_of(space) for space in spaces])
         self.constants["seed"] = seed
         self.ranges = np.stack([ranges_of(space) for space in spaces])

@@ -7,6 +7,7 @@ ends at the first batch of nodes whose means lie too far below the best value so
 
 import math
 from functools import lru_cache
+from threading import get_ident
 from typing import NamedTuple
 
 import numpy as np
@@ -79,9 +80,16 @@ def empty_scratch(uavs: int, nodes: int) -> Scratch:
     return Scratch(np.zeros((uavs, -(-nodes // _BATCH)), BATCH), search)
 
 
-@lru_cache(maxsize=8)
 def world_of(scenario: ScenarioSpace) -> World:
-    """The nodes of a scenario and the tables of its channel (eq. 10, in dB)."""
+    """The nodes of a scenario and the tables of its channel (eq. 10, in dB).
+
+    Every thread has tables of its own, since it fills them as it goes.
+    """
+    return _world_of(scenario, get_ident())
+
+
+@lru_cache(maxsize=8)
+def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, grid = scenario.communication_slots, scenario.grid
     coarse = np.arange(grid)[:, None]
     fine = np.arange(m * (grid - 1) + 1)[None, :] / m
@@ -112,7 +120,7 @@ def _fill_row(u, row, nodes, path_loss, order, means):
     for rank in range(count):
         order[row, rank] = ranking[rank]
         means[row, rank] = value[ranking[rank]]
-    order[row, count] = 1  # last, for another thread may look
+    order[row, count] = 1
 
 
 @inlined

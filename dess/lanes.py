@@ -10,8 +10,6 @@ from dess.compiled import kernel
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
-    BATTERY,
-    QUOTA,
     TRUNCATED,
     check_seed,
     constants_of,
@@ -20,7 +18,7 @@ from dess.state import (
     spaces_of,
 )
 
-# The parts of a reward (eq. 14-18), in the order in which they are added.
+# The parts of a reward, as ``rules.reward_terms`` gives them.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted")
 
 
@@ -157,19 +155,6 @@ def _step(state, world, scratch, actions, out):
             out.collected[b, i] = u.collected - collected[i]
             out.reward_terms[b, i] = 0.0
             if acted:
-                _write_terms(mission, u, u.slots_charging > charged[i], out.reward_terms[b, i])
-
-
-@kernel
-def _write_terms(mission, u, charged, terms):
-    """The parts of the reward that ``rules.settle`` gave (eq. 14-18)."""
-    terms[0] = mission.reward_data * mission.slot_collected
-    terms[1] = mission.reward_step
-    if u.overruled:
-        terms[2] = mission.reward_overruled
-    if charged:
-        terms[3] = mission.reward_charging
-    if u.end == QUOTA:
-        terms[4] = mission.reward_quota
-    if u.end == BATTERY:
-        terms[5] = mission.reward_depleted
+                terms = rules.reward_terms(mission, u, u.slots_charging > charged[i])
+                for t in range(len(terms)):
+                    out.reward_terms[b, i, t] = terms[t]

@@ -255,30 +255,46 @@ def arrive(mission, residual, arrivals):
 
 
 @inlined
+def reward_terms(mission, u, charged):
+    """The parts of the reward of an active UAV's slot (eq. 14-18), once its ``end`` is known.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        charged: Whether it charged in the slot.
+
+    Returns:
+        The terms for data, step, overruled, charging, quota and depleted, to be added in order.
+    """
+    return (
+        mission.reward_data * mission.slot_collected,
+        mission.reward_step,
+        mission.reward_overruled if u.overruled else 0.0,
+        mission.reward_charging if charged else 0.0,
+        mission.reward_quota if u.end == QUOTA else 0.0,
+        mission.reward_depleted if u.end == BATTERY else 0.0,
+    )
+
+
+@inlined
 def settle(mission, uavs):
     """Rewards (eq. 14-18) and operational status (eq. 6, 7) at the end of a slot."""
     mission.collected += mission.slot_collected
     mission.slot += 1
     for i in range(mission.uavs):
         u = uavs[i]
+        u.reward = 0.0
         if not u.active:
-            u.reward = 0.0
             continue
-        reward = mission.reward_data * mission.slot_collected + mission.reward_step
-        if u.overruled:
-            reward += mission.reward_overruled
-        if u.charging:
-            reward += mission.reward_charging
         if u.communications >= mission.quota:
             u.end = QUOTA
-            reward += mission.reward_quota
         elif u.battery <= 0:
             u.end = BATTERY
-            reward += mission.reward_depleted
         elif mission.slot >= mission.max_slots:
             u.end = TRUNCATED
-        u.reward = reward
-        u.total_reward += reward
+        for term in reward_terms(mission, u, u.charging):
+            u.reward += term
+        u.total_reward += u.reward
         if u.end != ACTIVE:
             u.active = False
             mission.active -= 1
