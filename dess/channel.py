@@ -234,10 +234,10 @@ def _top(node, snr, word, width):
         best = value if value > best else best
     first = 2**62
     for place in range(width):
-        key = node[place] * 8 + place
+        key = node[place] * _BATCH + place
         key = key if snr[word, place] == best else 2**62
         first = key if key < first else first
-    return first % 8
+    return first % _BATCH
 
 
 @inlined
