@@ -28,6 +28,9 @@ SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 # Entries of the table of the channel (dess.channel): 8 GiB if every step of it were ever made.
 _CHANNEL_LIMIT = 2**30
 
+# What pydantic says, in words of its own, where a pair or a list of cells is wanted.
+_WRONG_FORM = ("tuple_type", "missing", "too_long")
+
 # An integer as such: neither 2.0 nor true nor "2" is taken for one.
 Integer = Annotated[int, Field(strict=True)]
 # A finite number; an integer will do.
@@ -269,13 +272,18 @@ def validation_line(error: ValidationError, where: str) -> str:
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
+    models: dict[str, type[BaseModel]] = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}
+    fields = models[error.title].model_fields if error.title in models else {}
     if first["type"] == "extra_forbidden":
-        models: dict[str, type[BaseModel]] = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}
-        model = models.get(error.title)
-        allowed = f"; allowed: {', '.join(sorted(model.model_fields))}" if model else ""
+        allowed = f"; allowed: {', '.join(sorted(fields))}" if fields else ""
         return f"{where}: {key}: unknown key{allowed}"
     if first["type"] == "value_error":
         return f"{where}: {key + ': ' if key else ''}{message}"
+    field = fields.get(str(first["loc"][0]))
+    if field and first["type"] in _WRONG_FORM:
+        return (
+            f"{where}: {key}: {first['input']!r} has the wrong form; allowed: {field.description}"
+        )
     return f"{where}: {key}: {message}, not {first['input']!r}"
 
 
