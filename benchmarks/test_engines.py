@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from conftest import MISSIONS, SEED, Flown, Replay
-from floor import draw, needed_draws
 
 import policies
+from benchmarks.conftest import MISSIONS, SEED, Flown
+from benchmarks.floor import draw, needed_draws
+from benchmarks.replay import Replay
 from dess import simulate, simulate_batch
 
 FLOOR_MISSIONS = 300

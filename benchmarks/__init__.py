@@ -1,0 +1,1 @@
+"""Speed of the engines; run by the nox session bench."""
