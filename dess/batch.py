@@ -27,6 +27,7 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
+_TELL = 50  # missions between two calls of the progress callback
 LANES = 256  # missions in flight: enough to hide Python's share, few enough for the cache
 
 
@@ -142,7 +143,8 @@ class _Batch:
         while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
             _advance(job_of_lane, queue, source, state, self.world, scratch, records)
-            if progress and queue[1] > told:
+            # Telling costs time that all threads share: not in every slot.
+            if progress and (queue[1] >= told + _TELL or queue[1] == len(jobs)):
                 progress(int(queue[1]) - told)
                 told = int(queue[1])
 
