@@ -27,7 +27,6 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
-_TELL = 50  # missions between two calls of the progress callback
 LANES = 256  # missions in flight: enough to hide Python's share, few enough for the cache
 
 
@@ -139,12 +138,12 @@ class _Batch:
         source = (self.constants, self.ranges, which, numbers, jobs)
         for lane in range(lanes):
             _next_mission(lane, job_of_lane, queue, source, state)
-        told = 0
+        # Telling costs time that all threads share: a hundred times will do.
+        told, step = 0, max(1, len(jobs) // 100)
         while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
             _advance(job_of_lane, queue, source, state, self.world, scratch, records)
-            # Telling costs time that all threads share: not in every slot.
-            if progress and (queue[1] >= told + _TELL or queue[1] == len(jobs)):
+            if progress and (queue[1] >= told + step or queue[1] == len(jobs)):
                 progress(int(queue[1]) - told)
                 told = int(queue[1])
 

@@ -279,7 +279,7 @@ def validation_line(error: ValidationError, where: str) -> str:
         return f"{where}: {key}: unknown key{allowed}"
     if first["type"] == "value_error":
         return f"{where}: {key + ': ' if key else ''}{message}"
-    field = fields.get(str(first["loc"][0]))
+    field = fields.get(key.partition(".")[0])
     if field and first["type"] in _WRONG_FORM:
         return (
             f"{where}: {key}: {first['input']!r} has the wrong form; allowed: {field.description}"
