@@ -299,7 +299,9 @@ def test_the_help_imports_nothing_heavy():
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
     command = [sys.executable, "-m", "reports.cli", "study", "run", "trial.toml", "--out", "out"]
-    missions = ("--missions", "5000")
+    with open("trial.toml", "a") as study:  # slow enough to be caught in the middle
+        study.write('engine = "events"\n')
+    missions = ("--missions", "1000")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen([*command, *missions], env=environment(), **pipes) as running:
         while len(list(tmp_path.glob("out/missions/*.parquet"))) < 2:
