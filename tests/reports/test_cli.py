@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 
 import pyarrow.parquet as pq
 import pytest
@@ -303,7 +304,10 @@ def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
         study.write('engine = "events"\n')
     missions = ("--missions", "1000")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    with subprocess.Popen([*command, *missions], env=environment(), **pipes) as running:
+    # A background job of a shell ignores SIGINT, and its children with it: not this one.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    start = partial(subprocess.Popen, env=environment(), preexec_fn=heed, **pipes)
+    with start([*command, *missions]) as running:
         while len(list(tmp_path.glob("out/missions/*.parquet"))) < 2:
             assert running.poll() is None
             time.sleep(0.01)
