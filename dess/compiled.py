@@ -2,7 +2,8 @@
 
 Numba keeps a compiled function as long as the file that defines it stays the same. Our functions
 inline one another across files, so a cached engine would outlive a change of the rules. Here a
-cached function is valid only while all sources of its package and of ``dess`` are unchanged.
+cached function is valid only while all sources of its package, of the packages around that and of
+``dess`` are unchanged.
 """
 
 import hashlib
@@ -24,8 +25,8 @@ def kernel(function: Callable, **options: Any) -> Any:
         compiled = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     except RuntimeError:  # numba: no locator available
         return njit(nogil=True, error_model="numpy", **options)(function)
-    own = Path(inspect.getfile(function)).parent
-    _keep_fresh(compiled._cache._cache_file, _digest(Path(__file__).parent) + _digest(own))
+    folders = [Path(__file__).parent, *_packages(Path(inspect.getfile(function)))]
+    _keep_fresh(compiled._cache._cache_file, "".join(map(_digest, folders)))
     return compiled
 
 
@@ -47,6 +48,14 @@ def inlined(function: Callable) -> Any:
     functions of a mission slot more than their work.
     """
     return kernel(function, forceinline=True)
+
+
+def _packages(path: Path) -> list[Path]:
+    """The folder of a source file and those of the packages around it."""
+    folders = [path.parent]
+    while (folders[-1].parent / "__init__.py").exists():
+        folders.append(folders[-1].parent)
+    return folders
 
 
 @lru_cache

@@ -193,7 +193,7 @@ def grant_pads(mission, uavs):
 
 @inlined
 def spend(mission, uavs):
-    """Energy of one slot (eq. 8): a charging slot gains, any other active slot costs 1."""
+    """Energy of one slot (eq. 8): a charging slot gains, any other active slot costs."""
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
@@ -202,7 +202,7 @@ def spend(mission, uavs):
             u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
             u.slots_charging += 1
         else:
-            u.battery -= 1
+            u.battery -= mission.flight_cost
             u.slots_flying += 1
             if u.pad_request >= 0:
                 u.slots_waiting += 1

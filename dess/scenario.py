@@ -72,6 +72,13 @@ class _Constants(BaseModel):
     charge_rate: Integer = Field(
         10, ge=1, le=100, description="battery gained in a charging slot [%]"
     )
+    flight_cost: Integer = Field(
+        1,
+        ge=0,
+        le=1,
+        description="battery spent in a slot without charging [%]: 1, or 0 to fly without battery "
+        "decrease (Algorithm 1, phase I)",
+    )
 
     # Channel
     edge_snr: Number = Field(

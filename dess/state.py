@@ -44,6 +44,7 @@ MISSION = np.dtype(
         ("charge_start", np.int64),
         ("charge_complete", np.int64),
         ("charge_rate", np.int64),
+        ("flight_cost", np.int64),
         ("quota", np.int64),
         # channel and data
         ("communication_slot_length", np.float64),

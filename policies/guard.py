@@ -27,13 +27,14 @@ def slots_needed(mission, u):
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota on its battery; ``data`` is all residual data.
 
-    With little data left a communication slot may find no node to serve: then some in hand.
+    With little data left a communication slot may find no node to serve: then some in hand. Where
+    flying costs no battery, nobody must charge.
     """
     needed = slots_needed(mission, u)
     # What a UAV takes beside an average node; below it per needed slot the sea is nearly empty.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
-    return u.battery < needed
+    return u.battery < mission.flight_cost * needed
 
 
 @inlined

@@ -52,6 +52,7 @@ def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
         "communication_slots": draw(st.integers(1, 9)),
         "max_slots": draw(st.integers(20, 120)),
         "charge_rate": draw(st.integers(1, 25)),
+        "flight_cost": draw(st.sampled_from([1, 1, 1, 0])),
         "edge_snr": draw(_numbers(-30.0, 10.0)),
         "path_loss_exponent": draw(_numbers(1.5, 4.0)),
         "shadowing_variance": draw(st.just(0.0) | _numbers(0.5, 30.0)),

@@ -156,7 +156,7 @@ class Reference:
                 u.battery = min(u.battery + s.charge_rate, s.charge_complete)
                 u.slots_charging += 1
             else:
-                u.battery -= 1
+                u.battery -= s.flight_cost
                 u.slots_flying += 1
                 u.slots_waiting += u in self.queue
 

@@ -358,6 +358,33 @@ def test_the_last_slot_of_the_battery_still_communicates() -> None:
     assert record.reward == pytest.approx(1.3 * 12 - 0.2 + 100, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("quota", "end", "slots", "collected", "reward"),
+    [
+        (4, "quota", 4, 28, 136.0),  # 1.3 * 28 - 4 * 0.1 + 100
+        (440, "truncated", 6, 44, 56.6),  # 1.3 * 44 - 6 * 0.1
+    ],
+)
+def test_flying_without_battery_decrease(
+    quota: int, end: str, slots: int, collected: float, reward: float
+) -> None:
+    """b(0) = 2 lasts for ever: the mission ends by its quota, or is cut after 6 slots.
+
+    Node at (1, 0). East 8 units, east 4, west 8, and 8 in each slot that it hovers there.
+    """
+    scenario = Scenario.of(
+        **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": quota, "flying_time": 2},
+        flight_cost=0,
+        max_slots=6,
+    )
+    record, log = _fly(scenario, "EEW")
+    assert record.uav_rows() == [{"quota": slots, "battery": 2, "slots_charging": 0, "end": end}]
+    assert _values(log, "move", "time", "value") == [(float(t), 2.0) for t in range(slots)]
+    assert (record.slots, record.uav_slots, record.success) == (slots, slots, end == "quota")
+    assert record.collected == pytest.approx(collected, abs=1e-9)
+    assert record.reward == pytest.approx(reward, abs=1e-9)
+
+
 def test_a_uav_that_is_done_leaves_the_map() -> None:
     """UAV 0 takes all 5 units in slot 0 and has its quota of 1; UAV 1 wants into its cell.
 

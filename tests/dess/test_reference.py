@@ -95,12 +95,12 @@ def test_nothing_is_lost_and_everything_counted_once(
     for i, row in enumerate(record.uavs):
         assert counts[i] == row["quota"] <= scenario.communication_slots * row["slots_flying"]
 
-    # Battery: a flying slot costs 1, a charging slot gives charge_rate, the last one less.
+    # Battery: a flying slot costs flight_cost, a charging slot gives charge_rate, the last less.
     moves = rows("move")
     for i, row in enumerate(record.uavs):
         levels = [scenario.flying_time, *moves["value"][moves["uav"] == i].astype(int).tolist()]
         steps = np.diff(levels)
-        flying = steps == -1
+        flying = steps == -scenario.flight_cost
         capped = np.minimum(np.array(levels[:-1]) + scenario.charge_rate, scenario.charge_complete)
         assert (np.array(levels[1:])[~flying] == capped[~flying]).all()
         assert flying.sum() == row["slots_flying"]

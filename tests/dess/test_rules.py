@@ -249,6 +249,12 @@ def test_without_one_of_the_conditions_it_flies_on(but: dict[str, Any]) -> None:
     assert u["communications"] == 4
 
 
+@pytest.mark.parametrize(("x", "after"), [(0, 25), (1, 35)])
+def test_without_flight_cost_the_battery_can_only_gain(x: int, after: int) -> None:
+    u = _one_slot(IN_ZONE | {"x": x}, flight_cost=0)
+    assert (u["battery"], u["slots_flying"], u["slots_charging"]) == (after, 1 - x, x)
+
+
 def test_a_cancelled_move_does_not_start_charging() -> None:
     # model.md: the executed action is Hover because it was asked for or because it is charging.
     u = _one_slot(IN_ZONE | {"x": 0, "y": 1, "action": WEST}, zone=[0, 0, 2, 2])

@@ -120,6 +120,8 @@ REFUSED = [
     ({"flying_time": 101}, "flying_time", "1..100"),
     ({"flying_time": [0, 5]}, "flying_time", "1..100"),
     ({"charge_start": 9}, "charge_start", "10..100"),
+    ({"flight_cost": 2}, "flight_cost", "less than or equal to 1"),
+    ({"flight_cost": -1}, "flight_cost", "greater than or equal to 0"),
     ({"charge_complete": 101}, "charge_complete", "10..100"),
     ({"charge_start": 60}, "charge_start: 60", "10 <= charge_start < charge_complete <= 100"),
     ({"charge_start": [10, 70]}, "charge_start: 70", "charge_complete 60"),

@@ -106,6 +106,12 @@ def test_without_need_to_charge_nothing_is_closed() -> None:
     assert mask.all()
 
 
+def test_where_flying_costs_no_battery_nothing_is_closed() -> None:
+    # The corner of the zone is 11 steps away: with a cost, only the way home would be left.
+    (mask,) = _mask([{"x": 20, "y": 10, "battery": 12}], flight_cost=0)
+    assert mask.all()
+
+
 def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
     (mask,) = _mask([{"x": 0, "y": 0}])
     assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH, HOVER]
