@@ -27,11 +27,12 @@ class _Part(BaseModel):
 
 
 class Member(_Part):
-    """The identity of a policy: its name, its class, and a hash of the code that decides."""
+    """The identity of a policy: its name, its class, and hashes of the code and weights it has."""
 
     name: str
     class_: str = Field(alias="class")
     code: str
+    weights: str = ""
 
 
 class Team(_Part):
@@ -210,6 +211,7 @@ def _members(team: str) -> list[Member]:
             "name": policy.name,
             "class": f"{kind.__module__}:{kind.__qualname__}",
             "code": fingerprint(kind.__module__),
+            "weights": getattr(policy, "weights", ""),
         }
         identities.append(Member.model_validate(identity))
     return identities

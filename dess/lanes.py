@@ -72,6 +72,11 @@ class Lanes:
         """Seed of the missions to be launched."""
         return int(self._constants["seed"][0])
 
+    @property
+    def replication(self) -> int:
+        """The next replication to be launched."""
+        return self._next
+
     def start_at(self, seed: int, replication: int) -> None:
         """Make this replication of this seed the next mission to be launched.
 

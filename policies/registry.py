@@ -2,6 +2,7 @@
 
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 
 from dess.errors import InputError
 from policies.base import Policy
@@ -16,24 +17,44 @@ SHIPPED = {
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
 }
 
+# One folder per trained policy.
+TRAINED = Path(__file__).with_name("trained")
+
 
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
-    return [*SHIPPED, *sorted(set(_outside()) - set(SHIPPED))]
+    shipped = [*SHIPPED, *trained_names()]
+    return [*shipped, *sorted(set(_outside()) - set(shipped))]
 
 
-def load(name: str) -> Policy:
-    """The policy of that name.
+def trained_names() -> list[str]:
+    """The names of the trained policies that are shipped."""
+    return sorted(path.parent.name for path in TRAINED.glob("*/config.json"))
+
+
+def load(name: str | Path) -> Policy:
+    """The policy of that name, or the trained one in that folder.
 
     Raises:
-        InputError: If there is no such policy, or an outside one cannot be loaded.
+        InputError: If there is no such policy, or it cannot be loaded.
     """
+    path = Path(name)
+    name = str(name)
+    if name in trained_names():
+        path = TRAINED / name
+    if (path / "config.json").exists():
+        from policies.ddqn.checkpoint import load_policy
+
+        return load_policy(path)
     if name in SHIPPED:
         module, _, attribute = SHIPPED[name][0].partition(":")
         return getattr(import_module(module), attribute)()
     outside = _outside()
     if name not in outside:
-        raise InputError(f"policy: {name!r} is unknown; allowed: {', '.join(names())}")
+        raise InputError(
+            f"policy: {name!r} is unknown; allowed: {', '.join(names())}, "
+            "or the folder of a trained policy"
+        )
     try:
         policy = outside[name].load()()
     except Exception as error:  # somebody else's code: whatever it raises, say whose it was

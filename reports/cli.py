@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from dess import ScenarioSpace
     from dess.record import EventLog, MissionRecord
+    from policies.ddqn.training import Training
 
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 INTERRUPTED = 130  # what typer returns after Ctrl-C
@@ -219,6 +220,36 @@ def study_run(
 
 
 @app.command()
+def train(
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A config or a TOML file.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the training.")],
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with the training there.")
+    ] = False,
+    device: Annotated[
+        Literal["auto", "cpu", "cuda"], typer.Option(help="Where; auto takes CUDA if it is there.")
+    ] = "auto",
+    seed: Annotated[int | None, typer.Option(help="Seed of the training instead.")] = None,
+) -> None:
+    """Train a policy into a folder; Ctrl-C saves, --resume goes on exactly."""
+    from policies.ddqn.config import load_config
+
+    config = load_config(name, **({} if seed is None else {"seed": seed}))
+    from policies.ddqn.run import memory_of, train
+
+    print(f"replay memory: {memory_of(config) / 2**20:,.0f} MiB", file=sys.stderr)
+    with _compile_notice(), _training(config.ticks) as progress:
+        training = train(config, out, resume=resume, device=device, progress=progress)
+    if not training.done:
+        command = f"dess train {name} --out {out} --resume"
+        raise typer.Exit(_fail(f"interrupted at tick {training.tick}: go on with {command}", 1))
+    print(
+        f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
+        f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
+    )
+
+
+@app.command()
 def report(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAME]...", help="Reports; all by default.")
@@ -371,6 +402,25 @@ def _cells() -> "Iterator[Callable[[str, int, int], None]]":
                 bar.reset(total)
             bar.set_description(name, refresh=False)
             bar.update(done - bar.n)
+
+        yield show
+
+
+@contextmanager
+def _training(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
+    """Progress of a training on stderr, with the metrics of its last evaluation."""
+    with _bar("tick", ticks) as bar:
+
+        def show(training: "Training", done: int) -> None:
+            bar.update(training.tick - bar.n)
+            if training.curve:
+                last = training.curve[-1]
+                bar.set_postfix(
+                    phase=last["phase"],
+                    success=f"{last['evaluation_success']:.3f}",
+                    product=f"{last['evaluation_collection_ratio_and_communication']:.3f}",
+                    refresh=False,
+                )
 
         yield show
 

@@ -1,0 +1,243 @@
+"""Files of the learner: trained policies, and trainings under way. Nothing is ever unpickled.
+
+A policy is a folder with ``model.safetensors`` (the weights) and ``config.json`` (what they are the
+weights of). A training under way is one file, ``checkpoint.safetensors``: all arrays, and in its
+header, as JSON, all that is no array.
+"""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save_file
+
+from dess.errors import InputError
+from dess.record import MISSION_RECORD
+from dess.scenario import ScenarioSpace
+from policies.ddqn.config import TrainingConfig, config_of
+from policies.ddqn.policy import DDQN
+from policies.ddqn.snapshot import Layout, layout_of
+from policies.ddqn.training import Training, build
+
+FORMAT = 1
+MODEL, CONFIG, CHECKPOINT = "model.safetensors", "config.json", "checkpoint.safetensors"
+
+Tensors = dict[str, torch.Tensor]
+
+
+def save_policy(
+    folder: Path, weights: Mapping[str, torch.Tensor], config: TrainingConfig, space: ScenarioSpace
+) -> None:
+    """Write a trained policy into a folder: the weights, then what they are the weights of."""
+    folder.mkdir(parents=True, exist_ok=True)
+    tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
+    _replace(folder / MODEL, lambda path: save_file(tensors, path, {"format": str(FORMAT)}))
+    content = {
+        "format": FORMAT,
+        "name": config.name,
+        "layout": _plain(layout_of(space)),
+        "training": config.model_dump(mode="json"),
+    }
+    text = json.dumps(content, indent=2) + "\n"
+    _replace(folder / CONFIG, lambda path: path.write_text(text, "utf-8"))
+
+
+def load_policy(folder: Path) -> DDQN:
+    """The policy of a folder that ``save_policy`` wrote.
+
+    It computes in double precision, so that an action hardly ever depends on the rounding of sums.
+
+    Raises:
+        InputError: If a file is missing, damaged, of another version or of another shape.
+    """
+    where = folder / CONFIG
+    try:
+        content = json.loads(where.read_text("utf-8"))
+        version = content["format"]
+        if version == FORMAT:
+            layout, training = _layout(content["layout"]), content["training"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{where}: no readable description of a policy: {error!r}") from None
+    if version != FORMAT:
+        raise InputError(f"{where}: format {version!r} is unknown; allowed: {FORMAT}")
+    config = config_of(training, str(where))
+    observation, network = build(config, layout)
+    tensors, _ = _read(folder / MODEL)
+    _fit(tensors, network.state_dict(), folder / MODEL)
+    network.load_state_dict(tensors)
+    policy = DDQN(config.name, observation, network.double(), config.guard, layout)
+    policy.weights = _digest(tensors)
+    return policy
+
+
+def save_training(path: Path, training: Training) -> None:
+    """Write all that a training needs to go on exactly as if it had not been stopped."""
+    learner = training.learner
+    tensors: Tensors = {"random.torch": torch.get_rng_state()}
+    for name, network in _networks(training).items():
+        tensors |= {f"{name}.{key}": value for key, value in network.items()}
+    for index, state in learner.optimizer.state_dict()["state"].items():
+        tensors |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
+    for name, array in training.lanes.state._asdict().items():
+        tensors[f"lanes.{name}"] = _bytes(array)
+    if training.config.checkpoint_replay:
+        for name, array in training.replay.arrays.items():
+            tensors[f"replay.{name}"] = torch.from_numpy(array)
+    if training.finished:
+        tensors["finished"] = _bytes(np.concatenate(training.finished))
+    for name in training.losses[0] if training.losses else ():
+        tensors[f"losses.{name}"] = torch.stack([loss[name] for loss in training.losses])
+    header = {
+        "format": FORMAT,
+        "config": training.config.model_dump(mode="json"),
+        "progress": training.progress(),
+        "random": training.generator.bit_generator.state,
+        "lanes": [training.lanes.seed, training.lanes.replication],
+        "replay": training.replay.count if training.config.checkpoint_replay else None,
+        "curve": training.curve,
+    }
+    tensors = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
+    _replace(path, lambda new: save_file(tensors, new, {"dess": json.dumps(header)}))
+
+
+def load_training(path: Path, config: TrainingConfig, device: torch.device) -> Training:
+    """The training of a file that ``save_training`` wrote.
+
+    Without the replay memory in the file the memory is filled anew, by the policy as it is.
+
+    Raises:
+        InputError: If the file is missing, damaged, of another version or of another config.
+    """
+    tensors, metadata = _read(path)
+    try:
+        header = json.loads(metadata["dess"])
+        version = header["format"]
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: no checkpoint of a training: {error!r}") from None
+    if version != FORMAT:
+        raise InputError(f"{path}: format {version!r} is unknown; allowed: {FORMAT}")
+    ours, theirs = config.model_dump(mode="json"), header["config"]
+    if ours != theirs:
+        other = [key for key in ours if ours[key] != theirs.get(key)]
+        raise InputError(
+            f"{path}: of another config ({', '.join(other)} differ); allowed: the one it began with"
+        )
+    training = Training(config, device)
+    training.restore(header["progress"])
+    for name, network in _networks(training).items():
+        _fit(_part(tensors, name), network, path)
+        with torch.no_grad():
+            for key, value in _part(tensors, name).items():
+                network[key].copy_(value)
+    learner = training.learner
+    states: dict[int, Tensors] = {}
+    for key, value in _part(tensors, "optimizer").items():
+        index, _, field = key.partition(".")
+        states.setdefault(int(index), {})[field] = value
+    groups = learner.optimizer.state_dict()["param_groups"]
+    learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
+    training.lanes.start_at(*header["lanes"])
+    parts = _part(tensors, "lanes")
+    for name, array in training.lanes.state._asdict().items():
+        array[...] = _array(parts[name], array.dtype).reshape(array.shape)
+    if header["replay"] is not None:
+        training.replay.count = header["replay"]
+        parts = _part(tensors, "replay")
+        for name, array in training.replay.arrays.items():
+            array[...] = parts[name].numpy()
+    if "finished" in tensors:
+        training.finished = [_array(tensors["finished"], MISSION_RECORD)]
+    losses = _part(tensors, "losses")
+    for values in zip(*losses.values(), strict=True):
+        training.losses.append(dict(zip(losses, values, strict=True)))
+    training.curve = header["curve"]
+    training.generator.bit_generator.state = header["random"]
+    torch.set_rng_state(tensors["random.torch"])
+    return training
+
+
+def _digest(tensors: Tensors) -> str:
+    """A hash of weights."""
+    digest = hashlib.sha256()
+    for name in sorted(tensors):
+        digest.update(name.encode() + b"\0" + tensors[name].numpy().tobytes())
+    return digest.hexdigest()
+
+
+def _networks(training: Training) -> dict[str, Tensors]:
+    """The weights of all networks of a training, by name."""
+    learner = training.learner
+    networks = {"online": learner.online.state_dict(), "target": learner.target.state_dict()}
+    if learner.average is not None:
+        networks["average"] = learner.average.state_dict()
+    return networks | {"best": training.best}
+
+
+def _read(path: Path) -> tuple[Tensors, dict[str, str]]:
+    """The tensors of a file, and its metadata."""
+    try:
+        with safe_open(path, "pt") as file:
+            names = file.keys()
+            return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
+
+
+def _fit(tensors: Tensors, wanted: Tensors, path: Path) -> None:
+    """Refuse weights that are not those of the network."""
+    for name in sorted(tensors.keys() ^ wanted.keys()):
+        problem = "is missing" if name in wanted else "is one too many"
+        raise InputError(f"{path}: {name} {problem}; allowed: the weights of the config's network")
+    for name, value in wanted.items():
+        if tensors[name].shape != value.shape:
+            raise InputError(
+                f"{path}: {name} has shape {tuple(tensors[name].shape)}; "
+                f"allowed: {tuple(value.shape)}, as the config says"
+            )
+
+
+def _part(tensors: Tensors, name: str) -> Tensors:
+    """The tensors whose names begin with ``name.``, without that."""
+    prefix = name + "."
+    return {
+        key.removeprefix(prefix): value for key, value in tensors.items() if key.startswith(prefix)
+    }
+
+
+def _bytes(array: np.ndarray) -> torch.Tensor:
+    """Any array, structured ones too, as bytes."""
+    return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
+
+
+def _array(content: torch.Tensor, dtype: np.dtype) -> np.ndarray:
+    return np.frombuffer(content.numpy().tobytes(), dtype).copy()
+
+
+def _plain(layout: Layout) -> dict[str, Any]:
+    return {
+        "grid": layout.grid,
+        "zone": layout.zone.tolist(),
+        "nodes": layout.nodes.tolist(),
+    }
+
+
+def _layout(values: dict[str, Any]) -> Layout:
+    return Layout(int(values["grid"]), np.array(values["zone"]), np.array(values["nodes"]))
+
+
+def _replace(path: Path, write: Callable[[Path], Any]) -> None:
+    """Write a file beside its place, then put it there: it is never half there."""
+    new = path.with_name(path.name + ".new")
+    try:
+        write(new)
+        os.replace(new, path)
+    finally:
+        new.unlink(missing_ok=True)

@@ -1,0 +1,150 @@
+"""What a training is told: every setting, documented where it is declared."""
+
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from dess.errors import InputError
+from dess.scenario import load_scenario, parse_toml, validation_line
+
+Count = Annotated[int, Field(strict=True, ge=1)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Rate = Annotated[float, Field(gt=0.0, le=1.0)]
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Phase(_Settings):
+    """One phase of Algorithm 1."""
+
+    name: str = Field(description="what curves and files call it")
+    ticks: Count = Field(description="slots that every lane flies")
+    battery: bool = Field(True, description="whether flying costs battery (line 7, 19)")
+    epsilon: tuple[Share, Share] = Field(
+        (0.1, 0.1), description="share of random actions at the beginning and the end"
+    )
+    epsilon_decay: Rate = Field(1.0, description="share of the phase over which epsilon moves")
+    temperature: float = Field(
+        0.0, ge=0.0, description="of softmax exploration in scaled values; 0 for argmax"
+    )
+    learning_rate: tuple[float, float] = Field(
+        (1e-3, 1e-4), description="of Adam at the beginning and the end"
+    )
+
+
+class TrainingConfig(_Settings):
+    """All settings of a training."""
+
+    name: str = Field(description="name of the policy")
+    description: str = Field("", description="what it is for")
+    scenario: str = Field("paper", description="scenario that missions are drawn from")
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
+        1, description="of the training: weights, exploration, missions"
+    )
+
+    observation: Literal["vector", "maps"] = Field("vector", description="(b) or (a)")
+    hidden: tuple[Count, ...] = Field(
+        (512, 512), description="units of the dueling network's layers; maps have the paper's"
+    )
+    precision: Literal["float32", "bfloat16"] = Field(
+        "float32", description="of the hidden layers while training"
+    )
+
+    guard: bool = Field(True, description="whether the return guard masks the actions")
+    low_battery_starts: Share = Field(
+        0.0, description="share of training missions that start in the zone on a low battery"
+    )
+    phases: tuple[Phase, ...] = Field(min_length=1, description="of Algorithm 1, in order")
+    lanes: Count = Field(64, description="missions that fly side by side")
+    prefill: Count = Field(1000, description="slots per lane flown at random before learning")
+    replay: Count = Field(8000, description="slots per lane that the replay memory holds")
+    batch: Count = Field(512, description="transitions per update")
+    updates: Count = Field(1, description="updates per tick")
+
+    steps: Count = Field(5, description="n of the n-step return")
+    discount: Rate = Field(0.99, description="gamma per slot")
+    reward_scale: float = Field(0.05, gt=0.0, description="factor of all rewards")
+    loss: Literal["huber", "mse"] = Field("huber", description="of the difference to the target")
+    gradient_norm: float = Field(10.0, gt=0.0, description="to which gradients are clipped")
+    target_rate: Rate = Field(0.005, description="tau of the soft target update (eq. 28)")
+    average_rate: Rate = Field(
+        1.0,
+        description="rate of the slow copy of the weights that is evaluated; 1 for no copy",
+    )
+
+    evaluate_every: Count = Field(2000, description="ticks between evaluations")
+    evaluation_missions: Count = Field(300, description="missions of an evaluation")
+    evaluation_seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+        700_000_001, description="of the evaluations that select the weights"
+    )
+    window: Count = Field(3, description="evaluations in the moving average that selects")
+    checkpoint_replay: bool = Field(
+        True, description="whether checkpoints hold the replay memory; without, a resumed run is "
+        "another one than an uninterrupted run"
+    )  # fmt: skip
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> "TrainingConfig":
+        if self.replay <= self.steps:
+            raise ValueError(f"replay: {self.replay} is not above steps {self.steps}")
+        if self.prefill <= self.steps:
+            raise ValueError(f"prefill: {self.prefill} is not above steps {self.steps}")
+        names = [phase.name for phase in self.phases]
+        if len(set(names)) < len(names):
+            raise ValueError(f"phases: {names} are not distinct")
+        load_scenario(self.scenario)
+        return self
+
+    @property
+    def ticks(self) -> int:
+        """Ticks of all phases."""
+        return sum(phase.ticks for phase in self.phases)
+
+
+def config_names() -> list[str]:
+    """The names of the shipped configs."""
+    folder = resources.files("policies.ddqn").joinpath("configs")
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig:
+    """A shipped config by name, or one from a TOML file.
+
+    Raises:
+        InputError: If there is no such config, or it is not valid.
+    """
+    text = str(name_or_path)
+    if text in config_names():
+        where = f"config {text}"
+        content = (
+            resources.files("policies.ddqn").joinpath(f"configs/{text}.toml").read_text("utf-8")
+        )
+    else:
+        where, content = text, _read(text)
+    return config_of(parse_toml(content, where) | overrides, where)
+
+
+def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
+    """A config of plain values.
+
+    Raises:
+        InputError: If it is not valid; ``where`` says where the values came from.
+    """
+    try:
+        return TrainingConfig.model_validate(values)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where)) from None
+
+
+def _read(path: str) -> str:
+    try:
+        return Path(path).read_text("utf-8")
+    except FileNotFoundError:
+        allowed = ", ".join(config_names())
+        raise InputError(f"{path}: no such config; allowed: {allowed}, or a TOML file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read: {error}") from None

@@ -1,0 +1,105 @@
+"""The double DQN update (eq. 26-29) on a page."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from policies.ddqn.replay import Batch
+from policies.ddqn.snapshot import masks
+
+
+def double_dqn_target(
+    reward: torch.Tensor,
+    discount: torch.Tensor,
+    online: torch.Tensor,
+    target: torch.Tensor,
+    allowed: torch.Tensor,
+) -> torch.Tensor:
+    """The target value (eq. 29) with masked actions and n-step returns.
+
+    Args:
+        reward: (B,) discounted sum of the rewards until the later state.
+        discount: (B,) factor of the later state's value; 0 after termination.
+        online: (B, A) values of the later state by the online network: they choose.
+        target: (B, A) by the target network: they judge.
+        allowed: (B, A) mask of the actions of the later state.
+
+    Returns:
+        (B,) target values.
+    """
+    choice = online.masked_fill(~allowed, -torch.inf).argmax(1, keepdim=True)
+    return reward + discount * target.gather(1, choice).squeeze(1)
+
+
+@torch.no_grad()
+def soft_update(target: nn.Module, online: nn.Module, rate: float) -> None:
+    """Move the target network's weights toward the online ones: rate (tau) 1 copies (eq. 28)."""
+    torch._foreach_lerp_(list(target.parameters()), list(online.parameters()), rate)
+
+
+class Learner:
+    """Networks and optimizer.
+
+    Attributes:
+        online: The network that learns.
+        target: The one that judges, a slow copy.
+        average: A still slower copy, the one that is evaluated and kept; None without.
+        optimizer: Adam.
+        device: Where they are.
+    """
+
+    def __init__(self, network: nn.Module, observation: Any, settings: Any, device: torch.device):
+        self.online = network.to(device)
+        self.target = copy.deepcopy(self.online).requires_grad_(False)
+        self.average = copy.deepcopy(self.target) if settings.average_rate < 1.0 else None
+        self.observation, self.settings, self.device = observation, settings, device
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what the optimizer has gathered."""
+        self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
+
+    @property
+    def best_guess(self) -> nn.Module:
+        """The network to evaluate: the slow average, without one the online network."""
+        return self.online if self.average is None else self.average
+
+    def values(
+        self, network: nn.Module, states: Any, missions: np.ndarray, uavs: np.ndarray
+    ) -> torch.Tensor:
+        """(R, 5) action values of UAV ``uavs[r]`` in snapshot ``missions[r]``."""
+        parts = self.observation.encode(states, missions, uavs)
+        return network(*(torch.from_numpy(part).to(self.device) for part in parts))
+
+    def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
+        """One gradient step on a minibatch; what it was like, as scalars still on the device."""
+        settings = self.settings
+        allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
+        reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
+        discount = torch.from_numpy(batch.discount).to(self.device)
+        action = torch.from_numpy(batch.action).to(self.device)
+        with torch.no_grad():
+            parts = self.observation.encode(batch.state, batch.later, batch.uav)
+            later = [torch.from_numpy(part).to(self.device) for part in parts]
+            goal = double_dqn_target(
+                reward, discount, self.online(*later), self.target(*later), allowed
+            )
+        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        chosen = values.gather(1, action[:, None]).squeeze(1)
+        loss = _LOSSES[settings.loss](chosen, goal)
+        self.optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
+        for group in self.optimizer.param_groups:
+            group["lr"] = learning_rate
+        self.optimizer.step()
+        soft_update(self.target, self.online, settings.target_rate)
+        if self.average is not None:
+            soft_update(self.average, self.online, settings.average_rate)
+        return {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
+
+
+_LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}

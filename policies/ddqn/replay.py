@@ -1,0 +1,149 @@
+"""The replay memory shared by all UAVs: compact states in the order in which they happened.
+
+A ring of T slots x N lanes. Row t of a lane holds the state before the slot, what each UAV did and
+what came of it; the state after n slots is row t + n. So a state is stored once, whatever n is.
+A lane gives every mission one last row, after its end, in which nobody acts.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.compiled import kernel
+from policies.ddqn.snapshot import Snapshots, empty_snapshots
+
+
+class Batch(NamedTuple):
+    """A minibatch of B n-step transitions.
+
+    Attributes:
+        state: Snapshots whose missions ``rows`` are the states; ``later`` those after n slots or
+            at the end of the UAV's mission.
+        rows: (B,) missions of ``state``.
+        later: (B,) missions of ``state``.
+        uav: (B,) index of the UAV.
+        action: (B,) its action.
+        reward: (B,) float32, discounted sum of its rewards in between.
+        discount: (B,) float32, factor of the value of the later state; 0 if the UAV terminated.
+    """
+
+    state: Snapshots
+    rows: np.ndarray
+    later: np.ndarray
+    uav: np.ndarray
+    action: np.ndarray
+    reward: np.ndarray
+    discount: np.ndarray
+
+
+class ReplayMemory:
+    """A ring of the last T slots of N lanes.
+
+    Attributes:
+        capacity: T [mission slots per lane].
+        count: Slots added since the beginning; the last ``capacity`` of them are there.
+        arrays: Name -> array, all that the memory consists of.
+    """
+
+    def __init__(self, capacity: int, lanes: int, uavs: int, nodes: int):
+        self.capacity, self.lanes, self.uavs = capacity, lanes, uavs
+        self.count = 0
+        self._states = empty_snapshots(capacity * lanes, uavs, nodes)
+        shape = (capacity * lanes, uavs)
+        self._action = np.zeros(shape, np.int8)
+        self._reward = np.zeros(shape, np.float32)
+        self._acted = np.zeros(shape, np.bool_)
+        self._terminated = np.zeros(shape, np.bool_)
+        self._truncated = np.zeros(shape, np.bool_)
+        self.arrays = dict(self._states._asdict()) | {
+            "action": self._action,
+            "reward": self._reward,
+            "acted": self._acted,
+            "terminated": self._terminated,
+            "truncated": self._truncated,
+        }
+
+    @staticmethod
+    def bytes_for(capacity: int, lanes: int, uavs: int, nodes: int) -> int:
+        """Memory that such a ring takes [bytes]."""
+        one = ReplayMemory(1, 1, uavs, nodes)
+        return capacity * lanes * sum(array.nbytes for array in one.arrays.values())
+
+    def add(
+        self,
+        states: Snapshots,
+        action: np.ndarray,
+        reward: np.ndarray,
+        acted: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+    ) -> None:
+        """Add one slot of all lanes: the states before it, then (N, I) arrays of what happened."""
+        first = self.count % self.capacity * self.lanes
+        here = slice(first, first + self.lanes)
+        for ring, new in zip(self._states, states, strict=True):
+            ring[here] = new
+        self._action[here], self._reward[here], self._acted[here] = action, reward, acted
+        self._terminated[here], self._truncated[here] = terminated, truncated
+        self.count += 1
+
+    def sample(
+        self, size: int, steps: int, discount: float, generator: np.random.Generator
+    ) -> Batch:
+        """Draw transitions uniformly, with replacement, among those whose later state is there.
+
+        Args:
+            size: Transitions (B).
+            steps: n of the n-step return.
+            discount: Discount factor gamma per slot.
+            generator: Source of the draw.
+
+        Raises:
+            ValueError: If fewer than ``steps + 1`` slots have been added.
+        """
+        newest = self.count - 1
+        oldest = max(0, self.count - self.capacity)
+        if newest - oldest < steps:
+            raise ValueError(f"{self.count} slots in memory: too few for {steps}-step returns")
+        slots, rows, uavs = [], [], []
+        missing = size
+        while missing > 0:
+            slot = generator.integers(oldest, newest - steps + 1, 2 * missing + 16)
+            row = slot % self.capacity * self.lanes + generator.integers(0, self.lanes, len(slot))
+            uav = generator.integers(0, self.uavs, len(slot))
+            keep = np.nonzero(self._acted[row, uav])[0][:missing]
+            slots.append(slot[keep])
+            rows.append(row[keep])
+            uavs.append(uav[keep])
+            missing -= len(keep)
+        row, uav = np.concatenate(rows), np.concatenate(uavs)
+        later, reward = np.empty(size, np.int64), np.empty(size, np.float32)
+        factor = np.empty(size, np.float32)
+        _returns(
+            row, uav, steps, discount, self.lanes, self._reward, self._terminated,
+            self._truncated, later, reward, factor,
+        )  # fmt: skip
+        return Batch(
+            self._states, row, later, uav, self._action[row, uav].astype(np.int64), reward, factor
+        )
+
+
+@kernel
+def _returns(
+    rows, uavs, steps, discount, lanes, rewards, terminated, truncated, later, total, factor
+):
+    """n-step returns: they end where the UAV's mission does; truncation is no termination."""
+    size = len(rewards)
+    for b in range(len(rows)):
+        row, i = rows[b], uavs[b]
+        value, weight = 0.0, 1.0
+        for _ in range(steps):
+            value += weight * rewards[row, i]
+            weight *= discount
+            ended = truncated[row, i]
+            if terminated[row, i]:
+                weight, ended = 0.0, True
+            row = (row + lanes) % size
+            if ended:
+                break
+        later[b], total[b], factor[b] = row, value, weight

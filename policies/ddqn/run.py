@@ -1,0 +1,148 @@
+"""A training as a folder: config, checkpoint, curves and the best policy so far.
+
+The folder is one that ``policies.load`` takes, from the first evaluation on.
+"""
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import torch
+
+from dess.errors import InputError
+from dess.scenario import load_scenario
+from policies.ddqn.checkpoint import CHECKPOINT, load_training, save_policy, save_training
+from policies.ddqn.config import TrainingConfig
+from policies.ddqn.replay import ReplayMemory
+from policies.ddqn.training import Training
+
+CURVE, EVENTS = "training.parquet", "tensorboard"
+CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
+
+# Columns of the curve, by the tags under which TensorBoard shows them.
+_TAGS = {name: "losses" for name in ("loss", "gradient_norm", "value")}
+
+
+def device_of(name: str) -> torch.device:
+    """The device called ``auto`` (CUDA where there is one), ``cpu`` or ``cuda``.
+
+    Raises:
+        InputError: If the name is unknown, or there is no CUDA device.
+    """
+    if name not in ("auto", "cpu", "cuda"):
+        raise InputError(f"device: {name!r} is unknown; allowed: auto, cpu, cuda")
+    if name == "cuda" and not torch.cuda.is_available():
+        raise InputError("device: torch finds no CUDA device here; allowed: auto, cpu")
+    return torch.device("cuda" if name != "cpu" and torch.cuda.is_available() else "cpu")
+
+
+def memory_of(config: TrainingConfig) -> int:
+    """What the replay memory of a config takes [bytes]."""
+    space = load_scenario(config.scenario)
+    return ReplayMemory.bytes_for(config.replay, config.lanes, space.uavs[1], len(space.nodes))
+
+
+def train(
+    config: TrainingConfig,
+    out: Path,
+    *,
+    resume: bool = False,
+    device: str = "auto",
+    progress: Callable[[Training, int], None] | None = None,
+) -> Training:
+    """Train into a folder, or go on with the training that it holds.
+
+    Ctrl-C and SIGTERM end it after the tick under way; then the returned training is not ``done``,
+    and the folder holds all that is needed to resume it exactly.
+
+    Args:
+        config: The settings.
+        out: The folder.
+        resume: Whether to go on with its training.
+        device: ``auto``, ``cpu`` or ``cuda``.
+        progress: Called after each tick with the training and the ticks since the last call.
+
+    Returns:
+        The training as it ended.
+
+    Raises:
+        InputError: If the folder holds a training and is not to be resumed, or holds none to
+            resume, or one of another config.
+    """
+    path = out / CHECKPOINT
+    if resume:
+        training = load_training(path, config, device_of(device))
+    elif path.exists():
+        raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
+    else:
+        training = Training(config, device_of(device))
+        out.mkdir(parents=True, exist_ok=True)
+        save_training(path, training)
+    with _stop_signal() as stopped, _tensorboard(out / EVENTS, training) as show:
+        saved = time.monotonic()
+        while not training.done and not stopped():
+            rows = len(training.curve)
+            training.run(1)
+            if len(training.curve) > rows:
+                show(training.curve[-1])
+                _save_results(out, training)
+            if time.monotonic() - saved > CHECKPOINT_EVERY:
+                save_training(path, training)
+                saved = time.monotonic()
+            if progress:
+                progress(training, 1)
+        save_training(path, training)
+    return training
+
+
+def _save_results(out: Path, training: Training) -> None:
+    """Write the best policy so far and the curves."""
+    save_policy(out, training.best, training.config, training.space)
+    new = out / (CURVE + ".new")
+    pq.write_table(pa.Table.from_pylist(training.curve), new)
+    new.replace(out / CURVE)
+
+
+@contextmanager
+def _stop_signal() -> Iterator[Callable[[], bool]]:
+    """Take SIGINT and SIGTERM as a wish to stop after the tick; the second one stops at once."""
+    wishes: list[int] = []
+
+    def wish(number: int, frame: Any) -> None:
+        wishes.append(number)
+        if len(wishes) > 1:
+            raise KeyboardInterrupt
+
+    kinds = (signal.SIGINT, signal.SIGTERM)
+    before = {kind: signal.signal(kind, wish) for kind in kinds}
+    try:
+        yield lambda: bool(wishes)
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)
+
+
+@contextmanager
+def _tensorboard(folder: Path, training: Training) -> Iterator[Callable[[dict[str, Any]], None]]:
+    """Show the rows of the curve in TensorBoard, if it is installed."""
+    try:
+        from torch.utils.tensorboard import SummaryWriter
+    except ImportError:
+        yield lambda row: None
+        return
+    with SummaryWriter(str(folder), purge_step=training.tick + 1) as writer:
+
+        def show(row: dict[str, Any]) -> None:
+            for name, value in row.items():
+                kind, _, metric = name.partition("_")
+                if kind in ("evaluation", "training"):
+                    writer.add_scalar(f"{kind}/{metric}", value, row["tick"])
+                elif isinstance(value, float):
+                    writer.add_scalar(f"{_TAGS.get(name, 'charts')}/{name}", value, row["tick"])
+
+        yield show

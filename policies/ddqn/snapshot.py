@@ -1,0 +1,119 @@
+"""Compact states: what the observations are made of, a few bytes per mission and slot.
+
+The replay memory keeps snapshots, not observations: one serves all UAVs of its mission, and the
+next state of a transition is simply a later snapshot.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.compiled import kernel
+from dess.scenario import ScenarioSpace
+from dess.state import HOVER, STEP_X, STEP_Y, State
+from policies.guard import must_charge, parking_cell, safe_moves, slots_needed
+
+# Columns of ``Snapshots.missions``.
+CHARGE_START, CHARGE_COMPLETE = range(2)
+MISSION_COLUMNS = 2
+# Columns of ``Snapshots.uavs``: the cell, the battery [%], mission slots until the quota is filled,
+# whether it is active, latched, charging and bound to charge, slots to its parking cell and the
+# mask of its actions as bits.
+X, Y, BATTERY, NEEDED, ACTIVE, LATCH, CHARGING, MUST_CHARGE, HOME, MASK = range(10)
+UAV_COLUMNS = 10
+
+_MOST = np.iinfo(np.int16).max
+
+
+class Snapshots(NamedTuple):
+    """S missions x I UAVs x K nodes at one moment each.
+
+    Attributes:
+        missions: (S, 2) int16, columns ``CHARGE_START`` and ``CHARGE_COMPLETE``.
+        uavs: (S, I, 10) int16, columns ``X`` to ``MASK``; zeros for an absent UAV.
+        residual: (S, K) float32 [data units].
+    """
+
+    missions: np.ndarray
+    uavs: np.ndarray
+    residual: np.ndarray
+
+
+class Layout(NamedTuple):
+    """What all missions of a space have in common.
+
+    Attributes:
+        grid: Cells along one side (M).
+        zone: (4,) x, y, width and height of the charging zone [cells].
+        nodes: (K, 2) cells of the nodes.
+    """
+
+    grid: int
+    zone: np.ndarray
+    nodes: np.ndarray
+
+
+def layout_of(space: ScenarioSpace) -> Layout:
+    """The layout of a space."""
+    return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
+
+
+def empty_snapshots(count: int, uavs: int, nodes: int) -> Snapshots:
+    """Zeroed snapshots of that many missions, UAVs per mission and nodes."""
+    return Snapshots(
+        np.zeros((count, MISSION_COLUMNS), np.int16),
+        np.zeros((count, uavs, UAV_COLUMNS), np.int16),
+        np.zeros((count, nodes), np.float32),
+    )
+
+
+def snapshot(state: State, guarded: bool) -> Snapshots:
+    """The snapshots of all missions of a state.
+
+    Args:
+        state: The state of B missions.
+        guarded: Whether the mask of actions is that of the return guard (``policies.guard``), or
+            just that of the moves that stay on the grid.
+    """
+    taken = empty_snapshots(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
+    _take(state.missions, state.uavs, state.residual, guarded, taken)
+    return taken
+
+
+@kernel
+def _take(missions, uavs, residual, guarded, out):
+    taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
+    safe = np.empty(5, np.bool_)
+    for b in range(len(missions)):
+        mission, team = missions[b], uavs[b]
+        out.missions[b, CHARGE_START] = mission.charge_start
+        out.missions[b, CHARGE_COMPLETE] = mission.charge_complete
+        out.residual[b] = residual[b]
+        data = residual[b].sum()
+        for i in range(mission.uavs):
+            u, row = team[i], out.uavs[b, i]
+            row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
+            row[NEEDED] = min(max(slots_needed(mission, u), 0), _MOST)
+            row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
+            row[MASK] = 1 << HOVER
+            if not u.active:
+                continue
+            row[MUST_CHARGE] = must_charge(mission, u, data)
+            home_x, home_y, slots = parking_cell(mission, team, i, taken)
+            row[HOME] = slots
+            if not u.charging:
+                if guarded:
+                    safe_moves(mission, team, i, row[MUST_CHARGE] != 0, home_x, home_y, safe)
+                else:
+                    for action in range(5):
+                        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+                        safe[action] = 0 <= x < mission.grid and 0 <= y < mission.grid
+                row[MASK] = 0
+                for action in range(5):
+                    row[MASK] |= safe[action] << action
+
+
+def masks(snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
+    """(R, 5) mask of the allowed actions of UAV ``uavs[r]`` in snapshot ``missions[r]``."""
+    bits = snapshots.uavs[missions, uavs, MASK]
+    return (bits[:, None] >> np.arange(5) & 1).astype(bool)

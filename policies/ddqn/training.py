@@ -1,0 +1,267 @@
+"""Algorithm 1: missions fly side by side, all UAVs learn one network from one memory.
+
+A *tick* is one mission slot of all lanes, followed by the updates. Training missions, the missions
+that select the weights and those of an evaluation have seeds of their own: missions of training
+have ``MISSION_SEED`` + the seed of the training, those of selection the config's
+``evaluation_seed``; every other seed is free for evaluations.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from dess.batch import simulate_batch
+from dess.compiled import kernel
+from dess.lanes import Lanes
+from dess.scenario import ScenarioSpace, load_scenario
+from policies.ddqn.config import Phase, TrainingConfig
+from policies.ddqn.learner import Learner
+from policies.ddqn.maps import Maps
+from policies.ddqn.network import DuelingNetwork, PaperNetwork
+from policies.ddqn.policy import DDQN
+from policies.ddqn.replay import ReplayMemory
+from policies.ddqn.snapshot import ACTIVE, CHARGING, Layout, layout_of, masks, snapshot
+from policies.ddqn.vector import Vector
+
+MISSION_SEED = 500_000_000
+METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
+SELECT_BY = "collection_ratio_and_communication"
+# What of a training is a plain value.
+_PROGRESS = (
+    "tick",
+    "updates",
+    "uav_slots",
+    "seconds",
+    "phase_index",
+    "phase_start",
+    "scores",
+    "best_score",
+)
+
+
+def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
+    """The observation and a new network of a config, for missions over a layout."""
+    precision = getattr(torch, config.precision)
+    if config.observation == "maps":
+        maps = Maps(layout)
+        return maps, PaperNetwork(maps.shapes, precision)
+    vector = Vector(layout)
+    return vector, DuelingNetwork(vector.shapes[0][0], list(config.hidden), precision)
+
+
+class Training:
+    """A training under way, from its first tick to its last.
+
+    Attributes:
+        config: Its settings.
+        learner: Networks and optimizer.
+        tick: Ticks done, over all phases.
+        curve: One row per evaluation: where the training stood, and how good it was.
+    """
+
+    def __init__(self, config: TrainingConfig, device: torch.device):
+        self.config, self.device = config, device
+        self.generator = np.random.default_rng(config.seed)
+        torch.manual_seed(config.seed)
+        self.space = load_scenario(config.scenario)
+        self.observation, network = build(config, layout_of(self.space))
+        self.learner = Learner(network, self.observation, config, device)
+        self.tick = self.updates = self.uav_slots = 0
+        self.seconds = 0.0
+        self.curve: list[dict[str, Any]] = []
+        self.best = _weights(network)
+        self.finished: list[np.ndarray] = []
+        self.losses: list[dict[str, torch.Tensor]] = []
+        self._enter_phase(0)
+
+    @property
+    def phase(self) -> Phase:
+        """The phase that the next tick belongs to."""
+        return self.config.phases[self.phase_index]
+
+    @property
+    def done(self) -> bool:
+        """Whether all phases are over."""
+        return self.tick >= self.config.ticks
+
+    def run(self, ticks: int, progress: Callable[[int], None] | None = None) -> None:
+        """Train for that many ticks, or until the last phase ends."""
+        for _ in range(min(ticks, self.config.ticks - self.tick)):
+            began = time.perf_counter()
+            self.step()
+            self.seconds += time.perf_counter() - began
+            if progress:
+                progress(1)
+
+    def step(self) -> None:
+        """One tick: a slot of all lanes, the updates, an evaluation and the next phase if due."""
+        share = (self.tick - self.phase_start) / self.phase.ticks
+        epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
+        if self.replay.count == 0:
+            for _ in range(self.config.prefill):
+                self._fly(1.0 if self.tick == 0 else epsilon)
+        self._fly(epsilon)
+        for _ in range(self.config.updates):
+            batch = self.replay.sample(
+                self.config.batch, self.config.steps, self.config.discount, self.generator
+            )
+            rate = _between(self.phase.learning_rate, share)
+            self.losses.append(self.learner.update(batch, rate))
+            self.updates += 1
+        self.tick += 1
+        over = self.tick - self.phase_start == self.phase.ticks
+        if over or self.tick % self.config.evaluate_every == 0:
+            self._evaluate()
+        if over and not self.done:
+            for network in (self.learner.online, self.learner.target, self.learner.average):
+                if network is not None:
+                    network.load_state_dict(self.best)
+            self._enter_phase(self.phase_index + 1)
+
+    def policy(self, weights: dict[str, torch.Tensor]) -> DDQN:
+        """A policy with these weights."""
+        _, network = build(self.config, layout_of(self.space))
+        network.load_state_dict(weights)
+        return self._as_policy(network)
+
+    def _as_policy(self, network: nn.Module) -> DDQN:
+        config, layout = self.config, layout_of(self.space)
+        return DDQN(config.name, self.observation, network, config.guard, layout)
+
+    def progress(self) -> dict[str, Any]:
+        """Where the training stands, as plain values."""
+        return {name: getattr(self, name) for name in _PROGRESS}
+
+    def restore(self, progress: dict[str, Any]) -> None:
+        """Go to where ``progress()`` was taken; arrays and random states are not part of it."""
+        self._enter_phase(progress["phase_index"])
+        for name in _PROGRESS:
+            setattr(self, name, progress[name])
+
+    def _enter_phase(self, index: int) -> None:
+        """Begin a phase: its missions, an empty memory, a new optimizer, no best weights yet."""
+        self.phase_index, self.phase_start = index, self.tick
+        config = self.config
+        cost = 1 if self.phase.battery else 0
+        self.phase_space = ScenarioSpace.of(self.space, flight_cost=cost)
+        fleet, nodes = self.space.uavs[1], len(self.space.nodes)
+        self.lanes = Lanes(self.phase_space, config.lanes, MISSION_SEED + config.seed)
+        self.lanes.start_at(self.lanes.seed, index * 2**28)
+        self._launch(self.lanes.numbers)
+        self.replay = ReplayMemory(config.replay, config.lanes, fleet, nodes)
+        self.learner.restart()
+        self.scores: list[float] = []
+        self.best_score: float | None = None
+
+    def _launch(self, lanes: np.ndarray) -> None:
+        """Start new missions, some of them in the zone on a low battery."""
+        self.lanes.launch(lanes)
+        if self.config.low_battery_starts > 0 and len(lanes):
+            low = lanes[self.generator.random(len(lanes)) < self.config.low_battery_starts]
+            missions, uavs = self.lanes.state.missions, self.lanes.state.uavs
+            draws = self.generator.random((len(low), uavs.shape[1]))
+            _run_low(missions, uavs, low, draws)
+
+    def _fly(self, epsilon: float) -> None:
+        """One slot of all lanes under the exploring policy; remember it."""
+        state = self.lanes.state
+        over = np.nonzero(state.missions["active"] == 0)[0]
+        states = snapshot(state, self.config.guard)
+        missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
+        actions = np.full(state.uavs.shape, 4)
+        if len(missions):
+            actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
+        outcome = self.lanes.step(actions)
+        self.replay.add(
+            states, actions, outcome.reward, outcome.acted, outcome.terminated, outcome.truncated
+        )
+        self.uav_slots += int(outcome.acted.sum())
+        ended = np.nonzero((state.missions["active"] == 0) & outcome.acted.any(1))[0]
+        if len(ended):
+            self.finished.append(self.lanes.records(ended).missions)
+        self._launch(over)
+
+    def _explore(
+        self, states: Any, missions: np.ndarray, uavs: np.ndarray, epsilon: float
+    ) -> np.ndarray:
+        """Epsilon-greedy or softmax actions among the allowed ones."""
+        allowed = masks(states, missions, uavs)
+        noise = self.generator.random(allowed.shape)
+        chance = np.where(allowed, noise, -1.0).argmax(1)
+        if epsilon >= 1.0:
+            return chance
+        with torch.no_grad():
+            learner = self.learner
+            values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
+        if self.phase.temperature > 0.0:  # the Gumbel trick draws from the softmax
+            values = values / self.phase.temperature - np.log(-np.log(noise))
+        choice = np.where(allowed, values, -np.inf).argmax(1)
+        return np.where(self.generator.random(len(choice)) < epsilon, chance, choice)
+
+    def _evaluate(self) -> None:
+        """Fly the missions that select the weights; keep the best by moving average."""
+        config, network = self.config, self.learner.best_guess
+        policy = self._as_policy(network)
+        records = simulate_batch(
+            self.phase_space, policy, config.evaluation_seed, config.evaluation_missions
+        ).missions
+        network.train()
+        self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
+        average = float(np.mean(self.scores))
+        full = len(self.scores) == config.window
+        is_best = full and (self.best_score is None or average > self.best_score)
+        if is_best or self.best_score is None:
+            self.best = _weights(network)
+        if is_best:
+            self.best_score = average
+        share = (self.tick - self.phase_start) / self.phase.ticks
+        row = {
+            "tick": self.tick,
+            "phase": self.phase.name,
+            "uav_slots": self.uav_slots,
+            "updates": self.updates,
+            "seconds": self.seconds,
+            "epsilon": _between(self.phase.epsilon, share / self.phase.epsilon_decay),
+            "learning_rate": _between(self.phase.learning_rate, share),
+            "moving_average": average,
+            "is_best": is_best,
+        }
+        row |= {f"evaluation_{name}": float(records[name].mean()) for name in METRICS}
+        if self.finished:
+            flown = np.concatenate(self.finished)
+            row |= {f"training_{name}": float(flown[name].mean()) for name in METRICS}
+        for name in self.losses[-1] if self.losses else ():
+            row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())
+        self.finished, self.losses = [], []
+        self.curve.append(row)
+
+
+def _between(ends: tuple[float, float], share: float) -> float:
+    """A value that moves linearly from one end to the other, then stays."""
+    return ends[0] + (ends[1] - ends[0]) * min(max(share, 0.0), 1.0)
+
+
+def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
+    """A copy of a network's weights."""
+    return {name: value.detach().clone() for name, value in network.state_dict().items()}
+
+
+@kernel
+def _run_low(missions, uavs, lanes, draws):
+    """Set the batteries of newly launched missions low: somewhere from 5 % to C_S, latched.
+
+    The quota is as far filled as the slots flown before would have.
+    """
+    for n in range(len(lanes)):
+        mission = missions[lanes[n]]
+        for i in range(mission.uavs):
+            u = uavs[lanes[n], i]
+            span = mission.charge_start - 5 + 1
+            u.battery = min(5 + int(draws[n, i] * span), mission.charge_start)
+            flown = max(mission.flying_time - u.battery, 0)
+            u.communications = min(flown * mission.communication_slots, mission.quota - 1)
+            u.latch = True
