@@ -1,5 +1,6 @@
 """From names to policies; outside packages add theirs by the entry point ``dess.policies``."""
 
+import json
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -17,8 +18,8 @@ SHIPPED = {
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
 }
 
-# One folder per trained policy.
-TRAINED = Path(__file__).with_name("trained")
+# One folder per trained policy, and what tells what it is.
+TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
 
 
 def names() -> list[str]:
@@ -29,7 +30,14 @@ def names() -> list[str]:
 
 def trained_names() -> list[str]:
     """The names of the trained policies that are shipped."""
-    return sorted(path.parent.name for path in TRAINED.glob("*/config.json"))
+    return sorted(path.parent.name for path in TRAINED.glob(f"*/{CONFIG}"))
+
+
+def descriptions() -> dict[str, str]:
+    """What every policy does, by name, in the order of ``names``; none of them is loaded."""
+    known = {name: description for name, (_, description) in SHIPPED.items()}
+    known |= {name: _description(TRAINED / name) for name in trained_names()}
+    return {name: known.get(name, "of another package") for name in names()}
 
 
 def load(name: str | Path) -> Policy:
@@ -38,17 +46,16 @@ def load(name: str | Path) -> Policy:
     Raises:
         InputError: If there is no such policy, or it cannot be loaded.
     """
-    path = Path(name)
-    name = str(name)
-    if name in trained_names():
-        path = TRAINED / name
-    if (path / "config.json").exists():
-        from policies.ddqn.checkpoint import load_policy
-
-        return load_policy(path)
+    folder, name = Path(name), str(name)
     if name in SHIPPED:
         module, _, attribute = SHIPPED[name][0].partition(":")
         return getattr(import_module(module), attribute)()
+    if name in trained_names():
+        folder = TRAINED / name
+    if name and (folder / CONFIG).exists():  # no name would be the working folder
+        from policies.ddqn.checkpoint import load_policy  # brings torch
+
+        return load_policy(folder)
     outside = _outside()
     if name not in outside:
         raise InputError(
@@ -77,3 +84,8 @@ def load_team(text: str) -> list[Policy]:
 
 def _outside() -> dict[str, EntryPoint]:
     return {point.name: point for point in entry_points(group=GROUP)}
+
+
+def _description(folder: Path) -> str:
+    """What the config of a trained policy says that it is for."""
+    return json.loads((folder / CONFIG).read_text("utf-8"))["training"]["description"]

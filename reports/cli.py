@@ -272,10 +272,9 @@ def report(
 @app.command()
 def policies() -> None:
     """List the policies."""
-    from policies.registry import SHIPPED, names
+    from policies.registry import descriptions
 
-    outside = ("", "of another package")
-    _print_list((name, SHIPPED.get(name, outside)[1]) for name in names())
+    _print_list(descriptions().items())
 
 
 @app.command()

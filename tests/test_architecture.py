@@ -13,9 +13,20 @@ import pytest
 ROOT = Path(__file__).parents[1]
 FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 # What a floor must not import, besides the floors above it.
-REFUSED = {"dess": {"torch", "pandas"}, "policies": {"pandas"}}
+REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
+# What only the learner may import: it takes seconds to load, and most commands need none of it.
+LEARNER, LEARNING = "policies.ddqn", {"torch", "safetensors"}
 # What a plain `dess --help` must not wait for.
 HEAVY = {"torch", "numba", "pandas", "scipy", "matplotlib"}
+# What runs without the learner.
+LIGHT = {
+    "import": "import dess, policies, analysis, reports.cli",
+    "load": "import policies; policies.load_team('random,nearest,greedy,tour'), policies.names()",
+    "list": "from reports.cli import main; assert main(['policies']) == 0",
+    "evaluate": "from reports.cli import main; "
+    "assert main(['evaluate', '--policy', 'greedy', '--missions', '1']) == 0",
+    "refuse": "from reports.cli import main; assert main(['train', 'none', '--out', 'none']) == 2",
+}
 
 
 def module_name(path: Path) -> str:
@@ -44,6 +55,14 @@ def imports_of(name: str) -> set[str]:
             modules = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= {m if m in SOURCES else str(node.module) for m in modules}
     return found
+
+
+def loaded_by(script: str) -> set[str]:
+    """The packages that a new interpreter has loaded after a script."""
+    script += "; import json, sys; print(); print(json.dumps(list(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    return {name.split(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
 
 
 def public(tree: ast.Module | ast.ClassDef) -> Iterator[ast.ClassDef | ast.FunctionDef]:
@@ -80,11 +99,23 @@ def test_no_modules_import_each_other() -> None:
         pytest.fail(f"a cycle of imports: {' -> '.join(error.args[1])}")
 
 
+def test_only_the_learner_imports_torch() -> None:
+    users = {n for n in SOURCES if LEARNING & {module.split(".")[0] for module in imports_of(n)}}
+    assert users
+    assert not {name for name in users if not name.startswith(f"{LEARNER}.")}
+
+
 def test_the_command_line_loads_nothing_heavy() -> None:
-    script = "import json, sys, reports.cli; print(json.dumps(sorted(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-    assert not HEAVY & {name.split(".")[0] for name in json.loads(done.stdout)}
+    assert not HEAVY & loaded_by("import reports.cli")
+
+
+@pytest.mark.parametrize("script", LIGHT.values(), ids=LIGHT)
+def test_torch_is_loaded_only_for_the_learner(script: str) -> None:
+    assert not LEARNING & loaded_by(script)
+
+
+def test_the_learner_is_seen_to_load_torch() -> None:
+    assert loaded_by(f"import {LEARNER}.checkpoint") >= LEARNING
 
 
 @pytest.mark.parametrize("name", LIBRARY)

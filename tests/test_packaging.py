@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -14,15 +14,41 @@ import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from policies.registry import TRAINED, trained_names
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("dess", "policies", "analysis", "reports")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
+ASKED = [*PROJECT["dependencies"], *EXTRAS["test"], *EXTRAS["lint"]]
+# What no system in particular needs, all do.
+SYSTEM = dict.fromkeys(("os_name", "sys_platform", "platform_system", "platform_machine"), "other")
 
 
 def requirements(*lines: str) -> dict[str, Requirement]:
     """Requirements by the canonical name of the distribution."""
     return {canonicalize_name(Requirement(line).name): Requirement(line) for line in lines}
+
+
+def closure(*lines: str) -> set[str]:
+    """What requirements and their requirements ask for, as far as they are installed."""
+    pending, seen = [Requirement(line) for line in lines], set()
+    while pending:
+        asked = pending.pop()
+        for wanted in {(canonicalize_name(asked.name), extra) for extra in {"", *asked.extras}}:
+            if wanted not in seen:
+                seen.add(wanted)
+                pending += needed(*wanted)
+    return {name for name, _ in seen}
+
+
+def needed(name: str, extra: str) -> list[Requirement]:
+    """What an installed distribution asks for with an extra; of another one it is not known."""
+    try:
+        asked = [Requirement(line) for line in requires(name) or ()]
+    except PackageNotFoundError:
+        return []
+    return [r for r in asked if not r.marker or r.marker.evaluate({**SYSTEM, "extra": extra})]
 
 
 def pins() -> dict[str, str]:
@@ -52,8 +78,22 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
     assert held == files
     for package in PACKAGES:
         assert f"{package}/py.typed" in held
-    for kind in ("dess/scenarios/*.toml", "analysis/studies/*.toml", "reports/notebooks/*.py"):
+    for kind in (
+        "dess/scenarios/*.toml",
+        "policies/ddqn/configs/*.toml",
+        "analysis/studies/*.toml",
+        "reports/notebooks/*.py",
+    ):
         assert any(Path(name).match(kind) for name in held), kind
+
+
+def test_the_wheel_holds_trained_policies_with_their_curves_and_model_cards(wheel: ZipFile) -> None:
+    kinds = {"model.safetensors", "config.json", "training.parquet", "README.md"}
+    for name in trained_names():
+        folder = (TRAINED / name).relative_to(ROOT).as_posix()
+        assert {held for held in wheel.namelist() if held.startswith(f"{folder}/")} == {
+            f"{folder}/{kind}" for kind in kinds
+        }
 
 
 def test_the_wheel_installs_the_command(wheel: ZipFile) -> None:
@@ -78,10 +118,20 @@ def test_every_library_that_is_imported_is_asked_for() -> None:
 
 def test_every_requirement_of_the_sessions_is_pinned_within_its_range() -> None:
     pinned = pins()
-    asked = requirements(*PROJECT["dependencies"], *EXTRAS["test"], *EXTRAS["lint"])
+    asked = requirements(*ASKED)
     assert set(asked) <= set(pinned)
     for name, requirement in asked.items():
         assert requirement.specifier.contains(pinned[name]), name
+
+
+def test_what_the_requirements_require_is_pinned_too() -> None:
+    needed_by_all = closure(*ASKED)
+    assert len(needed_by_all) > len(requirements(*ASKED))
+    assert not needed_by_all - set(pins())
+
+
+def test_the_tests_need_every_extra() -> None:
+    assert {*EXTRAS["distributed"], *EXTRAS["tensorboard"]} <= set(EXTRAS["test"])
 
 
 def test_the_citation_names_this_version_and_the_paper() -> None:

@@ -117,25 +117,35 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
     tensors, metadata = _read(path)
     try:
         header = json.loads(metadata["dess"])
-        version = header["format"]
-    except (KeyError, ValueError, TypeError) as error:
+        version, theirs = header["format"], header.get("config", {})
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: no checkpoint of a training: {error!r}") from None
     if version != FORMAT:
         raise InputError(f"{path}: format {version!r} is unknown; allowed: {FORMAT}")
-    ours, theirs = config.model_dump(mode="json"), header["config"]
+    ours = config.model_dump(mode="json")
     if ours != theirs:
-        other = [key for key in ours if ours[key] != theirs.get(key)]
+        other = [key for key in ours | theirs if ours.get(key) != theirs.get(key)]
         raise InputError(
             f"{path}: of another config ({', '.join(other)} differ); allowed: the one it began with"
         )
     training = Training(config, device)
-    training.restore(header["progress"])
     for name, network in _networks(training).items():
         _fit(_part(tensors, name), network, path)
-        with torch.no_grad():
+    try:
+        _restore(training, tensors, header)
+    except (KeyError, ValueError, TypeError, RuntimeError) as error:
+        raise InputError(f"{path}: damaged, or of another scenario: {error!r}") from None
+    return training
+
+
+def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> None:
+    """Put a new training where the saved one was."""
+    training.restore(header["progress"])
+    learner = training.learner
+    with torch.no_grad():
+        for name, network in _networks(training).items():
             for key, value in _part(tensors, name).items():
                 network[key].copy_(value)
-    learner = training.learner
     states: dict[int, Tensors] = {}
     for key, value in _part(tensors, "optimizer").items():
         index, _, field = key.partition(".")
@@ -153,13 +163,12 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
             array[...] = parts[name].numpy()
     if "finished" in tensors:
         training.finished = [_array(tensors["finished"], MISSION_RECORD)]
-    losses = _part(tensors, "losses")
+    losses = {key: value.to(training.device) for key, value in _part(tensors, "losses").items()}
     for values in zip(*losses.values(), strict=True):
         training.losses.append(dict(zip(losses, values, strict=True)))
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
     torch.set_rng_state(tensors["random.torch"])
-    return training
 
 
 def _digest(tensors: Tensors) -> str:
@@ -197,11 +206,14 @@ def _fit(tensors: Tensors, wanted: Tensors, path: Path) -> None:
         problem = "is missing" if name in wanted else "is one too many"
         raise InputError(f"{path}: {name} {problem}; allowed: the weights of the config's network")
     for name, value in wanted.items():
-        if tensors[name].shape != value.shape:
-            raise InputError(
-                f"{path}: {name} has shape {tuple(tensors[name].shape)}; "
-                f"allowed: {tuple(value.shape)}, as the config says"
-            )
+        found, allowed = _form(tensors[name]), _form(value)
+        if found != allowed:
+            raise InputError(f"{path}: {name} is {found}; allowed: {allowed}, as the config says")
+
+
+def _form(tensor: torch.Tensor) -> str:
+    """Type and shape, like ``float32 [5, 16]``."""
+    return f"{str(tensor.dtype).removeprefix('torch.')} {list(tensor.shape)}"
 
 
 def _part(tensors: Tensors, name: str) -> Tensors:
@@ -230,7 +242,7 @@ def _plain(layout: Layout) -> dict[str, Any]:
 
 
 def _layout(values: dict[str, Any]) -> Layout:
-    return Layout(int(values["grid"]), np.array(values["zone"]), np.array(values["nodes"]))
+    return layout_of(ScenarioSpace.of(uavs=1, **values))  # which knows what fits together
 
 
 def _replace(path: Path, write: Callable[[Path], Any]) -> None:
@@ -239,5 +251,7 @@ def _replace(path: Path, write: Callable[[Path], Any]) -> None:
     try:
         write(new)
         os.replace(new, path)
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"{path}: cannot be written: {error}; allowed: another folder") from None
     finally:
         new.unlink(missing_ok=True)

@@ -46,7 +46,9 @@ class TrainingConfig(_Settings):
         1, description="of the training: weights, exploration, missions"
     )
 
-    observation: Literal["vector", "maps"] = Field("vector", description="(b) or (a)")
+    observation: Literal["vector", "relations", "maps"] = Field(
+        "vector", description="(b), (b) with a row per node, or the paper's (a)"
+    )
     hidden: tuple[Count, ...] = Field(
         (512, 512), description="units of the dueling network's layers; maps have the paper's"
     )
@@ -89,14 +91,13 @@ class TrainingConfig(_Settings):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
-        if self.replay <= self.steps:
-            raise ValueError(f"replay: {self.replay} is not above steps {self.steps}")
+        if self.replay < self.steps + 2:  # of two slots a lane has flown at least one
+            raise ValueError(f"replay: {self.replay} is not above steps {self.steps} + 1")
         if self.prefill <= self.steps:
             raise ValueError(f"prefill: {self.prefill} is not above steps {self.steps}")
         names = [phase.name for phase in self.phases]
         if len(set(names)) < len(names):
             raise ValueError(f"phases: {names} are not distinct")
-        load_scenario(self.scenario)
         return self
 
     @property
@@ -115,7 +116,7 @@ def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig
     """A shipped config by name, or one from a TOML file.
 
     Raises:
-        InputError: If there is no such config, or it is not valid.
+        InputError: If there is no such config, or it or its scenario is not valid.
     """
     text = str(name_or_path)
     if text in config_names():
@@ -125,11 +126,16 @@ def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig
         )
     else:
         where, content = text, _read(text)
-    return config_of(parse_toml(content, where) | overrides, where)
+    config = config_of(parse_toml(content, where) | overrides, where)
+    try:
+        load_scenario(config.scenario)
+    except InputError as error:
+        raise InputError(f"{where}: scenario: {error}") from None
+    return config
 
 
 def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
-    """A config of plain values.
+    """A config of plain values. Its scenario need not be here: a trained policy does without.
 
     Raises:
         InputError: If it is not valid; ``where`` says where the values came from.

@@ -1,7 +1,8 @@
 """The networks that value the five actions of a UAV: the paper's, and a dueling one on a vector.
 
-All weights are float32. With ``precision`` bfloat16 the hidden layers compute in bfloat16 by
-autocast, the last ones in float32.
+All weights are float32. With ``precision`` bfloat16 the hidden layers compute in bfloat16 while
+training, by autocast; the last layers, and all of them in evaluation mode, compute as their
+weights are.
 """
 
 from collections.abc import Sequence
@@ -53,11 +54,10 @@ class PaperNetwork(nn.Module):
             far: (R, 4, w, w) global maps.
             own: (R, 1) own flying times.
         """
-        with _autocast(own, self.precision):
+        with _hidden_precision(self, self.precision, own):
             maps = [self.local(local).flatten(1), self.far(far).flatten(1)]
             hidden = self.hidden(torch.cat([*maps, own.to(maps[0].dtype)], 1))
-        with _autocast(own, torch.float32):
-            return self.values(hidden.float())
+        return self.values(hidden.to(self.values.weight.dtype))
 
 
 class DuelingNetwork(nn.Module):
@@ -82,17 +82,58 @@ class DuelingNetwork(nn.Module):
 
     def forward(self, vector: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, inputs)."""
-        with _autocast(vector, self.precision):
+        with _hidden_precision(self, self.precision, vector):
             hidden = self.hidden(vector)
-        with _autocast(vector, torch.float32):
-            hidden = hidden.float()
-            advantage = self.advantage(hidden)
-            return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
+        hidden = hidden.to(self.value.weight.dtype)
+        advantage = self.advantage(hidden)
+        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
 
 
-def _autocast(tensor: Tensor, precision: torch.dtype) -> torch.autocast:
-    """Compute in bfloat16 if that is the precision, else in float32."""
-    return torch.autocast(tensor.device.type, torch.bfloat16, enabled=precision == torch.bfloat16)
+class NodeNetwork(nn.Module):
+    """A dueling network that looks at every node alike, then at what is most and usual of all."""
+
+    def __init__(
+        self,
+        shapes: Sequence[Sequence[int]],
+        hidden: Sequence[int],
+        precision: torch.dtype = torch.float32,
+    ) -> None:
+        """Make the layers.
+
+        Args:
+            shapes: Shapes of one row of the vector and of the nodes (``Relations.shapes``).
+            hidden: Widths: of what is known of a node, of the own vector, then of the layers on
+                both.
+            precision: Of the hidden layers, float32 or bfloat16.
+        """
+        super().__init__()
+        (inputs,), (_, features) = shapes
+        per_node, own, *joint = hidden
+        self.precision = precision
+        self.context = nn.Linear(inputs, per_node)
+        self.node = nn.Linear(features, per_node)
+        self.nodes = _dense([per_node, per_node])
+        self.own = _dense([inputs, own])
+        sizes = [own + 2 * per_node, *joint]
+        self.hidden = _dense(sizes)
+        self.value = nn.Linear(sizes[-1], 1)
+        self.advantage = nn.Linear(sizes[-1], ACTIONS)
+
+    def forward(self, vector: Tensor, nodes: Tensor) -> Tensor:
+        """The values (R, 5) of the actions, from vectors (R, F) and nodes (R, K, features)."""
+        with _hidden_precision(self, self.precision, vector):
+            each = self.nodes(torch.relu(self.node(nodes) + self.context(vector)[:, None]))
+            pooled = [self.own(vector), each.amax(1), each.mean(1)]
+            hidden = self.hidden(torch.cat([part.to(pooled[0].dtype) for part in pooled], 1))
+        hidden = hidden.to(self.value.weight.dtype)
+        advantage = self.advantage(hidden)
+        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
+
+
+def _hidden_precision(network: nn.Module, precision: torch.dtype, inputs: Tensor) -> torch.autocast:
+    """Compute in bfloat16 if that is the precision, and only while training."""
+    enabled = network.training and precision == torch.bfloat16
+    return torch.autocast(inputs.device.type, torch.bfloat16, enabled=enabled)
 
 
 def _convolutions(channels: int) -> nn.Sequential:

@@ -54,10 +54,11 @@ class DDQN:
         missions = view.state.missions[np.unique(view.mission)]
         learned = (self.layout.grid, *self.layout.zone)
         for field, value in zip(_PLACE, learned, strict=True):
-            if (missions[field] != value).any():
+            others = missions[field][missions[field] != value]
+            if len(others):
                 raise InputError(
-                    f"policy {self.name}: has learned {field} {value}, not "
-                    f"{missions[field].max()}; allowed: the grid, zone and nodes of its training"
+                    f"policy {self.name}: has learned {field} {value}, not {others[0]}; "
+                    "allowed: the grid, zone and nodes of its training"
                 )
         if not np.array_equal(view.world.nodes, self.layout.nodes):
             raise InputError(

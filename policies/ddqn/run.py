@@ -16,7 +16,13 @@ import torch
 
 from dess.errors import InputError
 from dess.scenario import load_scenario
-from policies.ddqn.checkpoint import CHECKPOINT, load_training, save_policy, save_training
+from policies.ddqn.checkpoint import (
+    CHECKPOINT,
+    MODEL,
+    load_training,
+    save_policy,
+    save_training,
+)
 from policies.ddqn.config import TrainingConfig
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.training import Training
@@ -72,16 +78,22 @@ def train(
 
     Raises:
         InputError: If the folder holds a training and is not to be resumed, or holds none to
-            resume, or one of another config.
+            resume, or one of another config; if it holds a policy alone, or cannot be written.
     """
     path = out / CHECKPOINT
     if resume:
         training = load_training(path, config, device_of(device))
     elif path.exists():
         raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
+    elif (out / MODEL).exists():
+        raise InputError(f"{out}: holds a policy; allowed: another folder")
     else:
         training = Training(config, device_of(device))
-        out.mkdir(parents=True, exist_ok=True)
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{out}: cannot be written: {reason}; allowed: a folder") from None
         save_training(path, training)
     with _stop_signal() as stopped, _tensorboard(out / EVENTS, training) as show:
         saved = time.monotonic()
@@ -103,8 +115,10 @@ def train(
 def _save_results(out: Path, training: Training) -> None:
     """Write the best policy so far and the curves."""
     save_policy(out, training.best, training.config, training.space)
+    names = dict.fromkeys(name for row in training.curve for name in row)
+    table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
     new = out / (CURVE + ".new")
-    pq.write_table(pa.Table.from_pylist(training.curve), new)
+    pq.write_table(table, new)
     new.replace(out / CURVE)
 
 

@@ -21,8 +21,9 @@ from dess.scenario import ScenarioSpace, load_scenario
 from policies.ddqn.config import Phase, TrainingConfig
 from policies.ddqn.learner import Learner
 from policies.ddqn.maps import Maps
-from policies.ddqn.network import DuelingNetwork, PaperNetwork
+from policies.ddqn.network import DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.policy import DDQN
+from policies.ddqn.relations import Relations
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.snapshot import ACTIVE, CHARGING, Layout, layout_of, masks, snapshot
 from policies.ddqn.vector import Vector
@@ -49,6 +50,9 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
     if config.observation == "maps":
         maps = Maps(layout)
         return maps, PaperNetwork(maps.shapes, precision)
+    if config.observation == "relations":
+        relations = Relations(layout)
+        return relations, NodeNetwork(relations.shapes, config.hidden, precision)
     vector = Vector(layout)
     return vector, DuelingNetwork(vector.shapes[0][0], list(config.hidden), precision)
 
@@ -162,9 +166,8 @@ class Training:
         self.lanes.launch(lanes)
         if self.config.low_battery_starts > 0 and len(lanes):
             low = lanes[self.generator.random(len(lanes)) < self.config.low_battery_starts]
-            missions, uavs = self.lanes.state.missions, self.lanes.state.uavs
-            draws = self.generator.random((len(low), uavs.shape[1]))
-            _run_low(missions, uavs, low, draws)
+            draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
+            _run_low(*self.lanes.state, low, draws)
 
     def _fly(self, epsilon: float) -> None:
         """One slot of all lanes under the exploring policy; remember it."""
@@ -210,14 +213,12 @@ class Training:
             self.phase_space, policy, config.evaluation_seed, config.evaluation_missions
         ).missions
         network.train()
+        settled = len(self.scores) == config.window  # until then the latest are the best
         self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
         average = float(np.mean(self.scores))
-        full = len(self.scores) == config.window
-        is_best = full and (self.best_score is None or average > self.best_score)
-        if is_best or self.best_score is None:
-            self.best = _weights(network)
+        is_best = not settled or self.best_score is None or average > self.best_score
         if is_best:
-            self.best_score = average
+            self.best, self.best_score = _weights(network), average
         share = (self.tick - self.phase_start) / self.phase.ticks
         row = {
             "tick": self.tick,
@@ -251,17 +252,23 @@ def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
 
 
 @kernel
-def _run_low(missions, uavs, lanes, draws):
-    """Set the batteries of newly launched missions low: somewhere from 5 % to C_S, latched.
+def _run_low(missions, uavs, residual, lanes, draws):
+    """Make newly launched missions ones that have flown: in the zone, latched, on a low battery.
 
-    The quota is as far filled as the slots flown before would have.
+    The battery is somewhere from 5 % to C_S, the same for the whole team as it is after a flight
+    together. The quota is as far filled as that flight would have, and some share of the nodes,
+    any from none to all, is empty.
     """
     for n in range(len(lanes)):
-        mission = missions[lanes[n]]
+        mission, data = missions[lanes[n]], residual[lanes[n]]
+        span = mission.charge_start - 5 + 1
+        battery = min(5 + int(draws[n, 0] * span), mission.charge_start)
+        flown = max(mission.flying_time - battery, 0)
         for i in range(mission.uavs):
             u = uavs[lanes[n], i]
-            span = mission.charge_start - 5 + 1
-            u.battery = min(5 + int(draws[n, i] * span), mission.charge_start)
-            flown = max(mission.flying_time - u.battery, 0)
+            u.battery = battery
             u.communications = min(flown * mission.communication_slots, mission.quota - 1)
             u.latch = True
+        for k in range(mission.nodes):
+            if draws[n, 2 + k] < draws[n, 1]:
+                data[k] = 0.0

@@ -32,9 +32,9 @@ _OWN = 16
 _MATE = 11
 # Nearness of a node to a cell: exp(-slots / scale), one picture per scale [slots]; what the sum of
 # data times nearness is divided by.
-_SCALES = np.array([1.2, 4.0, 12.0])
+SCALES = np.array([1.2, 4.0, 12.0])
 _NORMS = np.array([10.0, 25.0, 80.0])
-_DATA = 10.0  # data units that count as one
+DATA_UNIT = 10.0  # data units that count as one
 _FAR = 10.0  # slots of lead over the teammates that count as one
 
 
@@ -49,9 +49,9 @@ class Vector:
     def __init__(self, layout: Layout):
         self.layout = layout
         slots = np.arange(2 * layout.grid + 2)
-        self._nearness = np.exp(-slots / _SCALES[:, None])
+        self._nearness = np.exp(-slots / SCALES[:, None])
         own = _OWN + 2 * layout.grid + 3 * len(layout.nodes)
-        self.shapes = ((own + 5 * (2 * len(_SCALES) + 2) + MATES * _MATE,),)
+        self.shapes = ((own + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
 
     def encode(
         self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
@@ -78,10 +78,10 @@ def _encode(snapshots, rows_mission, rows_uav, grid, nodes, nearness, out):
         at += 2 * grid
         for k in range(count):
             slots = abs(nodes[k, 0] - me[X]) + abs(nodes[k, 1] - me[Y])
-            lead = _lead(team, i, nodes[k, 0], nodes[k, 1], slots)
+            lead = lead_of(team, i, nodes[k, 0], nodes[k, 1], slots)
             free[k] = data[k] if lead >= 0 else 0.3 * data[k]
-            line[at + k] = data[k] / _DATA
-            line[at + count + k] = data[k] / _DATA * nearness[1, slots]
+            line[at + k] = data[k] / DATA_UNIT
+            line[at + count + k] = data[k] / DATA_UNIT * nearness[1, slots]
             line[at + 2 * count + k] = min(max(lead / _FAR, -1.0), 1.0)
         at += 3 * count
         at = _actions(me, team, i, data, free, nodes, nearness, line, at)
@@ -114,12 +114,12 @@ def _own(mission, team, i, data, line):
     line[12] = min(me[NEEDED], 10) / 10.0
     line[13] = active - 1.0
     line[14] = active == 1
-    line[15] = total / (len(data) * _DATA)
+    line[15] = total / (len(data) * DATA_UNIT)
     return _OWN
 
 
 @kernel
-def _lead(team, i, x, y, slots):
+def lead_of(team, i, x, y, slots):
     """Slots by which UAV ``i`` is nearer to a cell than the nearest active teammate."""
     least = 10_000
     for j in range(len(team)):

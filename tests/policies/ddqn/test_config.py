@@ -1,0 +1,108 @@
+"""Configs of a training: what is refused, by name."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dess.errors import InputError
+from policies.ddqn.config import TrainingConfig, config_names, config_of, load_config
+from tests.policies.ddqn.tiny import PHASES, TINY, tiny, write_config
+
+PHASE = PHASES[0]
+BAD: list[tuple[dict[str, Any], str]] = [
+    ({"speed": 1}, "speed: unknown key"),
+    ({"phases": [PHASE | {"speed": 1}]}, "phases.0.speed: unknown key"),
+    ({"lanes": "many"}, "lanes: "),
+    ({"lanes": 8.0}, "lanes: "),
+    ({"lanes": 0}, "lanes: "),
+    ({"batch": True}, "batch: "),
+    ({"seed": -1}, "seed: "),
+    ({"name": 3}, "name: "),
+    ({"guard": "perhaps"}, "guard: "),
+    ({"hidden": [16, 0]}, "hidden.1: "),
+    ({"hidden": 16}, "hidden: "),
+    ({"observation": "radar"}, "observation: "),
+    ({"precision": "float16"}, "precision: "),
+    ({"loss": "l1"}, "loss: "),
+    ({"discount": 1.5}, "discount: "),
+    ({"target_rate": 0.0}, "target_rate: "),
+    ({"reward_scale": 0}, "reward_scale: "),
+    ({"low_battery_starts": 2}, "low_battery_starts: "),
+    ({"phases": []}, "phases: "),
+    ({"phases": [{"ticks": 1}]}, "phases.0.name: "),
+    ({"phases": [PHASE | {"ticks": 0}]}, "phases.0.ticks: "),
+    ({"phases": [PHASE | {"epsilon": [0.5]}]}, "phases.0.epsilon"),
+    ({"phases": [PHASE | {"epsilon": [0.5, 2]}]}, "phases.0.epsilon.1: "),
+    ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
+    ({"steps": 60}, "prefill: 60 is not above steps 60"),
+    ({"replay": 4, "steps": 3}, "replay: 4 is not above steps 3 + 1"),
+    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: fig4, paper"),
+]
+
+
+@pytest.mark.parametrize(("changes", "complaint"), BAD, ids=[complaint for _, complaint in BAD])
+def test_what_is_wrong_is_named(changes: dict[str, Any], complaint: str, tmp_path: Path) -> None:
+    path = write_config(tmp_path, **changes)
+    with pytest.raises(InputError) as error:
+        load_config(path)
+    assert str(error.value).startswith(f"{path}: {complaint}")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["name", "phases"])
+def test_what_is_missing_is_named(key: str) -> None:
+    with pytest.raises(InputError, match=f"^here: {key}: "):
+        config_of({k: v for k, v in TINY.items() if k != key}, "here")
+
+
+def test_a_missing_file_is_named() -> None:
+    with pytest.raises(InputError, match=r"^nope\.toml: no such config; allowed: .*a TOML file$"):
+        load_config("nope.toml")
+
+
+def test_a_file_that_is_no_config_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        load_config(tmp_path)
+    path = tmp_path / "bad.toml"
+    path.write_text("lanes = [8", "utf-8")
+    with pytest.raises(InputError, match=r"bad\.toml: not valid TOML"):
+        load_config(path)
+    path.write_bytes(b"name = '\xff'")
+    with pytest.raises(InputError, match=r"bad\.toml: cannot be read"):
+        load_config(path)
+
+
+def test_a_file_holds_what_it_says(tmp_path: Path) -> None:
+    config = load_config(write_config(tmp_path))
+    assert config == tiny()
+    assert config.model_dump(mode="json", include=set(TINY) - {"phases"}) == {
+        key: value for key, value in TINY.items() if key != "phases"
+    }
+    assert [phase.ticks for phase in config.phases] == [80, 80]
+    assert config.ticks == 160
+    assert config.phases[1].epsilon == (0.5, 0.01)
+
+
+def test_overrides_come_last(tmp_path: Path) -> None:
+    path = write_config(tmp_path)
+    assert load_config(path, seed=5, lanes=4) == tiny(seed=5, lanes=4)
+    with pytest.raises(InputError, match="seed: "):
+        load_config(path, seed=-5)
+
+
+def test_as_plain_values_and_back_it_is_the_same() -> None:
+    config = tiny(discount=1 / 3, seed=7)
+    assert config_of(config.model_dump(mode="json"), "here") == config
+
+
+def test_every_setting_is_documented() -> None:
+    for name, field in TrainingConfig.model_fields.items():
+        assert field.description, name
+
+
+def test_the_shipped_configs_load() -> None:
+    for name in config_names():
+        config = load_config(name)
+        assert config.description
+        assert config.ticks > 0

@@ -1,0 +1,173 @@
+"""The policy: the best allowed action, the same in either engine, and at home only."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import event, given
+from hypothesis import strategies as st
+from torch import Tensor, nn
+
+from dess.batch import simulate_batch
+from dess.errors import InputError
+from dess.mission import simulate
+from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.view import View
+from policies.base import Policy
+from policies.ddqn.maps import Maps
+from policies.ddqn.network import DuelingNetwork, PaperNetwork
+from policies.ddqn.policy import DDQN
+from policies.ddqn.snapshot import Layout, layout_of
+from policies.ddqn.vector import Vector
+from policies.guard import guard
+from tests.drawn import Recorder, Wanderer, replications, seeds, spaces
+
+PAPER = load_scenario("paper")
+
+
+def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> DDQN:
+    """A policy of random weights."""
+    torch.manual_seed(seed)
+    vector = Vector(layout)
+    network = DuelingNetwork(vector.shapes[0][0], [32, 32]).double()
+    return DDQN("random weights", vector, network, guarded, layout)
+
+
+class _Fixed(nn.Module):
+    """Gives every UAV the same values."""
+
+    def __init__(self, values: list[float]):
+        super().__init__()
+        self.values = nn.Parameter(torch.tensor(values, dtype=torch.float64))
+
+    def forward(self, vector: Tensor) -> Tensor:
+        return self.values.expand(len(vector), 5)
+
+
+def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> DDQN:
+    layout = layout_of(space)
+    return DDQN("fixed", Vector(layout), _Fixed(values), guarded, layout)
+
+
+class _Checked:
+    """A learned policy whose every answer is checked on the way."""
+
+    def __init__(self, policy: DDQN):
+        self.policy, self.name = policy, policy.name
+
+    def act(self, view: View) -> np.ndarray:
+        before = [array.tobytes() for array in view.state]
+        actions = self.policy.act(view)
+        assert [array.tobytes() for array in view.state] == before  # it only looks
+        rows = np.arange(len(view))
+        allowed = guard(view) if self.policy.guarded else view.legal
+        assert allowed[rows, actions].all()
+        last = View(view.state, view.world, view.mission[-1:], view.uav[-1:])
+        assert self.policy.act(last).tolist() == [actions[-1]]  # alone it gives the same
+        return actions
+
+
+def test_it_is_a_policy() -> None:
+    assert isinstance(_random(layout_of(PAPER)), Policy)
+
+
+@given(spaces(), st.booleans(), seeds, replications)
+def test_what_is_not_allowed_is_never_chosen(
+    space: ScenarioSpace, guarded: bool, seed: int, replication: int
+) -> None:
+    layout = layout_of(space)
+    policies = [_random(layout, guarded, weights) for weights in (1, 2)]
+    record = simulate(space, [_Checked(policy) for policy in policies], seed, replication)
+    event(f"charged {(record.uavs['slots_charging'] > 0).any()}")
+
+
+def _assert_same_records(policy: Any, seed: int, missions: int, lanes: int) -> None:
+    records = simulate_batch(PAPER, policy, seed, missions, lanes=lanes)
+    for number in range(missions):
+        single = simulate(PAPER, policy, seed, number)
+        assert single.metrics.tobytes() == records.missions[number].tobytes()
+        assert single.uavs.tobytes() == records.uavs[number, : len(single.uavs)].tobytes()
+
+
+@pytest.mark.parametrize("guarded", [True, False])
+def test_both_engines_give_the_same_records(guarded: bool) -> None:
+    recorder = Recorder(_random(layout_of(PAPER), guarded))
+    simulate(PAPER, recorder, 61)
+    assert len(set(recorder.asked.values())) > 1  # the network does tell situations apart
+    _assert_same_records(_random(layout_of(PAPER), guarded), 61, 6, 4)
+    _assert_same_records([_random(layout_of(PAPER), guarded), Wanderer()], 62, 3, 3)
+
+
+def test_both_engines_give_the_same_records_with_maps() -> None:
+    torch.manual_seed(4)
+    layout = layout_of(PAPER)
+    maps = Maps(layout)
+    network = PaperNetwork(maps.shapes).double()
+    _assert_same_records(DDQN("maps", maps, network, True, layout), 63, 2, 2)
+
+
+def _path(values: list[float], slots: int) -> list[tuple[float, float]]:
+    """The cells of a lone UAV that starts at (2, 2) on a grid of 4, slot by slot."""
+    space = ScenarioSpace.of(
+        grid=4, zone=[2, 2, 1, 1], nodes=[[0, 0]], uavs=1, max_slots=slots, initial_data=1e6
+    )
+    log = simulate(space, _fixed(values, space), events=True).events
+    assert log is not None
+    columns = log.columns()
+    moves = columns["event"] == "move"
+    return list(zip(columns["x"][moves].tolist(), columns["y"][moves].tolist(), strict=True))
+
+
+def test_it_takes_the_allowed_action_of_the_highest_value() -> None:
+    # North; at the northern edge east; in the corner south; and so on.
+    path = [(2, 1), (2, 0), (3, 0), (3, 1), (3, 0), (3, 1)]
+    assert _path([5, 4, 3, 2, 1], 6) == path
+    assert _path([1, 2, 3, 4, 5], 3) == [(2, 2)] * 3
+
+
+def test_rounding_decides_nothing() -> None:
+    assert _path([1 - 1e-12, 1, 1 + 1e-12, 1, 1], 2) == [(2, 1), (2, 0)]
+    assert _path([1 - 1e-6, 1, 1 + 1e-6, 1, 1], 1) == [(2, 3)]
+
+
+def test_a_network_computes_in_the_precision_of_its_weights() -> None:
+    layout = layout_of(PAPER)
+    for network in (_random(layout).network, _random(layout).network.float()):
+        policy = DDQN("any", Vector(layout), network, True, layout)
+        assert not policy.network.training
+        simulate(PAPER, policy, 64)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"grid": 40}, "grid 32, not 40"),
+        ({"zone": [25, 2, 4, 4]}, "zone_x 26, not 25"),
+        ({"zone": [26, 3, 4, 4]}, "zone_y 2, not 3"),
+        ({"zone": [26, 2, 3, 4]}, "zone_width 4, not 3"),
+        ({"zone": [26, 2, 4, 5]}, "zone_height 4, not 5"),
+        ({"nodes": PAPER.nodes[1:]}, "other nodes"),
+        ({"nodes": PAPER.nodes[::-1]}, "other nodes"),
+    ],
+)
+def test_away_from_home_it_refuses(changes: dict[str, Any], problem: str) -> None:
+    policy, away = _random(layout_of(PAPER)), load_scenario("paper", **changes)
+    for fly in (simulate, simulate_batch):
+        with pytest.raises(InputError) as error:
+            fly(away, policy)
+        line = str(error.value)
+        assert line.startswith(f"policy random weights: has learned {problem}")
+        assert "; allowed: " in line
+        assert "\n" not in line
+
+
+def test_among_many_missions_it_names_the_strange_one() -> None:
+    scenarios = [PAPER, load_scenario("paper", zone=[20, 2, 4, 4])]
+    with pytest.raises(InputError, match="has learned zone_x 26, not 20"):
+        simulate_batch(scenarios, _random(layout_of(PAPER)), 0, 2)
+
+
+def test_all_else_may_differ() -> None:
+    other = {"uavs": 5, "quota": 100, "initial_data": 3.0, "charge_rate": 5, "edge_snr": -20.0}
+    simulate(Scenario.of(**other), _random(layout_of(PAPER)))

@@ -1,0 +1,200 @@
+"""The replay memory: n-step returns through the ends of missions, and what may be drawn."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from policies.ddqn.replay import Batch, ReplayMemory
+from policies.ddqn.snapshot import empty_snapshots
+
+SLOT, LANE = 0, 1  # what the columns of the missions hold here
+
+
+class Log(NamedTuple):
+    """What happened in T slots of N lanes of I UAVs: arrays (T, N, I)."""
+
+    action: np.ndarray
+    reward: np.ndarray
+    acted: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+
+    def memory(self, capacity: int) -> ReplayMemory:
+        """A memory to which all of it was added; the states tell their slot and lane."""
+        slots, lanes, uavs = self.action.shape
+        memory = ReplayMemory(capacity, lanes, uavs, 1)
+        for slot in range(slots):
+            states = empty_snapshots(lanes, uavs, 1)
+            states.missions[:, SLOT], states.missions[:, LANE] = slot, np.arange(lanes)
+            memory.add(states, *(part[slot] for part in self))
+        return memory
+
+    def transition(
+        self, slot: int, lane: int, uav: int, steps: int, discount: float
+    ) -> tuple[float, float, int]:
+        """The n-step return from a slot on, the factor of the later value and its slot."""
+        total, factor = 0.0, 1.0
+        for n in range(slot, slot + steps):
+            total += factor * self.reward[n, lane, uav]
+            factor *= discount
+            if self.terminated[n, lane, uav]:
+                return total, 0.0, n + 1
+            if self.truncated[n, lane, uav]:
+                return total, factor, n + 1
+        return total, factor, slot + steps
+
+
+def _lone(rewards: list[float], terminated: int = -1, truncated: int = -1) -> Log:
+    """The log of one UAV in one lane, whose mission ends in the given slot."""
+    shape = (len(rewards), 1, 1)
+    slots = np.arange(len(rewards)).reshape(shape)
+    end = max(terminated, truncated)
+    return Log(
+        slots % 5,
+        np.array(rewards).reshape(shape),
+        slots != end + 1 if end >= 0 else np.full(shape, True),
+        slots == terminated,
+        slots == truncated,
+    )
+
+
+def _drawn(memory: ReplayMemory, size: int, steps: int, discount: float = 0.5) -> Batch:
+    return memory.sample(size, steps, discount, np.random.default_rng(1))
+
+
+def _returns(log: Log, steps: int, capacity: int = 100) -> dict[int, tuple[float, float, int]]:
+    """By slot: the reward, the factor and the later slot that a sample of one lane holds."""
+    batch = _drawn(log.memory(capacity), 200, steps)
+    slots, later = (batch.state.missions[rows, SLOT] for rows in (batch.rows, batch.later))
+    values = zip(batch.reward.tolist(), batch.discount.tolist(), later.tolist(), strict=True)
+    return dict(zip(slots.tolist(), values, strict=True))
+
+
+# --- by hand, with a discount factor of 1/2 ---
+
+
+def test_the_return_sums_discounted_rewards() -> None:
+    assert _returns(_lone([1, 2, 4, 8, 16]), 3) == {
+        0: (1 + 2 / 2 + 4 / 4, 1 / 8, 3),
+        1: (2 + 4 / 2 + 8 / 4, 1 / 8, 4),
+    }
+
+
+def test_after_termination_nothing_counts() -> None:
+    # The mission ends in slot 2; slot 3 is its last row, slot 4 the first of the next mission.
+    assert _returns(_lone([1, 2, 4, 99, 8, 16, 32], terminated=2), 3) == {
+        0: (1 + 2 / 2 + 4 / 4, 0, 3),
+        1: (2 + 4 / 2, 0, 3),
+        2: (4, 0, 3),
+    }
+
+
+def test_truncation_is_no_end_of_value() -> None:
+    assert _returns(_lone([1, 2, 4, 99, 8, 16, 32], truncated=2), 3) == {
+        0: (1 + 2 / 2 + 4 / 4, 1 / 8, 3),
+        1: (2 + 4 / 2, 1 / 4, 3),
+        2: (4, 1 / 2, 3),
+    }
+
+
+def test_the_ring_keeps_the_last_slots() -> None:
+    # Of eight slots the last four are left, 4 to 7; they lie in the rows 0 to 3.
+    rewards = [1.0, 2, 4, 8, 16, 32, 64, 128]
+    assert _returns(_lone(rewards), 2, capacity=4) == {
+        4: (16 + 32 / 2, 1 / 4, 6),
+        5: (32 + 64 / 2, 1 / 4, 7),
+    }
+    # Of six slots 2 to 5 are left: the return from slot 3 goes over the edge of the ring.
+    assert _returns(_lone(rewards[:6], terminated=4), 2, capacity=4) == {
+        2: (4 + 8 / 2, 1 / 4, 4),
+        3: (8 + 16 / 2, 0, 5),
+    }
+
+
+# --- against plain Python ---
+
+
+@st.composite
+def _logs(draw: st.DrawFn) -> tuple[Log, int, int]:
+    """Missions one after another in every lane; n, and a capacity that fits."""
+    steps, lanes, uavs = draw(st.integers(1, 5)), draw(st.integers(1, 3)), draw(st.integers(1, 3))
+    slots = draw(st.integers(steps + 2, 30))
+    capacity = draw(st.integers(steps + 2, 35))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    shape = (slots, lanes, uavs)
+    acted, terminated, truncated = (np.zeros(shape, np.bool_) for _ in range(3))
+    for lane in range(lanes):
+        slot = 0
+        while slot < slots:
+            lengths = rng.integers(1, 8, rng.integers(1, uavs + 1))  # of the UAVs of a mission
+            for uav, length in enumerate(lengths):
+                acted[slot : slot + length, lane, uav] = True
+                if slot + length <= slots:
+                    ends = terminated if rng.random() < 0.7 else truncated
+                    ends[slot + length - 1, lane, uav] = True
+            slot += int(lengths.max()) + 1  # nobody acts in the last row
+    log = Log(rng.integers(0, 5, shape), rng.normal(size=shape), acted, terminated, truncated)
+    return log, steps, capacity
+
+
+@given(_logs(), st.floats(0.1, 1.0))
+def test_all_that_can_be_drawn_is_drawn_and_right(
+    world: tuple[Log, int, int], discount: float
+) -> None:
+    log, steps, capacity = world
+    slots, lanes, uavs = log.action.shape
+    oldest = max(0, slots - capacity)
+    eligible = {
+        (slot, lane, uav)
+        for slot, lane, uav in np.argwhere(log.acted).tolist()
+        if oldest <= slot < slots - steps
+    }
+    batch = _drawn(log.memory(capacity), 30 * slots * lanes * uavs, steps, discount)
+    assert batch.state.residual.shape == (capacity * lanes, 1)
+    places = np.column_stack([batch.state.missions[batch.rows], batch.uav])
+    assert {(s, lane, uav) for s, lane, uav in places.tolist()} == eligible
+    for row, (slot, lane, uav) in enumerate(places.tolist()):
+        total, factor, later = log.transition(slot, lane, uav, steps, discount)
+        assert batch.reward[row] == pytest.approx(total, rel=1e-5, abs=1e-5)
+        assert batch.discount[row] == pytest.approx(factor)
+        assert batch.state.missions[batch.later[row]].tolist() == [later, lane]
+        assert batch.action[row] == log.action[slot, lane, uav]
+
+
+def test_the_draw_is_uniform() -> None:
+    rng = np.random.default_rng(3)
+    shape = (12, 3, 2)
+    acted = rng.random(shape) < 0.4
+    never = np.zeros(shape, np.bool_)
+    log = Log(np.zeros(shape), np.zeros(shape), acted, never, never)
+    batch = _drawn(log.memory(12), 20_000, 2)
+    places = np.column_stack([batch.state.missions[batch.rows], batch.uav])
+    _, counts = np.unique(places, axis=0, return_counts=True)
+    assert len(counts) == acted[:10].sum()
+    share = 1 / len(counts)
+    assert abs(counts / 20_000 - share).max() < 5 * np.sqrt(share / 20_000)
+
+
+def test_too_few_slots_are_refused() -> None:
+    for slots in range(4):
+        memory = _lone([1.0] * slots).memory(10)
+        with pytest.raises(ValueError, match=f"{slots} slots in memory"):
+            _drawn(memory, 8, 3)
+    assert len(_drawn(_lone([1.0] * 4).memory(10), 8, 3).reward) == 8
+    with pytest.raises(ValueError, match="9 slots in memory"):  # of which three are left
+        _drawn(_lone([1.0] * 9).memory(3), 8, 3)
+
+
+@pytest.mark.parametrize(("capacity", "lanes", "uavs", "nodes"), [(1, 1, 1, 1), (50, 8, 3, 25)])
+def test_its_size_is_known_before_it_is_made(
+    capacity: int, lanes: int, uavs: int, nodes: int
+) -> None:
+    memory = ReplayMemory(capacity, lanes, uavs, nodes)
+    taken = sum(array.nbytes for array in memory.arrays.values())
+    assert ReplayMemory.bytes_for(capacity, lanes, uavs, nodes) == taken
+    own = [value for value in vars(memory).values() if isinstance(value, np.ndarray)]
+    own += memory._states
+    assert taken == sum(array.nbytes for array in own)

@@ -1,0 +1,336 @@
+"""Algorithm 1: its phases, its exploration, what it keeps, and that it can be stopped anywhere."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from dess.batch import simulate_batch
+from dess.record import empty_records
+from dess.scenario import ScenarioSpace
+from policies.ddqn import training as module
+from policies.ddqn.checkpoint import load_training, save_training
+from policies.ddqn.snapshot import ACTIVE, CHARGING, masks, snapshot
+from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
+from tests.policies.ddqn.tiny import (
+    CPU,
+    PHASES,
+    assert_same,
+    story_of,
+    tiny,
+    weights_of,
+)
+
+# --- stopping and going on ---
+
+
+def _stopped(training: Training, path: Path) -> Training:
+    """The training as another process would go on with it."""
+    save_training(path, training)
+    torch.manual_seed(99)  # nothing may hang on what was drawn before
+    return load_training(path, training.config, CPU)
+
+
+def _trained(training: Training, ticks: int) -> Training:
+    training.run(ticks)
+    return training
+
+
+@pytest.fixture(scope="module")
+def whole() -> Training:
+    """The tiny training in one go."""
+    return _trained(Training(tiny(), CPU), 1000)
+
+
+@pytest.mark.parametrize("stops", [(0,), (1, 10), (25, 79), (80, 81), (120,), (159, 160)])
+def test_a_stopped_training_goes_on_as_if_nothing_had_been(
+    stops: tuple[int, ...], whole: Training, tmp_path: Path
+) -> None:
+    training = Training(tiny(), CPU)
+    for stop in stops:
+        training.run(stop - training.tick)
+        training = _stopped(training, tmp_path / "checkpoint")
+        assert training.tick == stop
+    assert_same(_trained(training, 1000), whole)
+    assert training.done
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"average_rate": 1.0, "updates": 2}, {"precision": "bfloat16", "guard": False}],
+    ids=["online alone", "bfloat16"],
+)
+def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
+    config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
+    parts = _stopped(_trained(Training(config, CPU), 17), tmp_path / "checkpoint")
+    assert_same(_trained(parts, 100), _trained(Training(config, CPU), 100))
+
+
+def test_so_does_one_on_maps(tmp_path: Path) -> None:
+    phases = [phase | {"ticks": 4} for phase in PHASES]
+    small = {"lanes": 2, "batch": 8, "prefill": 8, "evaluation_missions": 1, "evaluate_every": 3}
+    config = tiny(observation="maps", phases=phases, **small)
+    parts = _stopped(_trained(Training(config, CPU), 3), tmp_path / "checkpoint")
+    parts = _stopped(_trained(parts, 3), tmp_path / "checkpoint")
+    assert_same(_trained(parts, 100), _trained(Training(config, CPU), 100))
+
+
+def test_without_its_memory_a_stopped_training_fills_a_new_one(tmp_path: Path) -> None:
+    config = tiny(checkpoint_replay=False)
+    training = _trained(Training(config, CPU), 90)
+    path, full = tmp_path / "checkpoint", tmp_path / "full"
+    save_training(full, _trained(Training(tiny(), CPU), 90))
+    resumed = _stopped(training, path)
+    memory = sum(array.nbytes for array in training.replay.arrays.values())
+    assert full.stat().st_size - path.stat().st_size > 0.9 * memory
+    ours, theirs = weights_of(resumed), weights_of(training)
+    assert all(torch.equal(value, theirs[name]) for name, value in ours.items())
+    assert resumed.replay.count == 0
+    resumed.run(1)
+    assert resumed.replay.count == config.prefill + 1
+    assert _trained(resumed, 1000).done
+
+
+def test_the_seed_makes_the_training(whole: Training) -> None:
+    assert_same(_trained(Training(tiny(), CPU), 1000), whole)
+    other = _trained(Training(tiny(seed=2), CPU), 25)
+    assert story_of(other)[0] != story_of(whole)[0]
+
+
+# --- phases ---
+
+
+def test_the_first_phase_spends_no_battery() -> None:
+    training = _trained(Training(tiny(low_battery_starts=0.0), CPU), 40)
+    state = training.lanes.state
+    active = state.uavs["active"]
+    start = np.broadcast_to(state.missions["flying_time"][:, None], active.shape)
+    assert state.uavs["slots_flying"][active].min() > 50
+    assert (state.uavs["battery"] == start)[active].all()
+    training.run(41)  # one in the second phase, after the prefill
+    state = training.lanes.state
+    flown = state.uavs["active"] & (state.uavs["slots_charging"] == 0)
+    spent = state.missions["flying_time"][:, None] - state.uavs["battery"]
+    assert (spent == state.uavs["slots_flying"])[flown].all()
+    assert state.uavs["slots_flying"][flown].min() > 0
+
+
+def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
+    training = _trained(Training(tiny(), CPU), 79)
+    before = set(training.lanes.state.missions["replication"].tolist())
+    assert training.phase.name == "harvest"
+    assert training.replay.count == training.config.prefill + 79
+    assert training.learner.optimizer.state_dict()["state"]
+    training.run(1)
+    assert training.phase.name == "battery"
+    assert training.replay.count == 0
+    assert not training.learner.optimizer.state_dict()["state"]
+    missions = training.lanes.state.missions
+    assert (missions["seed"] == MISSION_SEED + training.config.seed).all()
+    assert before.isdisjoint(missions["replication"].tolist())
+    training.run(1)
+    assert training.replay.count == training.config.prefill + 1
+
+
+def _scripted(monkeypatch: pytest.MonkeyPatch, scores: list[float]) -> None:
+    """Let the evaluations of selection give these scores."""
+    left = iter(scores)
+
+    def fly(space: ScenarioSpace, *_: Any) -> Any:
+        records = empty_records(2, space.uavs[1])
+        records.missions[SELECT_BY] = next(left)
+        return records
+
+    monkeypatch.setattr(module, "simulate_batch", fly)
+
+
+@pytest.mark.parametrize(
+    ("window", "scores", "best"),
+    [
+        (1, [0.2, 0.9, 0.1, 0.8], 1),
+        (1, [0.2, 0.1, 0.0, 0.1], 0),
+        (1, [0.5, 0.5, 0.5, 0.5], 0),
+        (2, [0.9, 0.1, 0.6, 0.5], 3),  # means of two: 0.5, 0.35, 0.55
+        (2, [0.9, 0.1, 0.3, 0.5], 1),
+        (3, [0.9, 0.1, 0.4, 0.2], 2),
+        (9, [0.9, 0.1, 0.4, 0.2], 3),  # too few for a mean: the latest
+    ],
+)
+def test_the_second_phase_begins_with_the_best_weights_of_the_first(
+    window: int, scores: list[float], best: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _scripted(monkeypatch, [*scores, 0.0, 0.1])
+    # Four evaluations: after 6, 12 and 18 ticks, and at the end of the phase.
+    phases = [phase | {"ticks": 20} for phase in PHASES]
+    training = Training(tiny(window=window, phases=phases, evaluate_every=6), CPU)
+    guesses = []
+    for ticks in (6, 6, 6, 1):
+        guesses.append(weights_of(_trained(training, ticks)))
+    assert training.tick == 19
+    _trained(training, 1)
+    assert [row["evaluation_" + SELECT_BY] for row in training.curve] == scores
+    now = weights_of(training)
+    # The last guess of the first phase is overwritten by the best: it can be told by elimination.
+    origin = [
+        all(torch.equal(g[f"average.{key}"], now[f"best.{key}"]) for key in training.best)
+        for g in guesses[:3]
+    ]
+    assert origin == [number == best for number in range(3)]
+    for key, value in training.best.items():
+        for name in ("online", "target", "average"):
+            assert torch.equal(now[f"{name}.{key}"], value)
+    # What was best of the first phase has no say in the second.
+    assert training.best_score is None
+    training.run(4)
+    assert training.curve[-1]["is_best"]
+    assert training.best_score == 0.0
+
+
+def test_the_best_weights_score_as_the_curve_says() -> None:
+    training = Training(tiny(window=1, phases=PHASES[1:], evaluate_every=20), CPU)
+    training.run(60)
+    config = training.config
+    scores = [row["evaluation_" + SELECT_BY] for row in training.curve]
+    policy = training.policy(training.best)
+    missions = config.evaluation_seed, config.evaluation_missions
+    records = simulate_batch(training.space, policy, *missions).missions
+    assert records[SELECT_BY].mean() == max(scores) == training.best_score
+
+
+# --- exploration ---
+
+
+def test_rates_move_over_their_phase() -> None:
+    phases = [
+        PHASES[0] | {"epsilon": [0.1, 0.1], "learning_rate": [1e-3, 1e-4]},
+        PHASES[1] | {"epsilon": [0.5, 0.01], "epsilon_decay": 0.5, "learning_rate": [1e-4, 1e-4]},
+    ]
+    training = _trained(Training(tiny(phases=phases, evaluate_every=20), CPU), 1000)
+    rows = training.curve
+    assert [row["tick"] for row in rows] == [20, 40, 60, 80, 100, 120, 140, 160]
+    assert [row["phase"] for row in rows] == ["harvest"] * 4 + ["battery"] * 4
+    epsilons = [0.1] * 4 + [0.5 - 0.49 / 2, 0.01, 0.01, 0.01]
+    assert [row["epsilon"] for row in rows] == pytest.approx(epsilons)
+    rates = [7.75e-4, 5.5e-4, 3.25e-4, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4]
+    assert [row["learning_rate"] for row in rows] == pytest.approx(rates)
+
+
+def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
+    """Snapshots of what the lanes are in, and their UAVs that act, many times over."""
+    states = snapshot(training.lanes.state, training.config.guard)
+    missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
+    return states, np.tile(missions, 2000), np.tile(uavs, 2000)
+
+
+def _explorer(monkeypatch: pytest.MonkeyPatch, values: list[float], **phase: Any) -> Training:
+    """A training whose network gives every UAV these values."""
+    training = _trained(Training(tiny(phases=[PHASES[1] | phase]), CPU), 30)
+
+    def give(_: Any, __: Any, rows: np.ndarray, ___: Any) -> torch.Tensor:
+        return torch.tensor(values).expand(len(rows), 5)
+
+    monkeypatch.setattr(training.learner, "values", give)
+    return training
+
+
+VALUES = [0.3, 0.1, 0.5, 0.2, 0.4]
+# How often an action should be chosen, given the mask of the allowed ones.
+Chances = Callable[[np.ndarray, float], np.ndarray]
+
+
+def _greedy(allowed: np.ndarray, epsilon: float) -> np.ndarray:
+    best = np.where(allowed, VALUES, -np.inf).argmax(1)
+    random = allowed / allowed.sum(1, keepdims=True)
+    return epsilon * random + (1 - epsilon) * np.eye(5)[best]
+
+
+def _softmax(allowed: np.ndarray, epsilon: float) -> np.ndarray:
+    weights = allowed * np.exp(np.array(VALUES) / 0.25)
+    random = allowed / allowed.sum(1, keepdims=True)
+    return epsilon * random + (1 - epsilon) * weights / weights.sum(1, keepdims=True)
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("temperature", "chances"), [(0.0, _greedy), (0.25, _softmax)])
+def test_actions_are_explored_as_told(
+    epsilon: float, temperature: float, chances: Chances, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    training = _explorer(monkeypatch, VALUES, temperature=temperature)
+    states, missions, uavs = _acting(training)
+    allowed = masks(states, missions, uavs)
+    actions = training._explore(states, missions, uavs, epsilon)
+    assert allowed[np.arange(len(actions)), actions].all()
+    expected = chances(allowed, epsilon)
+    for forms in np.unique(allowed, axis=0):
+        alike = (allowed == forms).all(1)
+        count = np.bincount(actions[alike], minlength=5)
+        mean = expected[alike].sum(0)
+        spread = np.sqrt(mean * (1 - mean / alike.sum()))
+        assert (abs(count - mean) <= 5 * spread).all()
+
+
+def test_the_prefill_is_random(monkeypatch: pytest.MonkeyPatch) -> None:
+    training = Training(tiny(), CPU)
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("the network was asked")
+
+    monkeypatch.setattr(training.learner, "values", refuse)
+    with pytest.raises(AssertionError, match="was asked"):
+        training.run(1)
+    assert training.replay.count == training.config.prefill
+
+
+# --- missions that start low ---
+
+
+def test_low_starts_are_low_latched_and_near_their_quota() -> None:
+    training = Training(tiny(low_battery_starts=1.0, lanes=200), CPU)
+    missions, uavs = training.lanes.state.missions, training.lanes.state.uavs
+    present = uavs["active"]
+    start = np.broadcast_to(missions["charge_start"][:, None], present.shape)
+    assert (uavs["battery"] <= start)[present].all()
+    assert uavs["battery"][present].min() == 5
+    assert (uavs["battery"] == start)[present].any()
+    assert uavs["latch"][present].all()
+    assert not uavs["battery"][~present].any()
+    flown = missions["flying_time"][:, None] - uavs["battery"]
+    filled = np.minimum(4 * flown, missions["quota"][:, None] - 1)
+    assert (uavs["communications"] == filled)[present].all()
+    x, y, width, height = training.space.zone
+    assert ((uavs["x"] >= x) & (uavs["x"] < x + width))[present].all()
+    assert ((uavs["y"] >= y) & (uavs["y"] < y + height))[present].all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_the_share_of_low_starts(share: float) -> None:
+    training = Training(tiny(low_battery_starts=share, lanes=1000), CPU)
+    missions, uavs = training.lanes.state.missions, training.lanes.state.uavs
+    low = uavs["battery"][:, 0] < missions["flying_time"]
+    assert low.mean() == pytest.approx(share, abs=5 * np.sqrt(share * (1 - share) / 1000))
+    assert (uavs["latch"][:, 0] == low).all()
+
+
+# --- curves ---
+
+
+def test_the_curve_tells_how_the_training_stands(whole: Training) -> None:
+    config = whole.config
+    ticks = [25, 50, 75, 80, 100, 125, 150, 160]
+    assert [row["tick"] for row in whole.curve] == ticks
+    assert [row["updates"] for row in whole.curve] == ticks
+    # A mission has three UAVs at most, and a last row in which nobody acts.
+    slots = whole.curve[-1]["uav_slots"]
+    assert slots == whole.uav_slots
+    flown = (config.ticks + 2 * config.prefill) * config.lanes
+    assert flown < slots < 3 * flown
+    for row in whole.curve:
+        assert row["loss"] > 0
+        assert row["gradient_norm"] > 0
+        assert 0 <= row["evaluation_" + SELECT_BY] <= row["evaluation_collection_ratio"] <= 1
+    ended = [row for row in whole.curve if "training_success" in row]
+    assert 0 < len(ended) < len(whole.curve)  # now and then no mission ends
+    assert all(0 <= row["training_success"] <= 1 for row in ended)

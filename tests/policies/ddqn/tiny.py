@@ -1,0 +1,84 @@
+"""A training that takes next to no time."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+import torch
+
+from policies.ddqn.config import TrainingConfig, config_of
+from policies.ddqn.training import Training
+
+CPU = torch.device("cpu")
+PHASES: list[dict[str, Any]] = [
+    {"name": "harvest", "ticks": 80, "battery": False},
+    {"name": "battery", "ticks": 80, "epsilon": [0.5, 0.01], "epsilon_decay": 0.5},
+]
+TINY: dict[str, Any] = {
+    "name": "tiny",
+    "hidden": [16, 16],
+    "lanes": 8,
+    "prefill": 60,
+    "replay": 80,
+    "batch": 32,
+    "steps": 3,
+    "average_rate": 0.01,
+    "evaluate_every": 25,
+    "evaluation_missions": 4,
+    "window": 2,
+    "low_battery_starts": 0.2,
+    "phases": PHASES,
+}
+
+
+def tiny(**changes: Any) -> TrainingConfig:
+    """The config of the tiny training, with other values."""
+    return config_of(TINY | changes, "tiny")
+
+
+def write_config(folder: Path, **changes: Any) -> Path:
+    """The config of the tiny training as a TOML file."""
+    path = folder / "tiny.toml"
+    path.write_text(tomli_w.dumps(TINY | changes), "utf-8")
+    return path
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch compute in one thread: small sums in always the same order."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def weights_of(training: Training) -> dict[str, torch.Tensor]:
+    """A copy of all weights of a training: online, target, average and best."""
+    learner = training.learner
+    networks = {"online": learner.online.state_dict(), "target": learner.target.state_dict()}
+    if learner.average is not None:
+        networks["average"] = learner.average.state_dict()
+    networks["best"] = training.best
+    return {
+        f"{name}.{key}": value.clone()
+        for name, network in networks.items()
+        for key, value in network.items()
+    }
+
+
+def story_of(training: Training) -> list[dict[str, Any]]:
+    """The curve of a training but for the time that it took."""
+    return [{k: v for k, v in row.items() if k != "seconds"} for row in training.curve]
+
+
+def assert_same(one: Training, other: Training) -> None:
+    """Assert that two trainings stand at the same place, bit for bit."""
+    assert (one.tick, one.updates, one.uav_slots) == (other.tick, other.updates, other.uav_slots)
+    assert one.generator.bit_generator.state == other.generator.bit_generator.state
+    assert story_of(one) == story_of(other)
+    theirs = weights_of(other)
+    for name, value in weights_of(one).items():
+        assert torch.equal(value, theirs.pop(name)), name
+    assert not theirs

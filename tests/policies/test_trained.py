@@ -1,0 +1,63 @@
+"""Trained policies by name: listed with what they are for, and never in the way of another one."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import policies
+from dess.errors import InputError
+from policies import registry
+from policies.heuristics import Greedy
+from reports.cli import main
+
+
+def write_config(folder: Path, description: str) -> None:
+    """A folder that is taken for a trained policy, without weights."""
+    folder.mkdir()
+    content = {"format": 1, "training": {"description": description}}
+    (folder / "config.json").write_text(json.dumps(content))
+
+
+@pytest.fixture
+def learned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One trained policy is shipped: ``learned``."""
+    write_config(tmp_path / "learned", "it has learned")
+    monkeypatch.setattr(registry, "TRAINED", tmp_path)
+
+
+@pytest.mark.usefixtures("learned")
+def test_policies_are_described_in_the_order_of_their_names() -> None:
+    described = registry.descriptions()
+    assert list(described) == policies.names()
+    assert described["learned"] == "it has learned"
+    assert described["greedy"] == registry.SHIPPED["greedy"][1]
+
+
+@pytest.mark.usefixtures("learned")
+def test_the_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["policies"]) == 0
+    assert ["learned", "it has learned"] in [
+        line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()
+    ]
+
+
+def test_a_folder_does_not_hide_the_shipped_policy_of_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_config(tmp_path / "greedy", "another one")
+    monkeypatch.chdir(tmp_path)
+    assert isinstance(policies.load("greedy"), Greedy)
+
+
+def test_no_name_is_not_the_working_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_config(tmp_path / "here", "of the working folder")
+    monkeypatch.chdir(tmp_path / "here")
+    with pytest.raises(InputError, match="policy: '' is unknown"):
+        policies.load_team("greedy,")
+
+
+@pytest.mark.parametrize("name", registry.trained_names())
+def test_what_is_shipped_loads_by_its_own_name_and_says_what_it_is_for(name: str) -> None:
+    assert policies.load(name).name == name
+    assert registry.descriptions()[name]
