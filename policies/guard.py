@@ -163,7 +163,9 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
 
     Without any such action those are left that come nearest to the charger, but for cells that a
     teammate with the right of way may take: to let it pass, the margin may be used.
-    Cells off the grid and cells of parked teammates are never safe.
+    Cells off the grid and cells of parked teammates are never safe. A UAV that has just been
+    overruled leaves such contested cells to the teammates as well: two that both insist would
+    block each other until one runs dry.
 
     Args:
         mission: ``MISSION`` record.
@@ -187,17 +189,16 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
             # One slot is for the charging slot itself: the battery must not be empty by then.
             late[action] = max(home + 1 + margin(mission) - (u.battery - 1), 0)
             least = min(least, late[action])
-    if not charge:
-        return
-    nearest = safe & (late == least)
     clear = safe & (contested < 2)
-    if least == 0 or not clear.any():
-        safe[:] = nearest
-    elif (nearest & clear).any():  # late: straight home, but not where others have right of way
+    nearest = safe & (late == least) if charge else safe.copy()
+    if (nearest & clear).any() and (late[nearest].any() or u.overruled):
         safe[:] = nearest & clear
-    else:  # to wait or step aside until the teammate has passed is what the margin is for
+    elif late[nearest].any() and clear.any():
+        # to wait or step aside until the teammate has passed is what the margin is for
         wait = clear & (late <= margin(mission))
         safe[:] = wait if wait.any() else nearest
+    else:
+        safe[:] = nearest
 
 
 @kernel

@@ -80,6 +80,7 @@ def save_training(path: Path, training: Training) -> None:
     """Write all that a training needs to go on exactly as if it had not been stopped."""
     learner = training.learner
     tensors: Tensors = {"random.torch": torch.get_rng_state()}
+    tensors["early"] = torch.from_numpy(training.early)
     for name, network in _networks(training).items():
         tensors |= {f"{name}.{key}": value for key, value in network.items()}
     for index, state in learner.optimizer.state_dict()["state"].items():
@@ -153,6 +154,7 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
     groups = learner.optimizer.state_dict()["param_groups"]
     learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
     training.lanes.start_at(*header["lanes"])
+    training.early[...] = tensors["early"].numpy()
     parts = _part(tensors, "lanes")
     for name, array in training.lanes.state._asdict().items():
         array[...] = _array(parts[name], array.dtype).reshape(array.shape)

@@ -60,6 +60,10 @@ class TrainingConfig(_Settings):
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
     )
+    early_returns: Share = Field(
+        0.0,
+        description="share of UAVs that come home, in training, as soon as they may charge there",
+    )
     phases: tuple[Phase, ...] = Field(min_length=1, description="of Algorithm 1, in order")
     lanes: Count = Field(64, description="missions that fly side by side")
     prefill: Count = Field(1000, description="slots per lane flown at random before learning")
@@ -95,6 +99,8 @@ class TrainingConfig(_Settings):
             raise ValueError(f"replay: {self.replay} is not above steps {self.steps} + 1")
         if self.prefill <= self.steps:
             raise ValueError(f"prefill: {self.prefill} is not above steps {self.steps}")
+        if self.observation == "relations" and len(self.hidden) < 2:
+            raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
         names = [phase.name for phase in self.phases]
         if len(set(names)) < len(names):
             raise ValueError(f"phases: {names} are not distinct")

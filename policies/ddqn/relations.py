@@ -6,8 +6,8 @@ A network that treats all nodes alike learns once what a node five slots to the 
 import numpy as np
 
 from dess.compiled import kernel
-from policies.ddqn.snapshot import BATTERY, MUST_CHARGE, NEEDED, Layout, Snapshots, X, Y
-from policies.ddqn.vector import DATA_UNIT, SCALES, Vector, lead_of
+from policies.ddqn.snapshot import Layout, Snapshots, X, Y
+from policies.ddqn.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
 
 NODE = 22
 
@@ -27,9 +27,7 @@ class Relations:
         self._nearness = np.exp(-slots / SCALES[:, None])
         between = np.abs(layout.nodes[:, None] - layout.nodes[None]).sum(2)
         self._around = np.stack([np.exp(-between / 6.0) / 25.0, np.exp(-between / 12.0) / 80.0])
-        x, y, width, height = layout.zone
-        near = np.clip(layout.nodes, [x, y], [x + width - 1, y + height - 1])
-        self._home = np.abs(layout.nodes - near).sum(1)
+        self._home = layout.zone_slots(layout.nodes)
 
     def encode(
         self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
@@ -58,7 +56,6 @@ def _encode(snapshots, rows_mission, rows_uav, nodes, nearness, around, home, ou
             dx, dy = nodes[k, 0] - me[X], nodes[k, 1] - me[Y]
             slots = abs(dx) + abs(dy)
             lead = lead_of(team, i, nodes[k, 0], nodes[k, 1], slots)
-            left = me[BATTERY] - 1 - home[k] if me[MUST_CHARGE] else me[NEEDED]
             units = data[k] / DATA_UNIT
             line[0] = units
             line[1] = units * nearness[0, slots]
@@ -72,8 +69,8 @@ def _encode(snapshots, rows_mission, rows_uav, nodes, nearness, around, home, ou
             line[9] = min(max(lead / 10.0, -1.0), 1.0)
             line[10] = min(lead + slots, 40) / 30.0
             line[11] = home[k] / 30.0
-            line[12] = min(max((left - slots) / 30.0, -1.0), 1.0)
-            line[13] = left >= slots
+            line[12] = spare_slots(me, home[k], slots)
+            line[13] = line[12] >= 0.0
             line[14] = dx > 0
             line[15] = dx < 0
             line[16] = dy > 0

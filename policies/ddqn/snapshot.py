@@ -52,6 +52,12 @@ class Layout(NamedTuple):
     zone: np.ndarray
     nodes: np.ndarray
 
+    def zone_slots(self, cells: np.ndarray) -> np.ndarray:
+        """(N,) slots from each of (N, 2) cells to the nearest cell of the zone."""
+        x, y, width, height = self.zone
+        nearest = np.clip(cells, [x, y], [x + width - 1, y + height - 1])
+        return np.abs(cells - nearest).sum(1)
+
 
 def layout_of(space: ScenarioSpace) -> Layout:
     """The layout of a space."""

@@ -18,6 +18,7 @@ from dess.batch import simulate_batch
 from dess.compiled import kernel
 from dess.lanes import Lanes
 from dess.scenario import ScenarioSpace, load_scenario
+from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import Phase, TrainingConfig
 from policies.ddqn.learner import Learner
 from policies.ddqn.maps import Maps
@@ -25,7 +26,21 @@ from policies.ddqn.network import DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.relations import Relations
 from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.snapshot import ACTIVE, CHARGING, Layout, layout_of, masks, snapshot
+from policies.ddqn.snapshot import (
+    ACTIVE,
+    BATTERY,
+    CHARGE_START,
+    CHARGING,
+    LATCH,
+    MUST_CHARGE,
+    Layout,
+    Snapshots,
+    X,
+    Y,
+    layout_of,
+    masks,
+    snapshot,
+)
 from policies.ddqn.vector import Vector
 
 MISSION_SEED = 500_000_000
@@ -155,6 +170,7 @@ class Training:
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.lanes = Lanes(self.phase_space, config.lanes, MISSION_SEED + config.seed)
         self.lanes.start_at(self.lanes.seed, index * 2**28)
+        self.early = np.zeros((config.lanes, fleet), bool)
         self._launch(self.lanes.numbers)
         self.replay = ReplayMemory(config.replay, config.lanes, fleet, nodes)
         self.learner.restart()
@@ -162,8 +178,10 @@ class Training:
         self.best_score: float | None = None
 
     def _launch(self, lanes: np.ndarray) -> None:
-        """Start new missions, some of them in the zone on a low battery."""
+        """Start new missions, some of them in the zone on a low battery; who returns early?"""
         self.lanes.launch(lanes)
+        draws = self.generator.random((len(lanes), self.early.shape[1]))
+        self.early[lanes] = draws < self.config.early_returns
         if self.config.low_battery_starts > 0 and len(lanes):
             low = lanes[self.generator.random(len(lanes)) < self.config.low_battery_starts]
             draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
@@ -203,7 +221,25 @@ class Training:
         if self.phase.temperature > 0.0:  # the Gumbel trick draws from the softmax
             values = values / self.phase.temperature - np.log(-np.log(noise))
         choice = np.where(allowed, values, -np.inf).argmax(1)
+        if self.config.early_returns > 0.0:
+            homeward = allowed & self._homeward(states, missions, uavs)
+            choice = np.where(homeward.any(1), np.where(homeward, noise, -1.0).argmax(1), choice)
         return np.where(self.generator.random(len(choice)) < epsilon, chance, choice)
+
+    def _homeward(self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
+        """(R, 5) mask of the actions of those on an early return, who come home with C_S left.
+
+        They lead nearer to the zone; in it, once it may charge, a UAV hovers.
+        """
+        rows, layout = states.uavs[missions, uavs], layout_of(self.space)
+        cells = rows[:, [X, Y]].astype(np.int64)
+        home = layout.zone_slots(cells)
+        reserve = rows[:, BATTERY] - states.missions[missions, CHARGE_START]
+        due = self.early[missions, uavs] & (rows[:, MUST_CHARGE] > 0) & (reserve <= home)
+        steps = np.stack([STEP_X, STEP_Y], 1)
+        nearer = np.stack([layout.zone_slots(cells + step) < home for step in steps], 1)
+        nearer[:, HOVER] = (home == 0) & (rows[:, LATCH] > 0)
+        return nearer & due[:, None]
 
     def _evaluate(self) -> None:
         """Fly the missions that select the weights; keep the best by moving average."""

@@ -29,6 +29,7 @@ from policies.ddqn.snapshot import (
 
 MATES = 2  # teammates described one by one, the nearest first
 _OWN = 16
+_NODE = 4
 _MATE = 11
 # Nearness of a node to a cell: exp(-slots / scale), one picture per scale [slots]; what the sum of
 # data times nearness is divided by.
@@ -50,7 +51,8 @@ class Vector:
         self.layout = layout
         slots = np.arange(2 * layout.grid + 2)
         self._nearness = np.exp(-slots / SCALES[:, None])
-        own = _OWN + 2 * layout.grid + 3 * len(layout.nodes)
+        self._home = layout.zone_slots(layout.nodes)
+        own = _OWN + 2 * layout.grid + _NODE * len(layout.nodes)
         self.shapes = ((own + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
 
     def encode(
@@ -58,12 +60,13 @@ class Vector:
     ) -> tuple[np.ndarray, ...]:
         """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``: (R, F) float32."""
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
-        _encode(snapshots, missions, uavs, self.layout.grid, self.layout.nodes, self._nearness, out)
+        grid, nodes = self.layout.grid, self.layout.nodes
+        _encode(snapshots, missions, uavs, grid, nodes, self._home, self._nearness, out)
         return (out,)
 
 
 @kernel
-def _encode(snapshots, rows_mission, rows_uav, grid, nodes, nearness, out):
+def _encode(snapshots, rows_mission, rows_uav, grid, nodes, home, nearness, out):
     count = len(nodes)
     free = np.empty(count, np.float32)  # data at nodes that no teammate is nearer to
     for row in range(len(rows_mission)):
@@ -83,7 +86,8 @@ def _encode(snapshots, rows_mission, rows_uav, grid, nodes, nearness, out):
             line[at + k] = data[k] / DATA_UNIT
             line[at + count + k] = data[k] / DATA_UNIT * nearness[1, slots]
             line[at + 2 * count + k] = min(max(lead / _FAR, -1.0), 1.0)
-        at += 3 * count
+            line[at + 3 * count + k] = spare_slots(me, home[k], slots)
+        at += _NODE * count
         at = _actions(me, team, i, data, free, nodes, nearness, line, at)
         _mates(team, i, line, at)
 
@@ -116,6 +120,13 @@ def _own(mission, team, i, data, line):
     line[14] = active == 1
     line[15] = total / (len(data) * DATA_UNIT)
     return _OWN
+
+
+@kernel
+def spare_slots(me, home, slots):
+    """Slots in hand if the UAV visits a node, then charges if it must; 20 or more count as one."""
+    left = me[BATTERY] - 1 - home if me[MUST_CHARGE] else me[NEEDED]
+    return min(max((left - slots) / 20.0, -1.0), 1.0)
 
 
 @kernel

@@ -9,8 +9,13 @@ import pytest
 import policies
 from dess.errors import InputError
 from dess.mission import simulate
-from dess.scenario import Scenario
+from dess.scenario import Scenario, load_scenario
+from policies import registry
 from policies.base import Policy
+from policies.ddqn.checkpoint import save_policy
+from policies.ddqn.config import config_of
+from policies.ddqn.snapshot import layout_of
+from policies.ddqn.training import build
 from policies.registry import SHIPPED
 
 OUTSIDE = """
@@ -74,6 +79,54 @@ def test_unknown_names_are_refused(text: str) -> None:
     assert line.startswith("policy: ")
     assert "\n" not in line
     assert all(name in line for name in SHIPPED)
+
+
+def _trained(folder: Path) -> Path:
+    """The folder of a policy that is called ``novice`` and has learned nothing."""
+    settings = {"name": "novice", "hidden": [8], "phases": [{"name": "none", "ticks": 1}]}
+    config, space = config_of(settings, "here"), load_scenario("paper")
+    _, network = build(config, layout_of(space))
+    save_policy(folder, network.state_dict(), config, space)
+    return folder
+
+
+def test_a_trained_policy_loads_from_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = _trained(tmp_path / "runs" / "first")
+    for name in (folder, str(folder)):
+        policy = policies.load(name)
+        assert isinstance(policy, Policy)
+        assert policy.name == "novice"
+    monkeypatch.chdir(tmp_path)
+    team = policies.load_team("runs/first, greedy,./runs/first/")
+    assert [policy.name for policy in team] == ["novice", "greedy", "novice"]
+    assert np.isfinite(simulate(Scenario.of(uavs=3), team, 0).reward)
+
+
+def test_a_shipped_trained_policy_loads_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _trained(tmp_path / "novice")
+    (tmp_path / "no-policy").mkdir()
+    monkeypatch.setattr(registry, "TRAINED", tmp_path)
+    assert policies.names()[: len(SHIPPED) + 1] == [*SHIPPED, "novice"]
+    assert policies.load("novice").name == "novice"
+    with pytest.raises(InputError, match="'no-policy' is unknown; allowed: .*novice"):
+        policies.load("no-policy")
+
+
+def test_a_folder_without_a_policy_is_unknown(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none"):
+        with pytest.raises(InputError, match="or the folder of a trained policy$"):
+            policies.load(path)
+
+
+def test_a_damaged_trained_policy_is_named(tmp_path: Path) -> None:
+    folder = _trained(tmp_path / "first")
+    (folder / "model.safetensors").write_bytes(b"")
+    with pytest.raises(InputError, match=f"^{folder / 'model.safetensors'}: "):
+        policies.load(folder)
 
 
 @pytest.mark.usefixtures("outside")

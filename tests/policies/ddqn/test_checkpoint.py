@@ -67,8 +67,14 @@ def _refusal(load: Callable[..., Any], *arguments: Any) -> str:
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"guard": False}, {"precision": "bfloat16"}, {"observation": "maps", "batch": 2}],
-    ids=["vector", "free", "bfloat16", "maps"],
+    [
+        {},
+        {"guard": False},
+        {"precision": "bfloat16"},
+        {"observation": "relations"},
+        {"observation": "maps"},
+    ],
+    ids=["vector", "free", "bfloat16", "relations", "maps"],
 )
 def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) -> None:
     training = Training(tiny(**changes), CPU)
@@ -77,8 +83,8 @@ def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) 
     assert sorted(files_of(tmp_path / "new" / "policy")) == [CONFIG, MODEL]
     loaded, saved = load_policy(tmp_path / "new" / "policy"), training.policy(weights)
     assert (loaded.name, loaded.guarded) == ("tiny", training.config.guard)
-    for ours, theirs in zip(loaded.layout, saved.layout, strict=True):
-        assert np.array_equal(ours, theirs)
+    for part in loaded.layout._fields:
+        assert np.array_equal(getattr(loaded.layout, part), getattr(saved.layout, part))
     # It computes in double precision; so does the other one for this comparison.
     saved.network.double()
     saved._weight = next(saved.network.parameters())
@@ -181,7 +187,7 @@ def test_a_pickle_is_refused_and_not_run(folder: Path, file: Path, tmp_path: Pat
     assert str(folder / MODEL) in _refusal(load_policy, folder)
     assert str(file) in _refusal(load_training, file, tiny(), CPU)
     assert not trace.exists()
-    torch.load(file, weights_only=False)
+    torch.load(file.rename(tmp_path / "pickle"), weights_only=False)
     assert trace.exists()  # it would have
 
 
@@ -298,7 +304,6 @@ def test_the_checkpoint_of_another_version_is_refused(training: Training, file: 
         {"replay.reward": torch.zeros(3, 3)},
         {"random.torch": None},
         {"random.torch": torch.zeros(3)},
-        {"optimizer.0.exp_avg": None},
         {"optimizer.x": torch.zeros(1)},
         {"losses.loss": torch.zeros(9)},
     ],

@@ -23,6 +23,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"hidden": [16, 0]}, "hidden.1: "),
     ({"hidden": 16}, "hidden: "),
     ({"observation": "radar"}, "observation: "),
+    ({"observation": "relations", "hidden": [8]}, "hidden: [8] "),
     ({"precision": "float16"}, "precision: "),
     ({"loss": "l1"}, "loss: "),
     ({"discount": 1.5}, "discount: "),

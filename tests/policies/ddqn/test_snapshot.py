@@ -34,7 +34,14 @@ from policies.ddqn.snapshot import (
 from policies.guard import guard
 from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces, teams
 
-FIELDS = {X: "x", Y: "y", BATTERY: "battery", ACTIVE: "active", LATCH: "latch", CHARGING: "charging"}
+FIELDS = {
+    X: "x",
+    Y: "y",
+    BATTERY: "battery",
+    ACTIVE: "active",
+    LATCH: "latch",
+    CHARGING: "charging",
+}
 
 
 class _Compared:

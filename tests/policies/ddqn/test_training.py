@@ -60,8 +60,12 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
 
 @pytest.mark.parametrize(
     "changes",
-    [{"average_rate": 1.0, "updates": 2}, {"precision": "bfloat16", "guard": False}],
-    ids=["online alone", "bfloat16"],
+    [
+        {"average_rate": 1.0, "updates": 2},
+        {"precision": "bfloat16", "guard": False},
+        {"observation": "relations", "hidden": [8, 16, 16]},
+    ],
+    ids=["online alone", "bfloat16", "relations"],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
     config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
@@ -289,7 +293,7 @@ def test_the_prefill_is_random(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_low_starts_are_low_latched_and_near_their_quota() -> None:
     training = Training(tiny(low_battery_starts=1.0, lanes=200), CPU)
-    missions, uavs = training.lanes.state.missions, training.lanes.state.uavs
+    missions, uavs, residual = training.lanes.state
     present = uavs["active"]
     start = np.broadcast_to(missions["charge_start"][:, None], present.shape)
     assert (uavs["battery"] <= start)[present].all()
@@ -297,12 +301,20 @@ def test_low_starts_are_low_latched_and_near_their_quota() -> None:
     assert (uavs["battery"] == start)[present].any()
     assert uavs["latch"][present].all()
     assert not uavs["battery"][~present].any()
+    lowest = np.where(present, uavs["battery"], 100).min(1)
+    assert (uavs["battery"].max(1) == lowest).all()  # they have flown together
     flown = missions["flying_time"][:, None] - uavs["battery"]
     filled = np.minimum(4 * flown, missions["quota"][:, None] - 1)
     assert (uavs["communications"] == filled)[present].all()
     x, y, width, height = training.space.zone
     assert ((uavs["x"] >= x) & (uavs["x"] < x + width))[present].all()
     assert ((uavs["y"] >= y) & (uavs["y"] < y + height))[present].all()
+    # Of the nodes any share is empty; the others are as they were.
+    assert residual[residual > 0].min() >= training.space.initial_data[0]
+    shares = (residual == 0).mean(1)
+    assert shares.mean() == pytest.approx(0.5, abs=5 * np.sqrt(1 / 12 / 200))
+    assert shares.min() < 0.1
+    assert shares.max() > 0.9
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
@@ -312,6 +324,7 @@ def test_the_share_of_low_starts(share: float) -> None:
     low = uavs["battery"][:, 0] < missions["flying_time"]
     assert low.mean() == pytest.approx(share, abs=5 * np.sqrt(share * (1 - share) / 1000))
     assert (uavs["latch"][:, 0] == low).all()
+    assert training.lanes.state.residual[~low].all()
 
 
 # --- curves ---

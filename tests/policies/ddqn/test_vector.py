@@ -41,11 +41,11 @@ class Parts:
     """The observation of one UAV, cut into its parts."""
 
     def __init__(self, line: np.ndarray, nodes: int, grid: int = GRID):
-        sizes = [OWN, grid, grid, nodes, nodes, nodes, 5 * ACTION, 2 * MATE]
+        sizes = [OWN, grid, grid, *[nodes] * 4, 5 * ACTION, 2 * MATE]
         assert len(line) == sum(sizes)
         cut = np.split(line.astype(float), np.cumsum(sizes)[:-1])
-        self.own, self.column, self.row, self.data, self.near, self.lead, *_ = cut
-        self.actions, self.mates = cut[6].reshape(5, ACTION), cut[7].reshape(2, MATE)
+        self.own, self.column, self.row, self.data, self.near, self.lead, self.spare, *_ = cut
+        self.actions, self.mates = cut[7].reshape(5, ACTION), cut[8].reshape(2, MATE)
 
 
 def _team(*uavs: dict[int, int], residual: tuple[float, ...] = (0.0,)) -> Snapshots:
@@ -111,6 +111,18 @@ def test_a_node_under_the_uav_and_one_four_slots_east() -> None:
         ]
         # Allowed, nobody there, the data nearby, and all of it is free.
         assert seen.actions[action] == pytest.approx([1, 0, *sums, *sums])
+
+
+def test_which_nodes_it_has_slots_for() -> None:
+    # 3, 8 and 21 slots away, and 7, 12 and 22 from the zone's nearest cell.
+    layout = _layout((19, 5), (18, 9), (4, 5))
+    me = {X: 22, Y: 5, BATTERY: 12, NEEDED: 9}
+    # Without need to charge there are nine slots to fly.
+    seen = _observe(layout, _team(me, residual=(1.0, 1.0, 1.0)))
+    assert seen.spare == pytest.approx([(9 - 3) / 20, (9 - 8) / 20, (9 - 18) / 20])
+    # With it there are eleven, and the way back to the zone.
+    seen = _observe(layout, _team(me | {MUST_CHARGE: 1}, residual=(1.0, 1.0, 1.0)))
+    assert seen.spare == pytest.approx([(11 - 3 - 7) / 20, (11 - 8 - 12) / 20, -1])
 
 
 def test_what_is_not_allowed_is_marked() -> None:

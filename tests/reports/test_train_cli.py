@@ -1,0 +1,164 @@
+"""``dess train``: what it writes, what it refuses, and that Ctrl-C loses nothing."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+
+import pytest
+import torch
+
+import policies
+from policies.ddqn.checkpoint import load_training
+from policies.ddqn.config import load_config
+from reports import cli
+from tests.analysis.small import files_of
+from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, one_thread, write_config
+
+SHORT = {
+    "phases": [phase | {"ticks": 10} for phase in PHASES],
+    "prefill": 20,
+    "evaluate_every": 5,
+}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _one_thread():
+    with one_thread():
+        yield
+
+
+@pytest.fixture
+def dess(tmp_path, monkeypatch, capsys):
+    """Runs the command in a folder with a config: exit code, stdout, stderr."""
+    write_config(tmp_path, **SHORT)
+    monkeypatch.chdir(tmp_path)
+    # TensorBoard takes its time; all works without.
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+
+    def run(*arguments):
+        code = cli.main([str(argument) for argument in arguments])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_a_training_leaves_a_policy_that_flies(dess, tmp_path):
+    code, out, err = dess("train", "tiny.toml", "--out", "runs/tiny", "--device", "cpu")
+    assert code == 0
+    assert out.startswith("runs/tiny: 20 updates, ")
+    assert "best product 0." in out
+    assert "replay memory: " in err
+    names = ["checkpoint.safetensors", "config.json", "model.safetensors", "training.parquet"]
+    assert list(files_of(tmp_path / "runs" / "tiny")) == names
+    assert policies.load("runs/tiny").name == "tiny"
+
+    code, out, _ = dess("evaluate", "--policy", "runs/tiny", "--missions", 5, "--json")
+    assert code == 0
+    (row,) = json.loads(out)
+    assert (row["policy"], row["missions"]) == ("runs/tiny", 5)
+    assert 0 <= row["collection_ratio"]["mean"] <= 1
+    arguments = ("--policy", "runs/tiny,greedy", "--set", "uavs=2", "--json")
+    code, out, _ = dess("simulate", *arguments)
+    assert code == 0
+    assert len(json.loads(out)["uavs"]) == 2
+    # A mission elsewhere is refused.
+    code, out, err = dess("simulate", "--policy", "runs/tiny", "--set", "zone=[2,2,4,4]")
+    assert (code, out) == (2, "")
+    assert "has learned zone_x 26, not 2" in err
+
+
+def test_the_seed_can_be_set(dess):
+    assert dess("train", "tiny.toml", "--out", "a", "--seed", 5)[0] == 0
+    assert dess("train", "tiny.toml", "--out", "b")[0] == 0
+    weights = [policies.load(name).weights for name in ("a", "b")]
+    assert weights[0] != weights[1]
+    code, _, err = dess("train", "tiny.toml", "--out", "a", "--resume")
+    assert code == 2
+    assert "of another config (seed differ)" in err
+    assert dess("train", "tiny.toml", "--out", "a", "--resume", "--seed", 5)[0] == 0
+
+
+# Arguments, and what the line on stderr must name.
+BAD = {
+    "train nope --out out": ["nope: no such config", "or a TOML file"],
+    "train . --out out": [".: cannot be read"],
+    "train tiny.toml": ["--out"],
+    "train tiny.toml --out out --device tpu": ["--device", "'auto', 'cpu', 'cuda'"],
+    "train tiny.toml --out out --device cuda": ["no CUDA device", "auto, cpu"],
+    "train tiny.toml --out out --seed -1": ["tiny.toml: seed", "-1"],
+    "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
+    "train tiny.toml --out tiny.toml": ["tiny.toml: cannot be written"],
+    "train tiny.toml --out done": ["done: holds a training", "--resume", "another folder"],
+    "train other.toml --out done --resume": ["of another config (lanes differ)"],
+    "evaluate --policy broken": ["broken/config.json: no readable description of a policy"],
+    "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
+}
+
+
+@pytest.mark.parametrize("arguments", BAD)
+def test_bad_input_gets_one_line_and_changes_nothing(arguments, dess, tmp_path, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    if "done" in arguments:
+        assert dess("train", "tiny.toml", "--out", "done")[0] == 0
+        text = (tmp_path / "tiny.toml").read_text().replace("lanes = 8", "lanes = 4")
+        (tmp_path / "other.toml").write_text(text)
+    for name in ("broken", "empty"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "broken" / "config.json").write_text("{}")
+    before = files_of(tmp_path)
+    code, out, err = dess(*arguments.split(" "))
+    assert (code, out) == (2, "")
+    *notes, line = err.splitlines()
+    assert line.startswith("dess: error: ")
+    for note in notes:
+        assert note.startswith(("replay memory: ", "compiling the simulator"))
+    for part in BAD[arguments]:
+        assert part in line
+    assert files_of(tmp_path) == before
+
+
+def test_a_bad_config_is_named_with_its_key(dess, tmp_path):
+    write_config(tmp_path, **SHORT, speed=3)
+    code, out, err = dess("train", "tiny.toml", "--out", "out")
+    assert (code, out) == (2, "")
+    assert err.startswith("dess: error: tiny.toml: speed: unknown key")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_path):
+    # Long enough to be caught in the middle.
+    phases = [PHASES[0] | {"ticks": 40}, PHASES[1] | {"ticks": 300}]
+    config = write_config(tmp_path, phases=phases, evaluate_every=100)
+    arguments = ("train", "tiny.toml", "--device", "cpu", "--out")
+    command = [sys.executable, "-m", "reports.cli", *arguments, "out"]
+    environment = {"PYTHONPATH": os.pathsep.join(sys.path), "OMP_NUM_THREADS": "1"}
+    # A background job of a shell ignores SIGINT, and its children with it: not this one.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(
+        command, env=os.environ | environment, preexec_fn=heed, **pipes
+    ) as running:
+        while not (tmp_path / "out" / "training.parquet").exists():
+            assert running.poll() is None
+            time.sleep(0.01)
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate()
+    assert (running.returncode, out) == (1, "")
+    stopped = load_training(tmp_path / "out" / "checkpoint.safetensors", load_config(config), CPU)
+    assert 0 < stopped.tick < 340
+    hint = f"interrupted at tick {stopped.tick}: go on with dess train tiny.toml --out out --resume"
+    assert err.splitlines()[-1] == hint
+    assert "Traceback" not in err
+    assert not [name for name in files_of(tmp_path) if name.endswith(".new")]
+
+    assert dess(*arguments, "out", "--resume")[0] == 0
+    assert dess(*arguments, "undisturbed")[0] == 0
+    names = ("out", "undisturbed")
+    assert len({policies.load(name).weights for name in names}) == 1
+    paths = [tmp_path / name / "checkpoint.safetensors" for name in names]
+    assert_same(*(load_training(path, load_config(config), CPU) for path in paths))
