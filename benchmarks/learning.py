@@ -28,16 +28,20 @@ def _variants() -> dict[str, dict[str, Any]]:
     quick = load_config("quick")
     last = quick.phases[-1].model_dump()
     alone = {"phases": [last | {"ticks": quick.ticks}]}
+    means = {"guard": False, "low_battery_starts": 0.0, "early_returns": 0.0}
     return {
-        "transfer": {},
+        "quick": {},
         "no transfer": alone,
-        "1-step returns": {"steps": 1},
         "no guard": {"guard": False},
-        "no guard, no transfer": {"guard": False} | alone,
-        "no guard, low-battery starts": {"guard": False, "low_battery_starts": 0.2},
-        "no guard, no transfer, low-battery starts": {"guard": False, "low_battery_starts": 0.2}
-        | alone,
-        "low-battery starts": {"low_battery_starts": 0.2},
+        "no low-battery starts": {"low_battery_starts": 0.0},
+        "no early returns": {"early_returns": 0.0},
+        "neither of both": {"low_battery_starts": 0.0, "early_returns": 0.0},
+        "none of the three": means,
+        "none of the three, no transfer": means | alone,
+        "1-step returns": {"steps": 1},
+        "discount 0.99": {"discount": 0.99},
+        "64 lanes": {"lanes": 64, "replay": 8000},
+        "relations": {"observation": "relations", "hidden": (64, 256, 256)},
         "maps": {"observation": "maps"},
     }
 
