@@ -32,9 +32,21 @@ Tensors = dict[str, torch.Tensor]
 
 
 def save_policy(
-    folder: Path, weights: Mapping[str, torch.Tensor], config: TrainingConfig, space: ScenarioSpace
+    folder: Path,
+    weights: Mapping[str, torch.Tensor],
+    config: TrainingConfig,
+    space: ScenarioSpace,
+    run: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a trained policy into a folder: the weights, then what they are the weights of."""
+    """Write a trained policy into a folder: the weights, then what they are the weights of.
+
+    Args:
+        folder: The folder.
+        weights: Of the network.
+        config: What they were trained by.
+        space: The missions that they were trained on.
+        run: How the training went: for readers, not for ``load_policy``.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
     _replace(folder / MODEL, lambda path: save_file(tensors, path, {"format": str(FORMAT)}))
@@ -43,6 +55,7 @@ def save_policy(
         "name": config.name,
         "layout": _plain(layout_of(space)),
         "training": config.model_dump(mode="json"),
+        "run": dict(run or {}),
     }
     text = json.dumps(content, indent=2) + "\n"
     _replace(folder / CONFIG, lambda path: path.write_text(text, "utf-8"))

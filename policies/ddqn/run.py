@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
 
+import dess
 from dess.errors import InputError
 from dess.scenario import load_scenario
 from policies.ddqn.checkpoint import (
@@ -109,12 +110,26 @@ def train(
             if progress:
                 progress(training, 1)
         save_training(path, training)
+    if training.curve:
+        _save_results(out, training)
     return training
 
 
 def _save_results(out: Path, training: Training) -> None:
     """Write the best policy so far and the curves."""
-    save_policy(out, training.best, training.config, training.space)
+    cuda = training.device.type == "cuda"
+    run = {
+        "dess": dess.__version__,
+        "torch": torch.__version__,
+        "device": torch.cuda.get_device_name(training.device) if cuda else "cpu",
+        "threads": torch.get_num_threads(),
+        "ticks": training.tick,
+        "updates": training.updates,
+        "uav_slots": training.uav_slots,
+        "seconds": round(training.seconds),
+        "selection_score": training.best_score,
+    }
+    save_policy(out, training.best, training.config, training.space, run)
     names = dict.fromkeys(name for row in training.curve for name in row)
     table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
     new = out / (CURVE + ".new")

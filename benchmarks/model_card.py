@@ -1,0 +1,138 @@
+"""Write what can be computed of a model card: policies/trained/NAME/README.md.
+
+Replaces the part between the two marks; what is written around them stays.
+
+    python benchmarks/model_card.py policies/trained/ddqn --command "dess train ddqn --out runs/ddqn"
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+import policies
+from analysis import paper
+from analysis.statistics import mean_interval, wilson
+from dess import load_scenario, simulate_batch
+from policies.ddqn.training import MISSION_SEED
+from policies.registry import SHIPPED
+
+BEGIN, END = "<!-- computed by benchmarks/model_card.py -->", "<!-- end of the computed part -->"
+# Never used by a training or a selection of weights, and for nothing else than these cards.
+EVALUATION_SEED = 20_261_121
+PRODUCT = "collection_ratio_and_communication"
+
+
+def _row(name: str, missions: np.ndarray) -> str:
+    """Success, collection ratio and product of missions with their intervals, as a table row."""
+    ends = [wilson(int(missions["success"].sum()), len(missions))]
+    ends += [mean_interval(missions[metric]) for metric in ("collection_ratio", PRODUCT)]
+    cells = [f"{100 * e.mean:.1f} % [{100 * e.low:.1f}, {100 * e.high:.1f}]" for e in ends]
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+HEAD = "| | success | collection ratio | product per mission |\n| --- | --- | --- | --- |"
+
+
+def card(folder: Path, command: str, missions: int) -> Iterator[str]:
+    """The computed part of a card, paragraph by paragraph."""
+    described = json.loads((folder / "config.json").read_text("utf-8"))
+    config, run = described["training"], described["run"]
+    curve = pd.read_parquet(folder / "training.parquet")
+    space, policy = load_scenario(config["scenario"]), policies.load(folder)
+    learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
+
+    yield "## Training"
+    phases = ", ".join(
+        f"{p['name']} ({p['ticks']} ticks{'' if p['battery'] else ', no battery decrease'})"
+        for p in config["phases"]
+    )
+    yield _list(
+        {
+            "Command": f"`{command}`",
+            "Config": f"`policies/ddqn/configs/{config['name']}.toml`, whole in `config.json`",
+            "Observation and network": f"{config['observation']}, {_count(policy):,} weights",
+            "Phases": phases,
+            "Hardware": f"{run['device']}, {run['threads']} thread(s), torch {run['torch']}",
+            "Wall time": f"{run['seconds'] / 60:.0f} min, beside other load",
+            "Updates": f"{run['updates']:,} of {config['batch']} transitions",
+            "Experience": f"{run['uav_slots']:,} UAV-slots",
+            "Seeds": f"training {config['seed']} (missions of seed {MISSION_SEED} + that); "
+            f"selection {config['evaluation_seed']}; evaluation below {EVALUATION_SEED}",
+            "Selection": f"moving average of {config['window']} evaluations of "
+            f"{config['evaluation_missions']} missions; best product {run['selection_score']:.4f}",
+        }
+    )
+    yield "The curve (`training.parquet`), product of the evaluations while training:"
+    rows = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 12).round().astype(int))]
+    table = ["| tick | phase | minutes | success | product |", "| --- | --- | --- | --- | --- |"]
+    table += [
+        f"| {r.tick} | {r.phase} | {r.seconds / 60:.0f} | {100 * r.evaluation_success:.1f} % "
+        f"| {100 * getattr(r, 'evaluation_' + PRODUCT):.1f} % |"
+        for r in rows.itertuples()
+    ]
+    yield "\n".join(table)
+
+    yield "## Evaluation"
+    yield (
+        f"Means over {missions} random missions of Table II (seed {EVALUATION_SEED}, 95 % "
+        f"intervals): `dess evaluate --policy {folder.name} --missions {missions} "
+        f"--seed {EVALUATION_SEED}`."
+    )
+    others = {
+        name: simulate_batch(space, policies.load(name), EVALUATION_SEED, missions).missions
+        for name in SHIPPED
+    }
+    rows = [_row(folder.name, learned)]
+    rows += [_row(f"{n} UAV(s)", learned[learned["uavs"] == n]) for n in np.unique(learned["uavs"])]
+    rows += [_row(f"`{name}`", other) for name, other in others.items()]
+    printed = " | ".join(f"{100 * value:.1f} %" for value in paper.TABLE_IV.values())
+    rows.append(f"| paper, Table IV | {printed} |")
+    yield "\n".join([HEAD, *rows])
+    best = max(others, key=lambda name: others[name][PRODUCT].mean())
+    gain = mean_interval(100 * (learned[PRODUCT] - others[best][PRODUCT]))
+    yield (
+        f"Against `{best}`, the best heuristic, on the same missions, paired: the product is "
+        f"{gain.mean:+.2f} points [{gain.low:.2f}, {gain.high:.2f}]."
+    )
+    rows = [
+        _row(f"I = {n}", simulate_batch(case, policy, EVALUATION_SEED, missions).missions)
+        for n, case in ((n, load_scenario("fig4", uavs=n)) for n in (1, 2, 3))
+    ]
+    for n, printed in paper.FIG_4.items():
+        cells = f"{100 * printed['success']:.1f} % | {100 * printed['collection_ratio']:.1f} % | "
+        rows.append(f"| paper, I = {n} | {cells}not printed |")
+    yield f"The cases of Fig. 4, {missions} missions each:"
+    yield "\n".join([HEAD, *rows])
+
+
+def _count(policy: Any) -> int:
+    return sum(weight.numel() for weight in policy.network.parameters())
+
+
+def _list(entries: dict[str, str]) -> str:
+    return "\n".join(f"- {name}: {text}" for name, text in entries.items())
+
+
+def main() -> None:
+    """Write the computed part into the card."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--command", required=True, help="that trained it")
+    parser.add_argument("--missions", type=int, default=1000)
+    arguments = parser.parse_args()
+    path = arguments.folder / "README.md"
+    text = path.read_text("utf-8") if path.exists() else f"# {arguments.folder.name}\n\n"
+    before, _, rest = text.partition(BEGIN)
+    after = rest.partition(END)[2]
+    parts = card(arguments.folder, arguments.command, arguments.missions)
+    computed = "\n\n".join([BEGIN, *parts, END])
+    path.write_text(before + computed + (after or "\n"), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
