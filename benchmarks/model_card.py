@@ -2,7 +2,7 @@
 
 Replaces the part between the two marks; what is written around them stays.
 
-    python benchmarks/model_card.py policies/trained/ddqn --command "dess train ddqn --out runs/ddqn"
+    python benchmarks/model_card.py policies/trained/ddqn --command "dess train ddqn --out DIR"
 """
 
 import argparse

@@ -121,6 +121,16 @@ def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
     assert mask[[NORTH, SOUTH, WEST, HOVER]].all()
 
 
+def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> None:
+    # Both want the cell between them; the one with less battery goes first.
+    first, second = {"x": 10, "y": 10, "battery": 50}, {"x": 10, "y": 12, "battery": 60}
+    open_to_both = _mask([first, second])
+    assert open_to_both[0, SOUTH] and open_to_both[1, NORTH]
+    collided = _mask([first | {"overruled": True}, second | {"overruled": True}])
+    assert collided[0, SOUTH] and not collided[1, NORTH]
+    assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fleet", [2, 3])
 def test_guarded_random_teams_seldom_fail(fleet: int) -> None:

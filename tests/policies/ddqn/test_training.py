@@ -13,6 +13,7 @@ from dess.record import empty_records
 from dess.scenario import ScenarioSpace
 from policies.ddqn import training as module
 from policies.ddqn.checkpoint import load_training, save_training
+from policies.ddqn.replay import Batch
 from policies.ddqn.snapshot import ACTIVE, CHARGING, masks, snapshot
 from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
 from tests.policies.ddqn.tiny import (
@@ -61,11 +62,11 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
 @pytest.mark.parametrize(
     "changes",
     [
-        {"average_rate": 1.0, "updates": 2},
-        {"precision": "bfloat16", "guard": False},
+        {"average_rate": 1.0, "updates": 2, "precision": "bfloat16"},
+        {"guard": False},
         {"observation": "relations", "hidden": [8, 16, 16]},
     ],
-    ids=["online alone", "bfloat16", "relations"],
+    ids=["online alone, bfloat16", "free", "relations"],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
     config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
@@ -124,7 +125,7 @@ def test_the_first_phase_spends_no_battery() -> None:
 
 def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
     training = _trained(Training(tiny(), CPU), 79)
-    before = set(training.lanes.state.missions["replication"].tolist())
+    flown = training.lanes.replication
     assert training.phase.name == "harvest"
     assert training.replay.count == training.config.prefill + 79
     assert training.learner.optimizer.state_dict()["state"]
@@ -134,7 +135,7 @@ def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
     assert not training.learner.optimizer.state_dict()["state"]
     missions = training.lanes.state.missions
     assert (missions["seed"] == MISSION_SEED + training.config.seed).all()
-    assert before.isdisjoint(missions["replication"].tolist())
+    assert missions["replication"].min() >= flown
     training.run(1)
     assert training.replay.count == training.config.prefill + 1
 
@@ -207,12 +208,31 @@ def test_the_best_weights_score_as_the_curve_says() -> None:
 # --- exploration ---
 
 
-def test_rates_move_over_their_phase() -> None:
+def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
     phases = [
         PHASES[0] | {"epsilon": [0.1, 0.1], "learning_rate": [1e-3, 1e-4]},
         PHASES[1] | {"epsilon": [0.5, 0.01], "epsilon_decay": 0.5, "learning_rate": [1e-4, 1e-4]},
     ]
-    training = _trained(Training(tiny(phases=phases, evaluate_every=20), CPU), 1000)
+    training = Training(tiny(phases=phases, evaluate_every=20), CPU)
+    fly, update = training._fly, training.learner.update
+    flown: list[float] = []
+    learned: list[float] = []
+
+    def note_fly(epsilon: float) -> None:
+        flown.append(epsilon)
+        fly(epsilon)
+
+    def note_update(batch: Batch, rate: float) -> Any:
+        learned.append(rate)
+        return update(batch, rate)
+
+    monkeypatch.setattr(training, "_fly", note_fly)
+    monkeypatch.setattr(training.learner, "update", note_update)
+    training.run(1000)
+    # The first phase is prefilled at random, the second as it begins.
+    falling = [0.5 - 0.49 * min(tick / 40, 1) for tick in range(80)]
+    assert flown == pytest.approx([1.0] * 60 + [0.1] * 80 + [0.5] * 60 + falling)
+    assert learned == pytest.approx([1e-3 - 9e-4 * tick / 80 for tick in range(80)] + [1e-4] * 80)
     rows = training.curve
     assert [row["tick"] for row in rows] == [20, 40, 60, 80, 100, 120, 140, 160]
     assert [row["phase"] for row in rows] == ["harvest"] * 4 + ["battery"] * 4
