@@ -5,6 +5,7 @@ weights of). A training under way is one file, ``checkpoint.safetensors``: all a
 header, as JSON, all that is no array.
 """
 
+import copy
 import hashlib
 import json
 import os
@@ -64,7 +65,8 @@ def save_policy(
 def load_policy(folder: Path) -> DDQN:
     """The policy of a folder that ``save_policy`` wrote.
 
-    It computes in double precision, so that an action hardly ever depends on the rounding of sums.
+    It looks at close decisions in double precision, so that an action does not depend on how many
+    are taken together.
 
     Raises:
         InputError: If a file is missing, damaged, of another version or of another shape.
@@ -84,7 +86,8 @@ def load_policy(folder: Path) -> DDQN:
     tensors, _ = _read(folder / MODEL)
     _fit(tensors, network.state_dict(), folder / MODEL)
     network.load_state_dict(tensors)
-    policy = DDQN(config.name, observation, network.double(), config.guard, layout)
+    policy = DDQN(config.name, observation, network, config.guard, layout)
+    policy.exact = copy.deepcopy(network).double()
     policy.weights = _digest(tensors)
     return policy
 

@@ -1,5 +1,6 @@
 """The learned policy: the allowed action of the highest value (eq. 25)."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ from dess.errors import InputError
 from dess.view import View
 from policies.ddqn.snapshot import Layout, masks, snapshot
 
-# Values are told apart by this many decimals, so that the rounding of sums, which depends on how
-# many rows are evaluated together, decides nothing.
-DECIMALS = 9
+# The rounding of sums depends on how many rows are evaluated together, and must decide nothing:
+# where the two best values are closer than this, they are computed again in double precision and
+# told apart by that many decimals.
+CLOSE, DECIMALS = 1e-3, 9
 
 
 class DDQN:
@@ -21,12 +23,14 @@ class DDQN:
     Attributes:
         name: The name that results carry.
         observation: What the network is told: ``encode(snapshots, missions, uavs)``.
-        network: Values of the five actions, in the precision of its weights.
+        network: Values of the five actions.
+        exact: The same network in double precision, for close decisions; None while weights change.
         guarded: Whether it chooses among the actions of the return guard only.
         layout: The grid, zone and nodes that it has learned.
         weights: A hash of the weights, for whoever keeps results; empty while they change.
     """
 
+    exact: nn.Module | None = None
     weights = ""
 
     def __init__(
@@ -34,7 +38,6 @@ class DDQN:
     ):
         self.name, self.observation, self.guarded = name, observation, guarded
         self.network, self.layout = network.eval(), layout
-        self._weight = next(network.parameters())
 
     @torch.inference_mode()
     def act(self, view: View) -> np.ndarray:
@@ -45,10 +48,16 @@ class DDQN:
         """
         self._check(view)
         states = snapshot(view.state, self.guarded)
+        allowed = masks(states, view.mission, view.uav)
         parts = self.observation.encode(states, view.mission, view.uav)
-        inputs = (torch.from_numpy(part).to(self._weight) for part in parts)
-        values = self.network(*inputs).cpu().numpy().round(DECIMALS)
-        return np.where(masks(states, view.mission, view.uav), values, -np.inf).argmax(1)
+        values = np.where(allowed, _values(self.network, parts), -np.inf)
+        if self.exact is not None:
+            second, best = np.partition(values, -2)[:, -2:].T
+            close = best - second < CLOSE
+            if close.any():
+                exact = _values(self.exact, [part[close] for part in parts]).round(DECIMALS)
+                values[close] = np.where(allowed[close], exact, -np.inf)
+        return values.argmax(1)
 
     def _check(self, view: View) -> None:
         missions = view.state.missions[np.unique(view.mission)]
@@ -64,6 +73,12 @@ class DDQN:
             raise InputError(
                 f"policy {self.name}: has learned other nodes; allowed: those of its training"
             )
+
+
+def _values(network: nn.Module, parts: Iterable[np.ndarray]) -> np.ndarray:
+    """(R, 5) values, in the precision and on the device of the network's weights."""
+    weight = next(network.parameters())
+    return network(*(torch.from_numpy(part).to(weight) for part in parts)).cpu().numpy()
 
 
 _PLACE = ("grid", "zone_x", "zone_y", "zone_width", "zone_height")

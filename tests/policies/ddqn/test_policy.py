@@ -1,5 +1,6 @@
 """The policy: the best allowed action, the same in either engine, and at home only."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,14 @@ def _random(layout: Layout, guarded: bool = True, seed: int = 1) -> DDQN:
     """A policy of random weights."""
     torch.manual_seed(seed)
     vector = Vector(layout)
-    network = DuelingNetwork(vector.shapes[0][0], [32, 32]).double()
-    return DDQN("random weights", vector, network, guarded, layout)
+    network = DuelingNetwork(vector.shapes[0][0], [32, 32])
+    return _exact(DDQN("random weights", vector, network, guarded, layout))
+
+
+def _exact(policy: DDQN) -> DDQN:
+    """The policy with close decisions in double precision, as one that is loaded has it."""
+    policy.exact = copy.deepcopy(policy.network).double()
+    return policy
 
 
 class _Fixed(nn.Module):
@@ -47,7 +54,7 @@ class _Fixed(nn.Module):
 
 def _fixed(values: list[float], space: ScenarioSpace, guarded: bool = False) -> DDQN:
     layout = layout_of(space)
-    return DDQN("fixed", Vector(layout), _Fixed(values), guarded, layout)
+    return _exact(DDQN("fixed", Vector(layout), _Fixed(values), guarded, layout))
 
 
 class _Checked:
@@ -103,8 +110,8 @@ def test_both_engines_give_the_same_records_with_maps() -> None:
     torch.manual_seed(4)
     layout = layout_of(PAPER)
     maps = Maps(layout)
-    network = PaperNetwork(maps.shapes).double()
-    _assert_same_records(DDQN("maps", maps, network, True, layout), 63, 2, 2)
+    network = PaperNetwork(maps.shapes)
+    _assert_same_records(_exact(DDQN("maps", maps, network, True, layout)), 63, 2, 2)
 
 
 def _path(values: list[float], slots: int) -> list[tuple[float, float]]:
@@ -133,7 +140,7 @@ def test_rounding_decides_nothing() -> None:
 
 def test_a_network_computes_in_the_precision_of_its_weights() -> None:
     layout = layout_of(PAPER)
-    for network in (_random(layout).network, _random(layout).network.float()):
+    for network in (_random(layout).network, _random(layout).network.double()):
         policy = DDQN("any", Vector(layout), network, True, layout)
         assert not policy.network.training
         simulate(PAPER, policy, 64)

@@ -69,7 +69,7 @@ def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
     policy = policies.load(out)
     best = training.policy(training.best)
     weights = zip(policy.network.parameters(), best.network.parameters(), strict=True)  # type: ignore[attr-defined]
-    assert all(torch.equal(ours, theirs.double()) for ours, theirs in weights)
+    assert all(torch.equal(ours, theirs) for ours, theirs in weights)
     assert json.loads((out / CONFIG).read_text("utf-8"))["name"] == "tiny"
 
 

@@ -63,10 +63,10 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     "changes",
     [
         {"average_rate": 1.0, "updates": 2, "precision": "bfloat16"},
-        {"guard": False},
+        {"guard": False, "early_returns": 0.5},
         {"observation": "relations", "hidden": [8, 16, 16]},
     ],
-    ids=["online alone, bfloat16", "free", "relations"],
+    ids=["online alone, bfloat16", "free, early returns", "relations"],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
     config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
@@ -306,6 +306,29 @@ def test_the_prefill_is_random(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(AssertionError, match="was asked"):
         training.run(1)
     assert training.replay.count == training.config.prefill
+
+
+def _reserves(early_returns: float) -> np.ndarray:
+    """Battery above C_S of the UAVs that begin to charge, in a training that does not explore."""
+    phase = {"name": "one", "ticks": 75, "epsilon": [0.0, 0.0]}
+    settings = {"lanes": 40, "prefill": 4, "low_battery_starts": 0.0, "evaluate_every": 100}
+    training = Training(tiny(**settings, early_returns=early_returns, phases=[phase]), CPU)
+    missions, uavs, _ = training.lanes.state
+    begun = []
+    for _ in range(74):
+        before = uavs["battery"] - missions["charge_start"][:, None]
+        flying = uavs["active"] & ~uavs["charging"]
+        training.run(1)
+        begun += before[flying & uavs["charging"]].tolist()
+    return np.array(begun)
+
+
+def test_early_returns_come_home_as_soon_as_they_may_charge() -> None:
+    early, late = _reserves(1.0), _reserves(0.0)
+    assert len(early) > len(late) > 0
+    assert early.max() <= 0  # as the rules have it
+    assert np.median(early) >= -2
+    assert np.median(late) <= -10
 
 
 # --- missions that start low ---
