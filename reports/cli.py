@@ -237,11 +237,11 @@ def train(
     config = load_config(name, **({} if seed is None else {"seed": seed}))
     from policies.ddqn.run import memory_of, train
 
-    print(f"replay memory: {memory_of(config) / 2**20:,.0f} MiB", file=sys.stderr)
-    with _compile_notice(), _training(config.ticks) as progress:
+    with _compile_notice(), _training(config.ticks, memory_of(config)) as progress:
         training = train(config, out, resume=resume, device=device, progress=progress)
     if not training.done:
-        command = f"dess train {name} --out {out} --resume"
+        seeded = "" if seed is None else f" --seed {seed}"
+        command = f"dess train {name} --out {out}{seeded} --resume"
         raise typer.Exit(_fail(f"interrupted at tick {training.tick}: go on with {command}", 1))
     print(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
@@ -406,11 +406,13 @@ def _cells() -> "Iterator[Callable[[str, int, int], None]]":
 
 
 @contextmanager
-def _training(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
-    """Progress of a training on stderr, with the metrics of its last evaluation."""
+def _training(ticks: int, memory: int) -> "Iterator[Callable[[Training, int], None]]":
+    """Progress of a training on stderr: its replay memory [bytes], then its last evaluation."""
     with _bar("tick", ticks) as bar:
 
         def show(training: "Training", done: int) -> None:
+            if bar.n == 0:
+                print(f"replay memory: {memory / 2**20:,.0f} MiB", file=sys.stderr)
             bar.update(training.tick - bar.n)
             if training.curve:
                 last = training.curve[-1]

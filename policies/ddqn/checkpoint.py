@@ -88,7 +88,7 @@ def load_policy(folder: Path) -> DDQN:
     network.load_state_dict(tensors)
     policy = DDQN(config.name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
-    policy.weights = _digest(tensors)
+    policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])
     return policy
 
 
@@ -113,6 +113,7 @@ def save_training(path: Path, training: Training) -> None:
     header = {
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
+        "scenario": training.space.model_dump(mode="json"),
         "progress": training.progress(),
         "random": training.generator.bit_generator.state,
         "lanes": [training.lanes.seed, training.lanes.replication],
@@ -139,13 +140,14 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
         raise InputError(f"{path}: no checkpoint of a training: {error!r}") from None
     if version != FORMAT:
         raise InputError(f"{path}: format {version!r} is unknown; allowed: {FORMAT}")
-    ours = config.model_dump(mode="json")
-    if ours != theirs:
-        other = [key for key in ours | theirs if ours.get(key) != theirs.get(key)]
+    training = Training(config, device)
+    ours = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
+    theirs = config_of(theirs, str(path)).model_dump(mode="json")
+    theirs |= {"scenario": header.get("scenario")}
+    if other := [key for key in ours if ours[key] != theirs[key]]:
         raise InputError(
             f"{path}: of another config ({', '.join(other)} differ); allowed: the one it began with"
         )
-    training = Training(config, device)
     for name, network in _networks(training).items():
         _fit(_part(tensors, name), network, path)
     try:
@@ -189,9 +191,9 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
     torch.set_rng_state(tensors["random.torch"])
 
 
-def _digest(tensors: Tensors) -> str:
-    """A hash of weights."""
-    digest = hashlib.sha256()
+def _digest(tensors: Tensors, use: list[Any]) -> str:
+    """A hash of weights and of what they are used with."""
+    digest = hashlib.sha256(json.dumps(use).encode())
     for name in sorted(tensors):
         digest.update(name.encode() + b"\0" + tensors[name].numpy().tobytes())
     return digest.hexdigest()

@@ -9,6 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from dess.errors import InputError
 from dess.scenario import load_scenario, parse_toml, validation_line
 
+# Training missions have this seed + that of the training.
+MISSION_SEED = 500_000_000
+
 Count = Annotated[int, Field(strict=True, ge=1)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Rate = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -31,7 +34,7 @@ class Phase(_Settings):
     temperature: float = Field(
         0.0, ge=0.0, description="of softmax exploration in scaled values; 0 for argmax"
     )
-    learning_rate: tuple[float, float] = Field(
+    learning_rate: tuple[Rate, Rate] = Field(
         (1e-3, 1e-4), description="of Adam at the beginning and the end"
     )
 
@@ -64,7 +67,9 @@ class TrainingConfig(_Settings):
         0.0,
         description="share of UAVs that come home, in training, as soon as they may charge there",
     )
-    phases: tuple[Phase, ...] = Field(min_length=1, description="of Algorithm 1, in order")
+    phases: tuple[Phase, ...] = Field(
+        min_length=1, max_length=8, description="of Algorithm 1, in order"
+    )
     lanes: Count = Field(64, description="missions that fly side by side")
     prefill: Count = Field(1000, description="slots per lane flown at random before learning")
     replay: Count = Field(8000, description="slots per lane that the replay memory holds")
@@ -101,6 +106,8 @@ class TrainingConfig(_Settings):
             raise ValueError(f"prefill: {self.prefill} is not above steps {self.steps}")
         if self.observation == "relations" and len(self.hidden) < 2:
             raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
+        if self.evaluation_seed == MISSION_SEED + self.seed:
+            raise ValueError(f"evaluation_seed: {self.evaluation_seed} is that of the training")
         names = [phase.name for phase in self.phases]
         if len(set(names)) < len(names):
             raise ValueError(f"phases: {names} are not distinct")

@@ -15,6 +15,7 @@ from dess.state import ACTION_NAMES
 
 ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5
+NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # map of which two convolutions leave something
 DENSE = (256, 256, 256)
 
 

@@ -16,13 +16,14 @@ from torch import nn
 
 from dess.batch import simulate_batch
 from dess.compiled import kernel
+from dess.errors import InputError
 from dess.lanes import Lanes
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
-from policies.ddqn.config import Phase, TrainingConfig
+from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
 from policies.ddqn.maps import Maps
-from policies.ddqn.network import DuelingNetwork, NodeNetwork, PaperNetwork
+from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.relations import Relations
 from policies.ddqn.replay import ReplayMemory
@@ -43,7 +44,6 @@ from policies.ddqn.snapshot import (
 )
 from policies.ddqn.vector import Vector
 
-MISSION_SEED = 500_000_000
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 SELECT_BY = "collection_ratio_and_communication"
 # What of a training is a plain value.
@@ -64,6 +64,10 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
     precision = getattr(torch, config.precision)
     if config.observation == "maps":
         maps = Maps(layout)
+        if maps.width < NARROWEST:
+            raise InputError(
+                f"observation: a grid of {layout.grid} is too small for maps; allowed: vector"
+            )
         return maps, PaperNetwork(maps.shapes, precision)
     if config.observation == "relations":
         relations = Relations(layout)
