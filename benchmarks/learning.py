@@ -1,12 +1,13 @@
 """What each means of learning is worth: trainings that differ in one setting, same budget.
 
 Runs the variants of ``VARIANTS`` from the shipped config ``quick``, each with several training
-seeds, and gathers their curves in one table. A training whose curve is already there is not run
-again. With ``--table`` it prints what the curves say instead: the product of the selected weights
-on missions that no training and no selection has seen.
+seeds, and keeps the curve of each. A training whose curve is already there is not run again. The
+final figures are those of the selected weights on missions that no training and no selection has
+seen.
 
     python benchmarks/learning.py --out runs/learning --seeds 1 2 3
     python benchmarks/learning.py --out runs/learning --gather policies/trained/curves.parquet
+    python benchmarks/learning.py --table policies/trained/curves.parquet
 """
 
 import argparse
@@ -21,6 +22,7 @@ from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.training import Training
 
 EVALUATION_SEED = 900_000_001
+METRICS = ("success", "collection_ratio", "collection_ratio_and_communication")
 
 
 def _variants() -> dict[str, dict[str, Any]]:
@@ -55,20 +57,41 @@ def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, 
     training.run(config.ticks)
     policy = training.policy(training.best)
     records = simulate_batch(load_scenario(config.scenario), policy, EVALUATION_SEED, missions)
-    names = ("success", "collection_ratio", "collection_ratio_and_communication")
-    metrics = {f"final_{name}": float(records.missions[name].mean()) for name in names}
+    metrics = {f"final_{name}": float(records.missions[name].mean()) for name in METRICS}
     return pd.DataFrame(training.curve), metrics
+
+
+def table(curves: pd.DataFrame) -> str:
+    """Per variant the final metrics, the mean of its training seeds and their range, in percent."""
+    lines = [
+        "| variant | training seeds | success | collection ratio | product | lowest, highest |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for variant in [name for name in VARIANTS if name in set(curves["variant"])]:
+        last = curves[curves["variant"] == variant].groupby("seed").last()
+        means = [100 * last[f"final_{name}"].mean() for name in METRICS]
+        products = 100 * last[f"final_{METRICS[-1]}"]
+        cells = " | ".join(f"{mean:.1f} %" for mean in means)
+        ends = f"{products.min():.1f}, {products.max():.1f}" if len(last) > 1 else ""
+        lines.append(f"| {variant} | {len(last)} | {cells} | {ends} |")
+    return "\n".join(lines)
 
 
 def main() -> None:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path, required=True, help="folder of the curves")
+    parser.add_argument("--out", type=Path, help="folder of the curves")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS)
     parser.add_argument("--missions", type=int, default=1000, help="of the final evaluation")
     parser.add_argument("--gather", type=Path, help="only gather all curves into this file")
+    parser.add_argument("--table", type=Path, help="only print what the curves of a file say")
     arguments = parser.parse_args()
+    if arguments.table:
+        print(table(pd.read_parquet(arguments.table)))
+        return
+    if not arguments.out:
+        parser.error("--out is needed")
     if arguments.gather:
         files = sorted(arguments.out.glob("*.parquet"))
         pd.concat(map(pd.read_parquet, files)).to_parquet(arguments.gather, index=False)
@@ -84,7 +107,9 @@ def main() -> None:
             curve, final = run(config, arguments.missions)
             curve.insert(0, "variant", variant)
             curve.insert(1, "seed", seed)
-            curve.assign(**final).to_parquet(path, index=False)
+            new = path.with_suffix(".new")
+            curve.assign(**final).to_parquet(new, index=False)
+            new.replace(path)
             print(variant, seed, final, f"{curve['seconds'].iloc[-1]:.0f} s", flush=True)
 
 

@@ -274,13 +274,22 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         raise InputError(f"{where}: not valid TOML: {error}") from None
 
 
-def validation_line(error: ValidationError, where: str) -> str:
-    """The first complaint of pydantic as one line: where, key, what, and what is allowed."""
+def validation_line(
+    error: ValidationError, where: str, model: type[BaseModel] | None = None
+) -> str:
+    """The first complaint of pydantic as one line: where, key, what, and what is allowed.
+
+    Args:
+        error: The complaints.
+        where: What was read.
+        model: Whose fields are allowed; scenarios are known without.
+    """
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
     models: dict[str, type[BaseModel]] = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}
-    fields = models[error.title].model_fields if error.title in models else {}
+    model = model or models.get(error.title)
+    fields = model.model_fields if model else {}
     if first["type"] == "extra_forbidden":
         allowed = f"; allowed: {', '.join(sorted(fields))}" if fields else ""
         return f"{where}: {key}: unknown key{allowed}"

@@ -1,6 +1,7 @@
 """From names to policies; outside packages add theirs by the entry point ``dess.policies``."""
 
 import json
+import os
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -52,7 +53,8 @@ def load(name: str | Path) -> Policy:
         return getattr(import_module(module), attribute)()
     if name in trained_names():
         folder = TRAINED / name
-    if name and (folder / CONFIG).exists():  # no name would be the working folder
+    # Without a name it would be the working folder.
+    if name and os.path.exists(folder / CONFIG):
         from policies.ddqn.checkpoint import load_policy  # brings torch
 
         return load_policy(folder)

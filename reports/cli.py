@@ -4,6 +4,7 @@ Only what the help needs is imported at once; the rest is imported by the comman
 """
 
 import json
+import shlex
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -235,13 +236,16 @@ def train(
     from policies.ddqn.config import load_config
 
     config = load_config(name, **({} if seed is None else {"seed": seed}))
-    from policies.ddqn.run import memory_of, train
+    from policies.ddqn.run import train
 
-    with _compile_notice(), _training(config.ticks, memory_of(config)) as progress:
-        training = train(config, out, resume=resume, device=device, progress=progress)
+    with _compile_notice(), _training(config.ticks) as progress:
+        training = train(
+            config, out, resume=resume, device=device, announce=_say_memory, progress=progress
+        )
     if not training.done:
-        seeded = "" if seed is None else f" --seed {seed}"
-        command = f"dess train {name} --out {out}{seeded} --resume"
+        options = ["--out", str(out), *([] if seed is None else ["--seed", str(seed)])]
+        options += [] if device == "auto" else ["--device", device]
+        command = shlex.join(["dess", "train", name, *options, "--resume"])
         raise typer.Exit(_fail(f"interrupted at tick {training.tick}: go on with {command}", 1))
     print(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
@@ -405,14 +409,19 @@ def _cells() -> "Iterator[Callable[[str, int, int], None]]":
         yield show
 
 
+def _say_memory(size: int) -> None:
+    """Say what a replay memory takes [bytes]."""
+    print(f"replay memory: {size / 2**20:,.0f} MiB", file=sys.stderr)
+
+
 @contextmanager
-def _training(ticks: int, memory: int) -> "Iterator[Callable[[Training, int], None]]":
-    """Progress of a training on stderr: its replay memory [bytes], then its last evaluation."""
+def _training(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
+    """Progress of a training on stderr, with the metrics of its last evaluation."""
     with _bar("tick", ticks) as bar:
 
         def show(training: "Training", done: int) -> None:
-            if bar.n == 0:
-                print(f"replay memory: {memory / 2**20:,.0f} MiB", file=sys.stderr)
+            if bar.n == 0:  # a resumed one begins where it was
+                bar.initial = bar.n = training.tick - done
             bar.update(training.tick - bar.n)
             if training.curve:
                 last = training.curve[-1]

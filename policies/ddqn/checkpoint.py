@@ -24,7 +24,7 @@ from dess.scenario import ScenarioSpace
 from policies.ddqn.config import TrainingConfig, config_of
 from policies.ddqn.policy import DDQN
 from policies.ddqn.snapshot import Layout, layout_of
-from policies.ddqn.training import Training, build
+from policies.ddqn.training import OBSERVATIONS, Training, build
 
 FORMAT = 1
 MODEL, CONFIG, CHECKPOINT = "model.safetensors", "config.json", "checkpoint.safetensors"
@@ -50,16 +50,17 @@ def save_policy(
     """
     folder.mkdir(parents=True, exist_ok=True)
     tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
-    _replace(folder / MODEL, lambda path: save_file(tensors, path, {"format": str(FORMAT)}))
+    replace(folder / MODEL, lambda path: save_file(tensors, path, {"format": str(FORMAT)}))
     content = {
         "format": FORMAT,
         "name": config.name,
+        "observation_version": OBSERVATIONS[config.observation].version,
         "layout": _plain(layout_of(space)),
         "training": config.model_dump(mode="json"),
         "run": dict(run or {}),
     }
     text = json.dumps(content, indent=2) + "\n"
-    _replace(folder / CONFIG, lambda path: path.write_text(text, "utf-8"))
+    replace(folder / CONFIG, lambda path: path.write_text(text, "utf-8"))
 
 
 def load_policy(folder: Path) -> DDQN:
@@ -83,6 +84,7 @@ def load_policy(folder: Path) -> DDQN:
         raise InputError(f"{where}: format {version!r} is unknown; allowed: {FORMAT}")
     config = config_of(training, str(where))
     observation, network = build(config, layout)
+    _same_observation(content.get("observation_version"), observation, where)
     tensors, _ = _read(folder / MODEL)
     _fit(tensors, network.state_dict(), folder / MODEL)
     network.load_state_dict(tensors)
@@ -114,6 +116,7 @@ def save_training(path: Path, training: Training) -> None:
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
         "scenario": training.space.model_dump(mode="json"),
+        "observation_version": training.observation.version,
         "progress": training.progress(),
         "random": training.generator.bit_generator.state,
         "lanes": [training.lanes.seed, training.lanes.replication],
@@ -121,7 +124,7 @@ def save_training(path: Path, training: Training) -> None:
         "curve": training.curve,
     }
     tensors = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
-    _replace(path, lambda new: save_file(tensors, new, {"dess": json.dumps(header)}))
+    replace(path, lambda new: save_file(tensors, new, {"dess": json.dumps(header)}))
 
 
 def load_training(path: Path, config: TrainingConfig, device: torch.device) -> Training:
@@ -148,11 +151,12 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
         raise InputError(
             f"{path}: of another config ({', '.join(other)} differ); allowed: the one it began with"
         )
+    _same_observation(header.get("observation_version"), training.observation, path)
     for name, network in _networks(training).items():
         _fit(_part(tensors, name), network, path)
     try:
         _restore(training, tensors, header)
-    except (KeyError, ValueError, TypeError, RuntimeError) as error:
+    except (LookupError, ValueError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: damaged, or of another scenario: {error!r}") from None
     return training
 
@@ -231,6 +235,12 @@ def _fit(tensors: Tensors, wanted: Tensors, path: Path) -> None:
             raise InputError(f"{path}: {name} is {found}; allowed: {allowed}, as the config says")
 
 
+def _same_observation(version: Any, observation: Any, path: Path) -> None:
+    """Refuse weights that have learned from observations of another meaning."""
+    if version != observation.version:
+        raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
+
+
 def _form(tensor: torch.Tensor) -> str:
     """Type and shape, like ``float32 [5, 16]``."""
     return f"{str(tensor.dtype).removeprefix('torch.')} {list(tensor.shape)}"
@@ -265,7 +275,7 @@ def _layout(values: dict[str, Any]) -> Layout:
     return layout_of(ScenarioSpace.of(uavs=1, **values))  # which knows what fits together
 
 
-def _replace(path: Path, write: Callable[[Path], Any]) -> None:
+def replace(path: Path, write: Callable[[Path], Any]) -> None:
     """Write a file beside its place, then put it there: it is never half there."""
     new = path.with_name(path.name + ".new")
     try:

@@ -4,7 +4,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    StrictBool,
+    ValidationError,
+    model_validator,
+)
 
 from dess.errors import InputError
 from dess.scenario import load_scenario, parse_toml, validation_line
@@ -18,7 +25,7 @@ Rate = Annotated[float, Field(gt=0.0, le=1.0)]
 
 
 class _Settings(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Phase(_Settings):
@@ -26,7 +33,7 @@ class Phase(_Settings):
 
     name: str = Field(description="what curves and files call it")
     ticks: Count = Field(description="slots that every lane flies")
-    battery: bool = Field(True, description="whether flying costs battery (line 7, 19)")
+    battery: StrictBool = Field(True, description="whether flying costs battery (line 7, 19)")
     epsilon: tuple[Share, Share] = Field(
         (0.1, 0.1), description="share of random actions at the beginning and the end"
     )
@@ -59,7 +66,7 @@ class TrainingConfig(_Settings):
         "float32", description="of the hidden layers while training"
     )
 
-    guard: bool = Field(True, description="whether the return guard masks the actions")
+    guard: StrictBool = Field(True, description="whether the return guard masks the actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
     )
@@ -89,11 +96,11 @@ class TrainingConfig(_Settings):
 
     evaluate_every: Count = Field(2000, description="ticks between evaluations")
     evaluation_missions: Count = Field(300, description="missions of an evaluation")
-    evaluation_seed: Annotated[int, Field(strict=True, ge=0)] = Field(
+    evaluation_seed: Annotated[int, Field(strict=True, ge=0, lt=2**64)] = Field(
         700_000_001, description="of the evaluations that select the weights"
     )
     window: Count = Field(3, description="evaluations in the moving average that selects")
-    checkpoint_replay: bool = Field(
+    checkpoint_replay: StrictBool = Field(
         True, description="whether checkpoints hold the replay memory; without, a resumed run is "
         "another one than an uninterrupted run"
     )  # fmt: skip
@@ -156,7 +163,10 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
     try:
         return TrainingConfig.model_validate(values)
     except ValidationError as error:
-        raise InputError(validation_line(error, where)) from None
+        nested = error.errors()[0]["loc"][:1] == ("phases",)
+        raise InputError(
+            validation_line(error, where, Phase if nested else TrainingConfig)
+        ) from None
 
 
 def _read(path: str) -> str:

@@ -16,6 +16,8 @@ ZONE, DATA, FLYING_TIME, STATUS = range(4)
 LAYERS = 4
 DATA_SCALE = 20.0  # the most that a node starts with (Table II)
 BATTERY_SCALE = 100.0
+# Widths of the paper's local map and of a cell of its global map [cells] (l, g).
+CROP, POOL = 17, 3
 
 
 class Maps:
@@ -33,7 +35,9 @@ class Maps:
         width: Width of the global map, ``(2 M - 1) // pool``.
     """
 
-    def __init__(self, layout: Layout, crop: int = 17, pool: int = 3) -> None:
+    version = 1  # of what the numbers mean: weights of another one do not fit
+
+    def __init__(self, layout: Layout, crop: int = CROP, pool: int = POOL) -> None:
         """Make an encoder for one layout.
 
         Raises:

@@ -50,7 +50,7 @@ class DDQN:
         states = snapshot(view.state, self.guarded)
         allowed = masks(states, view.mission, view.uav)
         parts = self.observation.encode(states, view.mission, view.uav)
-        values = np.where(allowed, _values(self.network, parts), -np.inf)
+        values = np.where(allowed, _values(self.network, parts).astype(np.float64), -np.inf)
         if self.exact is not None:
             second, best = np.partition(values, -2)[:, -2:].T
             close = best - second < CLOSE

@@ -20,6 +20,8 @@ class Relations:
         shapes: The shapes of its parts per row: (F,) and (K, 22).
     """
 
+    version = 1  # of what the numbers mean: weights of another one do not fit
+
     def __init__(self, layout: Layout):
         self.layout, self._vector = layout, Vector(layout)
         self.shapes = (*self._vector.shapes, (len(layout.nodes), NODE))

@@ -92,6 +92,8 @@ class ReplayMemory:
     ) -> Batch:
         """Draw transitions uniformly, with replacement, among those whose later state is there.
 
+        The last slot of a mission that was cut short is none of them.
+
         Args:
             size: Transitions (B).
             steps: n of the n-step return.
@@ -99,7 +101,8 @@ class ReplayMemory:
             generator: Source of the draw.
 
         Raises:
-            ValueError: If fewer than ``steps + 1`` slots have been added.
+            ValueError: If fewer than ``steps + 1`` slots have been added, or in none of them a UAV
+                has done anything that can be learned from.
         """
         newest = self.count - 1
         oldest = max(0, self.count - self.capacity)
@@ -111,7 +114,10 @@ class ReplayMemory:
             slot = generator.integers(oldest, newest - steps + 1, 2 * missing + 16)
             row = slot % self.capacity * self.lanes + generator.integers(0, self.lanes, len(slot))
             uav = generator.integers(0, self.uavs, len(slot))
-            keep = np.nonzero(self._acted[row, uav])[0][:missing]
+            good = self._acted[row, uav] & ~self._truncated[row, uav]
+            keep = np.nonzero(good)[0][:missing]
+            if not len(keep) and len(rows) > 1000:
+                raise ValueError("no transition in memory that can be learned from")
             slots.append(slot[keep])
             rows.append(row[keep])
             uavs.append(uav[keep])
@@ -132,18 +138,19 @@ class ReplayMemory:
 def _returns(
     rows, uavs, steps, discount, lanes, rewards, terminated, truncated, later, total, factor
 ):
-    """n-step returns: they end where the UAV's mission does; truncation is no termination."""
+    """n-step returns: they end where the UAV's mission does.
+
+    Truncation is no termination: the return ends before the slot that was cut, with the value of
+    the last state in which the UAV still had a choice.
+    """
     size = len(rewards)
     for b in range(len(rows)):
         row, i = rows[b], uavs[b]
         value, weight = 0.0, 1.0
         for _ in range(steps):
-            value += weight * rewards[row, i]
-            weight *= discount
-            ended = truncated[row, i]
-            if terminated[row, i]:
-                weight, ended = 0.0, True
-            row = (row + lanes) % size
-            if ended:
+            if truncated[row, i] or weight == 0.0:
                 break
+            value += weight * rewards[row, i]
+            weight = 0.0 if terminated[row, i] else weight * discount
+            row = (row + lanes) % size
         later[b], total[b], factor[b] = row, value, weight

@@ -21,6 +21,7 @@ from policies.ddqn.checkpoint import (
     CHECKPOINT,
     MODEL,
     load_training,
+    replace,
     save_policy,
     save_training,
 )
@@ -60,6 +61,7 @@ def train(
     *,
     resume: bool = False,
     device: str = "auto",
+    announce: Callable[[int], None] | None = None,
     progress: Callable[[Training, int], None] | None = None,
 ) -> Training:
     """Train into a folder, or go on with the training that it holds.
@@ -72,6 +74,7 @@ def train(
         out: The folder.
         resume: Whether to go on with its training.
         device: ``auto``, ``cpu`` or ``cuda``.
+        announce: Called before anything large is made, with what the replay memory takes [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
     Returns:
@@ -79,17 +82,26 @@ def train(
 
     Raises:
         InputError: If the folder holds a training and is not to be resumed, or holds none to
-            resume, or one of another config; if it holds a policy alone, or cannot be written.
+            resume, or one of another config; if it holds a policy alone, or cannot be written; if
+            the machine's memory is too small.
     """
-    path = out / CHECKPOINT
-    if resume:
-        training = load_training(path, config, device_of(device))
-    elif path.exists():
+    path, place = out / CHECKPOINT, device_of(device)
+    if path.exists() and not resume:
         raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
-    elif (out / MODEL).exists():
+    if not path.exists() and resume:
+        raise InputError(f"{path}: no such file; allowed: the folder of a training")
+    if (out / MODEL).exists() and not resume:
         raise InputError(f"{out}: holds a policy; allowed: another folder")
-    else:
-        training = Training(config, device_of(device))
+    if announce:
+        announce(memory_of(config))
+    try:
+        training = load_training(path, config, place) if resume else Training(config, place)
+    except MemoryError as error:
+        raise InputError(
+            f"replay: the memory takes {memory_of(config) / 2**30:.1f} GiB, too much for this "
+            "machine; allowed: fewer lanes or slots"
+        ) from error
+    if not resume:
         try:
             out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -132,9 +144,7 @@ def _save_results(out: Path, training: Training) -> None:
     save_policy(out, training.best, training.config, training.space, run)
     names = dict.fromkeys(name for row in training.curve for name in row)
     table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
-    new = out / (CURVE + ".new")
-    pq.write_table(table, new)
-    new.replace(out / CURVE)
+    replace(out / CURVE, lambda new: pq.write_table(table, new))
 
 
 @contextmanager

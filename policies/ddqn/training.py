@@ -7,7 +7,6 @@ have ``MISSION_SEED`` + the seed of the training, those of selection the config'
 """
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
-from policies.ddqn.maps import Maps
+from policies.ddqn.maps import POOL, Maps
 from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.relations import Relations
@@ -45,6 +44,8 @@ from policies.ddqn.snapshot import (
 from policies.ddqn.vector import Vector
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
+MISSIONS_PER_PHASE = 2**28
+OBSERVATIONS: dict[str, Any] = {"vector": Vector, "relations": Relations, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
 # What of a training is a plain value.
 _PROGRESS = (
@@ -62,18 +63,17 @@ _PROGRESS = (
 def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
     """The observation and a new network of a config, for missions over a layout."""
     precision = getattr(torch, config.precision)
+    if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
+        raise InputError(
+            f"observation: a grid of {layout.grid} is too small for maps; "
+            "allowed: vector, relations"
+        )
+    observation = OBSERVATIONS[config.observation](layout)
     if config.observation == "maps":
-        maps = Maps(layout)
-        if maps.width < NARROWEST:
-            raise InputError(
-                f"observation: a grid of {layout.grid} is too small for maps; allowed: vector"
-            )
-        return maps, PaperNetwork(maps.shapes, precision)
+        return observation, PaperNetwork(observation.shapes, precision)
     if config.observation == "relations":
-        relations = Relations(layout)
-        return relations, NodeNetwork(relations.shapes, config.hidden, precision)
-    vector = Vector(layout)
-    return vector, DuelingNetwork(vector.shapes[0][0], list(config.hidden), precision)
+        return observation, NodeNetwork(observation.shapes, config.hidden, precision)
+    return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
 
 class Training:
@@ -111,14 +111,12 @@ class Training:
         """Whether all phases are over."""
         return self.tick >= self.config.ticks
 
-    def run(self, ticks: int, progress: Callable[[int], None] | None = None) -> None:
+    def run(self, ticks: int) -> None:
         """Train for that many ticks, or until the last phase ends."""
         for _ in range(min(ticks, self.config.ticks - self.tick)):
             began = time.perf_counter()
             self.step()
             self.seconds += time.perf_counter() - began
-            if progress:
-                progress(1)
 
     def step(self) -> None:
         """One tick: a slot of all lanes, the updates, an evaluation and the next phase if due."""
@@ -173,7 +171,7 @@ class Training:
         self.phase_space = ScenarioSpace.of(self.space, flight_cost=cost)
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.lanes = Lanes(self.phase_space, config.lanes, MISSION_SEED + config.seed)
-        self.lanes.start_at(self.lanes.seed, index * 2**28)
+        self.lanes.start_at(self.lanes.seed, index * MISSIONS_PER_PHASE)
         self.early = np.zeros((config.lanes, fleet), bool)
         self._launch(self.lanes.numbers)
         self.replay = ReplayMemory(config.replay, config.lanes, fleet, nodes)
@@ -311,4 +309,5 @@ def _run_low(missions, uavs, residual, lanes, draws):
             u.latch = True
         for k in range(mission.nodes):
             if draws[n, 2 + k] < draws[n, 1]:
+                mission.initial -= data[k]
                 data[k] = 0.0

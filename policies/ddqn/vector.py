@@ -47,6 +47,8 @@ class Vector:
         shapes: The shapes of its parts per row: one vector (F,).
     """
 
+    version = 1  # of what the numbers mean: weights of another one do not fit
+
     def __init__(self, layout: Layout):
         self.layout = layout
         slots = np.arange(2 * layout.grid + 2)
@@ -131,7 +133,7 @@ def spare_slots(me, home, slots):
 
 @kernel
 def lead_of(team, i, x, y, slots):
-    """Slots by which UAV ``i`` is nearer to a cell than the nearest active teammate."""
+    """Slots by which UAV ``i`` is nearer to a cell than the nearest flying teammate."""
     least = 10_000
     for j in range(len(team)):
         if j != i and team[j, ACTIVE] and not team[j, CHARGING]:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from policies.ddqn.replay import Batch, ReplayMemory
@@ -38,12 +38,12 @@ class Log(NamedTuple):
         """The n-step return from a slot on, the factor of the later value and its slot."""
         total, factor = 0.0, 1.0
         for n in range(slot, slot + steps):
+            if self.truncated[n, lane, uav]:
+                return total, factor, n
             total += factor * self.reward[n, lane, uav]
             factor *= discount
             if self.terminated[n, lane, uav]:
                 return total, 0.0, n + 1
-            if self.truncated[n, lane, uav]:
-                return total, factor, n + 1
         return total, factor, slot + steps
 
 
@@ -93,11 +93,19 @@ def test_after_termination_nothing_counts() -> None:
 
 
 def test_truncation_is_no_end_of_value() -> None:
+    # The slot that was cut, 2, is left out: its state is the last one with a choice.
     assert _returns(_lone([1, 2, 4, 99, 8, 16, 32], truncated=2), 3) == {
-        0: (1 + 2 / 2 + 4 / 4, 1 / 8, 3),
-        1: (2 + 4 / 2, 1 / 4, 3),
-        2: (4, 1 / 2, 3),
+        0: (1 + 2 / 2, 1 / 4, 2),
+        1: (2, 1 / 2, 2),
     }
+
+
+def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
+    cut = np.full((6, 1, 1), True)
+    zero = np.zeros((6, 1, 1))
+    log = Log(zero.astype(int), zero, cut, ~cut, cut)
+    with pytest.raises(ValueError, match="no transition"):
+        _drawn(log.memory(6), 4, 2)
 
 
 def test_the_ring_keeps_the_last_slots() -> None:
@@ -147,9 +155,10 @@ def test_all_that_can_be_drawn_is_drawn_and_right(
     log, steps, capacity = world
     slots, lanes, uavs = log.action.shape
     oldest = max(0, slots - capacity)
+    assume((log.acted & ~log.truncated)[oldest : slots - steps].any())
     eligible = {
         (slot, lane, uav)
-        for slot, lane, uav in np.argwhere(log.acted).tolist()
+        for slot, lane, uav in np.argwhere(log.acted & ~log.truncated).tolist()
         if oldest <= slot < slots - steps
     }
     batch = _drawn(log.memory(capacity), 30 * slots * lanes * uavs, steps, discount)

@@ -161,7 +161,8 @@ def test_folders_are_not_overwritten(tmp_path: Path) -> None:
     assert "another config (seed differ)" in _refusal(out, config=other, resume=True)
     (out / CHECKPOINT).unlink()
     assert _refusal(out) == f"{out}: holds a policy; allowed: another folder"
-    assert _refusal(out, resume=True) == f"{out / CHECKPOINT}: no such file"
+    line = f"{out / CHECKPOINT}: no such file; allowed: the folder of a training"
+    assert _refusal(out, resume=True) == line
     assert "no such file" in _refusal(tmp_path / "nothing", resume=True)
 
 
