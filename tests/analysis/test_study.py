@@ -9,7 +9,7 @@ def test_the_shipped_studies():
     assert study_names() == ["fig4", "table4"]
     table4, fig4 = load_study("table4"), load_study("fig4")
     assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
-    assert table4.policies == fig4.policies == ("random", "nearest", "greedy", "tour")
+    assert table4.policies == fig4.policies == ("random", "nearest", "greedy", "tour", "ddqn")
     assert [point.scenario.uavs for point in fig4.points] == [(1, 1), (2, 2), (3, 3)]
     assert fig4.logged == 1
 

@@ -16,7 +16,7 @@ from policies.ddqn.checkpoint import save_policy
 from policies.ddqn.config import config_of
 from policies.ddqn.snapshot import layout_of
 from policies.ddqn.training import build
-from policies.registry import SHIPPED
+from policies.registry import SHIPPED, trained_names
 
 OUTSIDE = """
 import numpy as np
@@ -131,7 +131,8 @@ def test_a_damaged_trained_policy_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("outside")
 def test_outside_packages_add_policies() -> None:
-    assert policies.names()[len(SHIPPED) :] == ["absent", "broken", "nothing", "still"]
+    shipped = len(SHIPPED) + len(trained_names())
+    assert policies.names()[shipped:] == ["absent", "broken", "nothing", "still"]
     record = simulate(Scenario.of(uavs=1), policies.load("still"), 0)
     assert np.isfinite(record.reward)
 

@@ -158,7 +158,7 @@ def test_the_event_log_and_the_figure(dess, tmp_path):
 
 def test_what_there_is(dess):
     for command, names in {
-        "policies": ["random", "nearest", "greedy", "tour"],
+        "policies": ["random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"],
         "scenarios": ["fig4", "paper"],
         "studies": ["fig4", "table4"],
     }.items():
