@@ -35,6 +35,7 @@ def _variants() -> dict[str, dict[str, Any]]:
         "quick": {},
         "no transfer": alone,
         "no guard": {"guard": False},
+        "no guard, no transfer": {"guard": False} | alone,
         "no low-battery starts": {"low_battery_starts": 0.0},
         "no early returns": {"early_returns": 0.0},
         "neither of both": {"low_battery_starts": 0.0, "early_returns": 0.0},
