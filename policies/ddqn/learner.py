@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from policies.ddqn.replay import Batch
-from policies.ddqn.snapshot import masks
+from policies.ddqn.snapshot import Snapshots, masks
 
 
 def double_dqn_target(
@@ -68,11 +68,10 @@ class Learner:
         return self.online if self.average is None else self.average
 
     def values(
-        self, network: nn.Module, states: Any, missions: np.ndarray, uavs: np.ndarray
+        self, network: nn.Module, states: Snapshots, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
         """(R, 5) action values of UAV ``uavs[r]`` in snapshot ``missions[r]``."""
-        parts = self.observation.encode(states, missions, uavs)
-        return network(*(torch.from_numpy(part).to(self.device) for part in parts))
+        return network(*self._observe(states, missions, uavs))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
         """One gradient step on a minibatch; what it was like, as scalars still on the device."""
@@ -82,8 +81,7 @@ class Learner:
         discount = torch.from_numpy(batch.discount).to(self.device)
         action = torch.from_numpy(batch.action).to(self.device)
         with torch.no_grad():
-            parts = self.observation.encode(batch.state, batch.later, batch.uav)
-            later = [torch.from_numpy(part).to(self.device) for part in parts]
+            later = self._observe(batch.state, batch.later, batch.uav)
             goal = double_dqn_target(
                 reward, discount, self.online(*later), self.target(*later), allowed
             )
@@ -100,6 +98,13 @@ class Learner:
         if self.average is not None:
             soft_update(self.average, self.online, settings.average_rate)
         return {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
+
+    def _observe(
+        self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray
+    ) -> list[torch.Tensor]:
+        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, on the device."""
+        parts = self.observation.encode(states, missions, uavs)
+        return [torch.from_numpy(part).to(self.device) for part in parts]
 
 
 _LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}
