@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import typer.main
 
 import dess
 import policies
 from analysis import load_study, paper
+from benchmarks import learning
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli
 
@@ -267,3 +269,12 @@ def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFix
     for column, arguments in enumerate(by_fleet):
         for row in evaluated(arguments, capsys):
             assert printed[row["policy"]][column] == shown(row[METRICS[2]])
+
+
+def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves() -> None:
+    curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
+    assert learning.table(curves) in PAGES["docs/learning.md"]
+    for variant in ("quick", "no transfer"):  # Fig. 3: three training seeds, the same budget
+        runs = curves[curves["variant"] == variant].groupby("seed")["tick"].max()
+        assert len(runs) >= 3
+        assert runs.nunique() == 1

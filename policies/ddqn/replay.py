@@ -108,7 +108,8 @@ class ReplayMemory:
         oldest = max(0, self.count - self.capacity)
         if newest - oldest < steps:
             raise ValueError(f"{self.count} slots in memory: too few for {steps}-step returns")
-        slots, rows, uavs = [], [], []
+        rows: list[np.ndarray] = []
+        uavs: list[np.ndarray] = []
         missing = size
         while missing > 0:
             slot = generator.integers(oldest, newest - steps + 1, 2 * missing + 16)
@@ -118,7 +119,6 @@ class ReplayMemory:
             keep = np.nonzero(good)[0][:missing]
             if not len(keep) and len(rows) > 1000:
                 raise ValueError("no transition in memory that can be learned from")
-            slots.append(slot[keep])
             rows.append(row[keep])
             uavs.append(uav[keep])
             missing -= len(keep)
