@@ -38,7 +38,10 @@ def _variants() -> dict[str, dict[str, Any]]:
         "no guard, no transfer": {"guard": False} | alone,
         "no low-battery starts": {"low_battery_starts": 0.0},
         "no early returns": {"early_returns": 0.0},
-        "neither of both": {"low_battery_starts": 0.0, "early_returns": 0.0},
+        "no low-battery starts, no early returns": {
+            "low_battery_starts": 0.0,
+            "early_returns": 0.0,
+        },
         "none of the three": means,
         "none of the three, no transfer": means | alone,
         "1-step returns": {"steps": 1},

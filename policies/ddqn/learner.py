@@ -7,6 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from policies.ddqn.config import TrainingConfig
 from policies.ddqn.replay import Batch
 from policies.ddqn.snapshot import Snapshots, masks
 
@@ -51,7 +52,9 @@ class Learner:
         device: Where they are.
     """
 
-    def __init__(self, network: nn.Module, observation: Any, settings: Any, device: torch.device):
+    def __init__(
+        self, network: nn.Module, observation: Any, settings: TrainingConfig, device: torch.device
+    ):
         self.online = network.to(device)
         self.target = copy.deepcopy(self.online).requires_grad_(False)
         self.average = copy.deepcopy(self.target) if settings.average_rate < 1.0 else None

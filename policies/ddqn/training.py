@@ -91,7 +91,8 @@ class Training:
         self.generator = np.random.default_rng(config.seed)
         torch.manual_seed(config.seed)
         self.space = load_scenario(config.scenario)
-        self.observation, network = build(config, layout_of(self.space))
+        self.layout = layout_of(self.space)
+        self.observation, network = build(config, self.layout)
         self.learner = Learner(network, self.observation, config, device)
         self.tick = self.updates = self.uav_slots = 0
         self.seconds = 0.0
@@ -145,13 +146,13 @@ class Training:
 
     def policy(self, weights: dict[str, torch.Tensor]) -> DDQN:
         """A policy with these weights."""
-        _, network = build(self.config, layout_of(self.space))
+        _, network = build(self.config, self.layout)
         network.load_state_dict(weights)
         return self._as_policy(network)
 
     def _as_policy(self, network: nn.Module) -> DDQN:
-        config, layout = self.config, layout_of(self.space)
-        return DDQN(config.name, self.observation, network, config.guard, layout)
+        config = self.config
+        return DDQN(config.name, self.observation, network, config.guard, self.layout)
 
     def progress(self) -> dict[str, Any]:
         """Where the training stands, as plain values."""
@@ -195,7 +196,7 @@ class Training:
         over = np.nonzero(state.missions["active"] == 0)[0]
         states = snapshot(state, self.config.guard)
         missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
-        actions = np.full(state.uavs.shape, 4)
+        actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
         outcome = self.lanes.step(actions)
@@ -209,7 +210,7 @@ class Training:
         self._launch(over)
 
     def _explore(
-        self, states: Any, missions: np.ndarray, uavs: np.ndarray, epsilon: float
+        self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray, epsilon: float
     ) -> np.ndarray:
         """Epsilon-greedy or softmax actions among the allowed ones."""
         allowed = masks(states, missions, uavs)
@@ -233,7 +234,7 @@ class Training:
 
         They lead nearer to the zone; in it, once it may charge, a UAV hovers.
         """
-        rows, layout = states.uavs[missions, uavs], layout_of(self.space)
+        rows, layout = states.uavs[missions, uavs], self.layout
         cells = rows[:, [X, Y]].astype(np.int64)
         home = layout.zone_slots(cells)
         reserve = rows[:, BATTERY] - states.missions[missions, CHARGE_START]
