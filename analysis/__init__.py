@@ -12,9 +12,13 @@ _HOME = {
     "study_names": "study",
     "run_study": "runner",
     "evaluate": "runner",
-    "Results": "store",
-    "load_results": "store",
+    "Results": "results",
+    "load_results": "results",
     "summary": "statistics",
+    "distribution": "statistics",
+    "bootstrap_interval": "statistics",
+    "compare": "comparison",
+    "compare_learners": "comparison",
 }
 
 __all__ = [*_HOME]

@@ -1,25 +1,46 @@
 """What a results folder is about: the study, what it was run with, and what its cells depend on."""
 
-import hashlib
 import inspect
 import json
+import shlex
 import subprocess
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from hashlib import sha256
 from importlib import import_module, metadata
 from pathlib import Path, PurePath
 from platform import python_version
-from typing import Any
+from typing import Any, NamedTuple, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 import dess
 from analysis.study import Study
 from dess.errors import InputError
-from dess.scenario import validation_line
+from dess.scenario import ScenarioSpace, load_scenario, validation_line
 from policies import load_team
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "pandas", "pyarrow")
+
+
+class Cell(NamedTuple):
+    """A team on a design point, by their numbers, with the key of what its records depend on.
+
+    ``key`` is a hash of all that the records depend on but the replication. ``first`` is the first
+    replication.
+    """
+
+    team: int
+    point: int
+    key: str
+    first: int
 
 
 class _Part(BaseModel):
@@ -27,12 +48,16 @@ class _Part(BaseModel):
 
 
 class Member(_Part):
-    """The identity of a policy: its name, its class, and hashes of the code and weights it has."""
+    """The identity of a policy: its name, its class, and hashes of the code and weights it has.
+
+    ``learner`` is the same for trained policies that differ in the seed of their training alone.
+    """
 
     name: str
     class_: str = Field(alias="class")
     code: str
     weights: str = ""
+    learner: str = ""
 
 
 class Team(_Part):
@@ -43,37 +68,21 @@ class Team(_Part):
 
 
 class DesignPoint(_Part):
-    """A design point: the values of the swept fields, and the whole scenario."""
+    """A design point: what it sets of the scenario, and its first replication."""
 
     values: dict[str, Any]
-    scenario: dict[str, Any]
-
-
-class Cell(_Part):
-    """A team on a scenario: all that its records depend on but the replication."""
-
-    version: str
-    code: str
-    seed: int
-    scenario: dict[str, Any]
-    members: list[Member]
-
-    @property
-    def text(self) -> str:
-        """The cell as canonical JSON."""
-        return json.dumps(self.model_dump(mode="json", by_alias=True), sort_keys=True)
-
-    @property
-    def key(self) -> str:
-        """A hash of the cell's content."""
-        return hashlib.sha256(self.text.encode()).hexdigest()[:16]
-
-    def __str__(self) -> str:
-        return ",".join(member.name for member in self.members)
+    replication: int = 0
 
 
 class Manifest(_Part):
-    """What a results folder is about. No clock and no path: equal runs have equal manifests."""
+    """What a results folder is about. No clock and no path: equal runs have equal manifests.
+
+    Attributes:
+        scenario: The whole scenario that the design points change.
+        missions: Wanted of every team and design point; grows where a rule decides it.
+        selected: The design point that was selected for every team, if the study selects.
+        complete: Whether all of it is there.
+    """
 
     schema_version: int
     version: str
@@ -82,8 +91,12 @@ class Manifest(_Part):
     libraries: dict[str, str]
     seed: int
     study: dict[str, Any]
+    scenario: dict[str, Any]
     policies: list[Team]
     points: list[DesignPoint]
+    missions: list[list[int]]
+    selected: list[int | None]
+    complete: bool
 
     @field_validator("study")
     @classmethod
@@ -93,11 +106,23 @@ class Manifest(_Part):
             raise ValueError("is not the data of a study")
         return study
 
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        shape = [len(self.points)] * len(self.policies)
+        if [*map(len, self.missions)] != shape or len(self.selected) != len(self.policies):
+            raise ValueError("missions, selected: not one for every policy and design point")
+        return self
+
     @classmethod
     def of(cls, study: Study) -> "Manifest":
         """The manifest of a study that is run by this code."""
-        # Where a scenario's file lies does not matter; what it says is in the design points.
+        # Where a scenario's file lies does not matter; what it says is told.
         data = study.model_dump(mode="json") | {"scenario": PurePath(study.scenario).name}
+        base = load_scenario(study.scenario, **study.set)
+        points = [
+            DesignPoint(values=json.loads(json.dumps(p.values)), replication=p.replication)
+            for p in study.points
+        ]
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
@@ -106,11 +131,12 @@ class Manifest(_Part):
             libraries={"python": python_version()} | {n: metadata.version(n) for n in LIBRARIES},
             seed=study.seed,
             study=data,
+            scenario=base.model_dump(mode="json"),
             policies=[Team(policy=team, members=_members(team)) for team in study.policies],
-            points=[
-                DesignPoint(values=p.values, scenario=p.scenario.model_dump(mode="json"))
-                for p in study.points
-            ],
+            points=points,
+            missions=[[study.first] * len(points)] * len(study.policies),
+            selected=[None] * len(study.policies),
+            complete=False,
         )
 
     @classmethod
@@ -149,8 +175,7 @@ class Manifest(_Part):
         teams = {team.policy: team for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [team.policy for team in self.policies if teams.get(team.policy, team) != team]
-        scenarios = [point.scenario for point in new.points]
-        foreign = any(point.scenario not in scenarios for point in self.points)
+        foreign = not set(self._point_keys) <= set(new._point_keys)
         complaints = {
             f"holds study {held}, not {name}": held != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
@@ -163,30 +188,66 @@ class Manifest(_Part):
             if holds:
                 raise InputError(f"{path}: {complaint}; {_ALLOWED}")
 
-    def cell(self, team: int, point: int) -> Cell:
-        """The cell of a team and a design point, both by number."""
-        return Cell(
-            version=self.version,
-            code=self.code,
-            seed=self.seed,
-            scenario=self.points[point].scenario,
-            members=self.policies[team].members,
-        )
+    def carried_on_from(self, held: "Manifest") -> "Manifest":
+        """This manifest, as far as an earlier run of the same study got."""
+        data = ("study", "policies", "points")
+        if any(getattr(self, name) != getattr(held, name) for name in data):
+            return self
+        progress = {name: getattr(held, name) for name in ("missions", "selected", "complete")}
+        return self.model_copy(update=progress)
 
-    @property
-    def cells(self) -> list[tuple[int, int, Cell]]:
-        """All cells with the numbers of their team and design point, in the order of the study."""
-        points = range(len(self.points))
-        return [(t, p, self.cell(t, p)) for t in range(len(self.policies)) for p in points]
+    def replay(self, cell: Cell, replication: int) -> str:
+        """The command that simulates a mission of a cell again."""
+        values = self.study["set"] | self.points[cell.point].values
+        settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
+        who = ["--policy", self.policies[cell.team].policy]
+        which = ["--seed", str(self.seed), "--replication", str(replication)]
+        scenario = ["--scenario", self.study["scenario"]]
+        return shlex.join(["dess", "simulate", *scenario, *settings, *who, *which])
+
+    @cached_property
+    def scenarios(self) -> tuple[ScenarioSpace, ...]:
+        """The scenario of every design point."""
+        return tuple(ScenarioSpace.of(**self.scenario | point.values) for point in self.points)
+
+    @cached_property
+    def _point_keys(self) -> list[str]:
+        texts = (space.model_dump_json() for space in self.scenarios)
+        return [f"{text} {p.replication}" for text, p in zip(texts, self.points, strict=True)]
+
+    @cached_property
+    def cells(self) -> tuple[tuple[Cell, ...], ...]:
+        """The cells of every team, in the order of the design points."""
+        run = {"version": self.version, "code": self.code, "seed": self.seed}
+        scenarios = [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
+        teams = []
+        for number, team in enumerate(self.policies):
+            members = [member.model_dump(mode="json", by_alias=True) for member in team.members]
+            whose = _canonical(run | {"members": members})
+            keys = (sha256((whose + text).encode()).hexdigest()[:16] for text in scenarios)
+            teams.append(
+                tuple(Cell(number, p, k, self.points[p].replication) for p, k in enumerate(keys))
+            )
+        return tuple(teams)
 
     @property
     def data(self) -> dict[str, Any]:
         """The manifest as plain data."""
         return self.model_dump(mode="json", by_alias=True)
 
+    @property
+    def text(self) -> str:
+        """The manifest as JSON, a line for each of its parts."""
+        lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
 
 _VERSIONS = ("version", "schema_version")
 _ALLOWED = "allowed: another --out, or remove the folder"
+
+
+def _canonical(data: Any) -> str:
+    return json.dumps(data, sort_keys=True)
 
 
 @lru_cache
@@ -197,7 +258,7 @@ def fingerprint(module: str) -> str:
     depth = len(imported.__package__.split(".")) if imported.__package__ else 0
     folders = [source.parents[level] for level in range(depth)]
     sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    digest = hashlib.sha256()
+    digest = sha256()
     for path in sources or [source]:
         digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()
@@ -212,6 +273,7 @@ def _members(team: str) -> list[Member]:
             "class": f"{kind.__module__}:{kind.__qualname__}",
             "code": fingerprint(kind.__module__),
             "weights": getattr(policy, "weights", ""),
+            "learner": getattr(policy, "learner", ""),
         }
         identities.append(Member.model_validate(identity))
     return identities

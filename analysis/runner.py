@@ -1,86 +1,61 @@
-"""Runs studies: splits them into jobs and runs these here, in joblib workers or on a dask cluster.
+"""Runs studies: splits them into jobs and has a pool do these; evaluates single teams.
 
 A job depends on nothing but its fields, so the result is the same wherever and in whatever order
-the jobs are run.
+the jobs are run. Where a rule decides how many missions there are, they come in rounds; what a
+round asks for depends on the missions of the rounds before it alone.
 """
 
-import signal
+import shlex
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, nullcontext
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from analysis.manifest import Cell, fingerprint
-from analysis.store import Results, Store, load_results
-from analysis.study import Study, load_study
-from dess import simulate, simulate_batch
+from analysis.jobs import Job, LogJob, MissionsJob, Problem, Progress
+from analysis.manifest import Cell
+from analysis.pools import Cluster, Here, Pool
+from analysis.results import Results, parts_of, results_of
+from analysis.store import Chunk, Failure, Part, Store, split
+from analysis.study import CHECK, Study, load_study
+from dess import simulate_batch
 from dess.errors import InputError
-from dess.record import Records, empty_records
+from dess.record import Records
 from dess.scenario import ScenarioSpace
 from policies import load_team
 
 # Missions of a chunk, by engine: enough to fill the batch, few enough to lose little.
-CHUNK = {"batch": 250, "events": 50}
+CHUNK = {"batch": 500, "events": 50}
 
-Progress = Callable[[int], object]
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """Consecutive replications of a team on a scenario."""
-
-    scenario: ScenarioSpace
-    team: str
-    seed: int
-    engine: str
-    part: range
-
-    def run(self, progress: Progress | None = None) -> Records:
-        """Simulate the missions; ``progress`` is told how many are done since its last call."""
-        team = load_team(self.team)
-        if self.engine == "batch":
-            return simulate_batch(self.scenario, team, self.seed, self.part, progress=progress)
-        records = empty_records(len(self.part), self.scenario.uavs[1])
-        for row, replication in enumerate(self.part):
-            record = simulate(self.scenario, team, self.seed, replication)
-            records.missions[row] = record.metrics
-            records.uavs[row, : len(record.uavs)] = record.uavs
-            if progress:
-                progress(1)
-        return records
-
-    def save(self, store: Store, cell: Cell, records: Records) -> None:
-        """Keep the records."""
-        store.write(cell, self.part, records)
+Counts = list[list[int]]  # missions of every team and design point
 
 
-@dataclass(frozen=True)
-class Log:
-    """One mission, for its event log."""
+class Round(NamedTuple):
+    """A round of a study.
 
-    scenario: ScenarioSpace
-    team: str
-    seed: int
-    replication: int
-    part = range(0)  # its record comes with a chunk
+    Attributes:
+        number: Which, from 0.
+        missions: Wanted of all rounds up to this one.
+        present: Of these, missions that are there already.
+    """
 
-    def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
-        """Simulate the mission with the SimPy engine."""
-        team = load_team(self.team)
-        log = simulate(self.scenario, team, self.seed, self.replication, events=True).events
-        assert log is not None
-        return log.columns()
-
-    def save(self, store: Store, cell: Cell, columns: dict[str, np.ndarray]) -> None:
-        """Keep the event log."""
-        store.write_log(cell, self.replication, columns)
+    number: int
+    missions: int
+    present: int
 
 
-Job = Chunk | Log
+class ChunkError(Exception):
+    """Some chunks of a study could not be computed, all others are there.
+
+    Attributes:
+        failures: What went wrong, by the file that tells it.
+    """
+
+    def __init__(self, failures: dict[Path, Failure]):
+        super().__init__(f"{len(failures)} chunks failed")
+        self.failures = failures
 
 
 def run_study(
@@ -89,6 +64,7 @@ def run_study(
     workers: int = 1,
     scheduler: str | None = None,
     progress: Progress | None = None,
+    announce: Callable[[Round], object] | None = None,
 ) -> Results:
     """Run a study into a results folder; what is there already is kept.
 
@@ -99,27 +75,30 @@ def run_study(
         out: The results folder.
         workers: Processes.
         scheduler: Address of a ``dask.distributed`` scheduler to run on instead.
-        progress: Called with the number of missions done since its last call, first with those
-            that are there already.
+        progress: Called with the number of missions done since its last call, first in every round
+            with those that are there already.
+        announce: Called before each round.
 
     Raises:
-        InputError: If the study is not valid, the folder cannot be written or holds something else,
-            or the scheduler cannot be used.
+        InputError: If the study is not valid, the folder cannot be written, is in use or holds
+            something else, or the scheduler cannot be used.
+        ChunkError: If something could not be computed; after all that could.
     """
     if not isinstance(study, Study):
         study = load_study(study)
+    with pool_of(workers, scheduler) as pool, Store.open(study, out) as store:
+        _Run(study, store, pool, progress, announce).complete()
+        return results_of(store)
+
+
+def pool_of(workers: int, scheduler: str | None = None) -> Pool:
+    """Who does the jobs: this process, processes of this machine, or a cluster.
+
+    Raises:
+        InputError: If there is no worker, or the scheduler cannot be used.
+    """
     check_workers(workers)
-    with _Cluster(scheduler) if scheduler else nullcontext(_Here(workers)) as pool:
-        store = Store.open(study, out)
-        todo = _jobs(study, store)
-        jobs = [job for _, job in todo]
-        if progress:
-            whole = study.missions * len(store.manifest.cells)
-            progress(whole - sum(len(job.part) for job in jobs))
-        for number, result in pool.run(jobs, progress):
-            cell, job = todo[number]
-            job.save(store, cell, result)
-    return load_results(out)
+    return Cluster(scheduler) if scheduler else Here(workers)
 
 
 def check_workers(workers: int) -> None:
@@ -132,16 +111,132 @@ def check_workers(workers: int) -> None:
         raise InputError(f"workers: {workers} is out of range; allowed: 1 or more")
 
 
-def _jobs(study: Study, store: Store) -> list[tuple[Cell, Job]]:
-    """What is missing in the folder, with the cells that it belongs to."""
-    todo: list[tuple[Cell, Job]] = []
-    for number, point, cell in store.manifest.cells:
-        scenario, team = study.points[point].scenario, study.policies[number]
-        for replication in store.missing_logs(cell, study.logged):
-            todo.append((cell, Log(scenario, team, study.seed, replication)))
-        for part in store.missing(cell, study.missions, CHUNK[study.engine]):
-            todo.append((cell, Chunk(scenario, team, study.seed, study.engine, part)))
-    return todo
+class _Run:
+    """A study on its way into its folder."""
+
+    def __init__(
+        self,
+        study: Study,
+        store: Store,
+        pool: Pool,
+        progress: Progress | None,
+        announce: Callable[[Round], object] | None,
+    ):
+        self.study, self.store, self.pool = study, store, pool
+        self.progress, self.announce = progress, announce
+        self.rounds = self.asked = 0  # so far; missions of all rounds
+
+    def complete(self) -> None:
+        """Do what is missing, round by round.
+
+        Raises:
+            ChunkError: If some of a round could not be computed, after the rest of it.
+        """
+        teams, points = range(len(self.study.policies)), range(len(self.study.points))
+        before: Counts = [[0 for _ in points] for _ in teams]
+        wanted: Counts = [[self.study.first for _ in points] for _ in teams]
+        logs = self._log_jobs()
+        while wanted != before:
+            self._round(new_parts(self.store, before, wanted), logs)
+            before, logs = wanted, []
+            wanted = [self._more(team, wanted[team]) for team in teams]
+        selected = [self._select(team, wanted[team]) for team in teams]
+        checks = [self._check(team, best) for team, best in enumerate(selected) if best is not None]
+        if any(part.replications for part in checks):
+            self._round(checks, [])
+        self.store.finish(wanted, selected)
+
+    def _more(self, team: int, counts: list[int]) -> list[int]:
+        """How many missions the rule wants of a team's points, now that these are there."""
+        rule = self.study.rule
+        return rule.wanted(self._samples(team, counts)) if rule else counts
+
+    def _select(self, team: int, counts: list[int]) -> int | None:
+        """The design point that is selected for a team, if the study selects."""
+        rule = self.study.selection
+        return rule.choice(self._samples(team, counts)).best if rule else None
+
+    def _check(self, team: int, best: int) -> Part:
+        """The missions that check what is selected, none of which selected it."""
+        assert self.study.selection
+        cell = self.store.manifest.cells[team][best]
+        return Part(cell, range(CHECK, CHECK + self.study.selection.check))
+
+    def _samples(self, team: int, counts: list[int]) -> list[dict[str, np.ndarray]]:
+        return self.store.samples(parts_of(self.store.manifest.cells[team], counts))
+
+    def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
+        """Do what is missing of the parts, all of a round that is new, and the logs."""
+        jobs, present = [*logs], 0
+        for chunk in split(parts, CHUNK[self.study.engine]):
+            missing = self.store.missing(chunk)
+            present += chunk.missions - (missing.missions if missing else 0)
+            if missing:
+                jobs.append(self._missions_job(missing))
+        self.asked += sum(len(part.replications) for part in parts)
+        if self.announce:
+            self.announce(Round(self.rounds, self.asked, present))
+        self.rounds += 1
+        if self.progress:
+            self.progress(present)
+        self._do(jobs)
+
+    def _log_jobs(self) -> list[Job]:
+        """The missions to fly anew whose event logs are wanted and not there."""
+        return [
+            LogJob(
+                Chunk(cell.team, (Part(cell, range(replication, replication + 1)),)),
+                self.study.points[cell.point].scenario,
+                self.study.policies[cell.team],
+                self.study.seed,
+            )
+            for cells in self.store.manifest.cells
+            for cell in cells
+            for replication in self.store.missing_logs(cell, self.study.logged)
+        ]
+
+    def _missions_job(self, chunk: Chunk) -> MissionsJob:
+        return MissionsJob(
+            chunk,
+            tuple(self.study.points[part.cell.point].scenario for part in chunk.parts),
+            self.study.policies[chunk.team],
+            self.study.seed,
+            self.study.engine,
+        )
+
+    def _do(self, jobs: Sequence[Job]) -> None:
+        """Do the jobs and keep what comes of them."""
+        failures = {}
+        for number, result in self.pool.run(jobs, self.progress):
+            job = jobs[number]
+            if not isinstance(result, Problem):
+                job.save(self.store, result)
+                continue
+            failure = self._failure(job, result)
+            failures[self.store.write_failure(job.chunk, failure)] = failure
+        if failures:
+            raise ChunkError(failures)
+
+    def _failure(self, job: Job, problem: Problem) -> Failure:
+        """What is told of a job that failed; without a culprit, the same study does it again."""
+        replay = shlex.join(
+            ["dess", "study", "run", self.study.name, "--out", str(self.store.folder)]
+        )
+        if mission := problem.mission:
+            replay = self.store.manifest.replay(mission.cell, mission.replications[0])
+        policy = self.study.policies[job.chunk.team]
+        return Failure(policy, job.missions, problem.error, replay, problem.traceback)
+
+
+def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
+    """What is wanted beyond what was, each mission once, in the order of the study."""
+    parts = [
+        Part(cell, range(cell.first + begin, cell.first + end))
+        for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True)
+        for cell, begin, end in zip(cells, begins, ends, strict=True)
+        if end > begin
+    ]
+    return [*{(p.cell.team, p.cell.key, p.replications): p for p in parts}.values()]
 
 
 @dataclass(frozen=True)
@@ -198,115 +293,27 @@ def evaluate(
             scenario, policies, seed, missions, workers=workers, progress=progress
         )
         return Evaluation(team, records, clock() - begin)
-    starts = range(0, missions, CHUNK[engine])
-    parts = [range(first, min(first + CHUNK[engine], missions)) for first in starts]
-    jobs = [Chunk(scenario, team, seed, engine, part) for part in parts]
-    pool, warm_up = _Here(workers), Chunk(scenario, team, seed, engine, range(1))
-    dict(pool.run([warm_up] * (1 if workers == 1 else 2 * workers)))
+    pool, one = Here(workers), Part(Cell(0, 0, "", 0), range(missions))
+    jobs = [
+        MissionsJob(chunk, (scenario,) * len(chunk.parts), team, seed, engine)
+        for chunk in split([one], CHUNK[engine])
+    ]
+    _results(pool, [next(jobs[0].alone())] * (1 if workers == 1 else 2 * workers))  # warms up
     begin = clock()
-    done = dict(pool.run(jobs, progress))
+    chunks = _results(pool, jobs, progress)
     seconds = clock() - begin
-    chunks = [done[number] for number in range(len(jobs))]
     records = Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))
     return Evaluation(team, records, seconds)
 
 
-class _Here:
-    """This machine: this process, or joblib workers."""
+def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
+    """What comes of all jobs, in their order.
 
-    def __init__(self, workers: int):
-        self.workers = workers
-
-    def run(
-        self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Iterator[tuple[int, Any]]:
-        """Run the jobs; their numbers and results as they come in."""
-        if self.workers == 1 or not jobs:
-            for number, job in enumerate(jobs):
-                yield number, job.run(progress)
-        else:
-            _compile(jobs)
-            yield from self._run_in_workers(jobs, progress)
-
-    def _run_in_workers(
-        self, jobs: Sequence[Job], progress: Progress | None
-    ) -> Iterator[tuple[int, Any]]:
-        from joblib import Parallel, delayed
-
-        parallel = Parallel(
-            self.workers,
-            return_as="generator_unordered",
-            batch_size=1,
-            initializer=_leave_interrupts_to_the_parent,
-        )
-        tasks = (delayed(_numbered)(number, job) for number, job in enumerate(jobs))
-        with closing(parallel(tasks)) as results:
-            for number, result in results:
-                if progress:
-                    progress(len(jobs[number].part))
-                yield number, result
-
-
-def _compile(jobs: Sequence[Job]) -> None:
-    """Compile what the jobs need, once, so that the workers only load it."""
-    for job in {job.team: job for job in jobs if isinstance(job, Chunk)}.values():
-        replace(job, part=range(1)).run()
-
-
-def _numbered(number: int, job: Job) -> tuple[int, Any]:
-    return number, job.run()
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-class _Cluster:
-    """A dask.distributed cluster, whose workers must have this code."""
-
-    def __init__(self, address: str):
-        try:
-            from distributed import Client
-            from distributed.comm import get_address_host_port
-        except ModuleNotFoundError:
-            raise InputError(
-                "scheduler: needs the package distributed: pip install dess[distributed]"
-            ) from None
-        try:
-            get_address_host_port(address)  # a Client that fails on it would hang when it is closed
-            self.client = Client(address, timeout="10s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"scheduler: {address} cannot be reached: {error}; allowed: tcp://HOST:PORT"
-            ) from None
-
-    def __enter__(self) -> "_Cluster":
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.client.close()
-
-    def run(
-        self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Iterator[tuple[int, Any]]:
-        """Run the jobs; their numbers and results as they come in."""
-        from distributed import as_completed
-
-        code = fingerprint("dess")
-        futures = [self.client.submit(_checked, job, code, pure=False) for job in jobs]
-        numbers = {future.key: number for number, future in enumerate(futures)}
-        try:
-            for future, result in as_completed(futures, loop=self.client.loop, with_results=True):
-                number = numbers[future.key]
-                if progress:
-                    progress(len(jobs[number].part))
-                yield number, result
-                future.release()
-        finally:
-            self.client.cancel(futures)
-
-
-def _checked(job: Job, code: str) -> Any:
-    if fingerprint("dess") != code:
-        raise InputError("scheduler: a worker has other code of dess; allowed: the same version")
-    return job.run()
+    Raises:
+        RuntimeError: If one failed.
+    """
+    done = dict(pool.run(jobs, progress))
+    for result in done.values():
+        if isinstance(result, Problem):
+            raise RuntimeError(f"{result.error}\n{result.traceback}")
+    return [done[number] for number in range(len(jobs))]

@@ -1,38 +1,111 @@
-"""A results folder: parquet chunks named after what they hold, and ``manifest.json``.
+"""A results folder: parquet files named after what they hold, and ``manifest.json``.
 
 ``manifest.json`` says what the folder is about. ``missions/`` and ``uavs/`` hold the records in
-chunks, ``events/`` the event logs. A file is named after its cell - scenario, team, seed and the
-code that computed it - and its replications, and is there whole or not at all; so a run resumes by
-computing what is missing. A file that is damaged counts as missing. Nothing is pickled, and nothing
-in the folder depends on when, where or by how many workers it was computed.
+chunks, partitioned by policy, ``events/`` the event logs, ``failures/`` what could not be computed.
+A file's name has two parts: a hash of what it holds - cells and replications - and one of its
+bytes, so a run resumes by computing what is missing, and a damaged file counts as missing. A file
+is there whole or not at all. Nothing is pickled, and nothing in the folder depends on when, where,
+in which order or by how many workers it was computed.
 """
 
 import json
 import os
-import re
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, Self
+from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from filelock import FileLock, Timeout
 
 from analysis.manifest import Cell, Manifest
 from analysis.study import Study
 from dess.errors import InputError
 from dess.record import MISSION_RECORD, UAV_RECORD, Records
-from dess.scenario import ScenarioSpace
 from dess.state import END_NAMES
 
-MANIFEST = "manifest.json"
-FOLDERS = ("missions", "uavs", "events")
+MANIFEST, LOCK = "manifest.json", ".lock"
+FOLDERS = ("missions", "uavs", "events", "failures")
 
-_CELL = b"dess.cell"  # the parquet metadata that says which cell a file belongs to
+_PARTS = b"dess.parts"  # the parquet metadata that says what a file holds, in its order
+_KEY = pa.dictionary(pa.int32(), pa.string())
+
+
+def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
+    assert record.fields is not None
+    return [(name, pa.from_numpy_dtype(kind[0])) for name, kind in record.fields.items()]
+
+
+# What the tables hold; ``cell`` is the key of the team and the scenario.
+MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
+UAVS = pa.schema(
+    [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
+)
+UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
+
+
+@dataclass(frozen=True)
+class Part:
+    """Consecutive replications of a cell."""
+
+    cell: Cell
+    replications: range
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """What is computed and kept together: parts of the cells of one team."""
+
+    team: int
+    parts: tuple[Part, ...]
+
+    @property
+    def missions(self) -> int:
+        """How many missions it has."""
+        return sum(len(part.replications) for part in self.parts)
+
+    @property
+    def rows(self) -> list[tuple[str, int, int]]:
+        """The key, start and stop of every part."""
+        return [(p.cell.key, p.replications.start, p.replications.stop) for p in self.parts]
+
+    @property
+    def name(self) -> str:
+        """A hash of what it holds."""
+        return _name(self.rows)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A chunk that could not be computed.
+
+    Attributes:
+        policy: The team.
+        missions: How many missions are missing for it.
+        error: What went wrong, in a line.
+        replay: A command that does it again.
+        traceback: Where it went wrong.
+    """
+
+    policy: str
+    missions: int
+    error: str
+    replay: str
+    traceback: str
+
+
+class _Tables(NamedTuple):
+    """What the files of a chunk hold."""
+
+    missions: pa.Table
+    uavs: pa.Table
 
 
 class Store:
@@ -40,173 +113,292 @@ class Store:
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
+        self._lock = FileLock(folder / LOCK)
+        self._tables: dict[tuple[int, str], _Tables] = {}  # by team and name of the chunk
+        self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
+        self._damaged: list[Path] = []
 
     @classmethod
-    def open(cls, study: Study, out: str | Path) -> "Store":
+    def open(cls, study: Study, out: str | Path) -> Self:
         """Open a results folder for a study: a new one, or one that the study completes or extends.
 
-        Raises:
-            InputError: If the folder cannot be written, or holds something else.
-        """
-        folder, manifest = Path(out), Manifest.of(study)
-        path = folder / MANIFEST
-        with _writable(folder):
-            if path.exists():
-                Manifest.read(path).check_extended_by(manifest, path)
-            elif folder.is_dir() and any(not _is_temporary(entry) for entry in folder.iterdir()):
-                raise InputError(
-                    f"{folder}: holds other files and no {MANIFEST}; "
-                    "allowed: a results folder, or a new or empty one (another --out)"
-                )
-            folder.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as temporary, _writable(path):
-            temporary.write_text(json.dumps(manifest.data, indent=2) + "\n", "utf-8")
-        for name in FOLDERS:
-            with _writable(folder / name):
-                (folder / name).mkdir(exist_ok=True)
-        return cls(folder, manifest)
+        It stays locked until it is closed, at the end of a ``with`` block.
 
-    def missing(self, cell: Cell, missions: int, chunk: int) -> list[range]:
-        """The replications of a cell that are not there, in chunks of at most that many."""
-        gaps, begin = [], 0
-        present = [part for part, tables in self._chunks(cell) if tables]
-        for part in [*present, range(missions, missions)]:
-            end = min(part.start, missions)
-            gaps += [range(first, min(first + chunk, end)) for first in range(begin, end, chunk)]
-            begin = max(begin, part.stop)
-        return gaps
+        Raises:
+            InputError: If the folder cannot be written, holds something else, or is in use.
+        """
+        folder = Path(out)
+        store = cls(folder, _extended(folder, Manifest.of(study)))
+        with _writable(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        store._acquire()
+        try:
+            store._prepare()
+        except BaseException:
+            store._lock.release()
+            raise
+        return store
+
+    @classmethod
+    def read(cls, out: str | Path) -> Self:
+        """A results folder to load from; nothing is written or locked.
+
+        Raises:
+            InputError: If the folder holds none, or one of another version.
+        """
+        store = cls(Path(out), Manifest.read(Path(out) / MANIFEST))
+        store._scan()
+        return store
+
+    @classmethod
+    def peek(cls, study: Study, out: str | Path) -> Self:
+        """What ``open`` would find, to count what is missing; nothing is written or locked.
+
+        Raises:
+            InputError: If the folder holds something else.
+        """
+        store = cls(Path(out), _extended(Path(out), Manifest.of(study)))
+        store._scan()
+        return store
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.release()
+
+    def _acquire(self) -> None:
+        with _writable(self.folder):
+            try:
+                self._lock.acquire(timeout=0)
+            except Timeout:
+                raise InputError(
+                    f"{self.folder}: in use by another run; "
+                    "allowed: another --out, or wait for its end"
+                ) from None
+
+    def _prepare(self) -> None:
+        """Write the manifest, sweep up what a killed run has left, and see what is there."""
+        self.manifest = _extended(self.folder, self.manifest)  # another run may have ended here
+        self._write_manifest()
+        for name in FOLDERS:
+            with _writable(self.folder / name):
+                (self.folder / name).mkdir(exist_ok=True)
+        for path in [*self.folder.glob(".*.tmp"), *self.folder.glob("*/*/.*.tmp")]:
+            path.unlink()
+        self._scan()
+        while self._damaged:
+            self._damaged.pop().unlink()
+
+    def _scan(self) -> None:
+        """Learn which missions are there, and which files are damaged."""
+        for team in range(len(self.manifest.policies)):
+            uavs = {_id(path): self._whole(path, UAVS) for path in self._files("uavs", team)}
+            for path in self._files("missions", team):
+                missions, of_uavs = self._whole(path, MISSIONS), uavs.get(_id(path))
+                if missions is not None and of_uavs is not None:
+                    self._enter(team, _id(path), _Tables(missions, of_uavs))
+            for path in self._files("events", team):
+                self._whole(path)
+
+    def _whole(self, path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
+        """What a file holds; if that is not what its name says, it is damaged."""
+        table = _read(path, schema)
+        if table is None or (schema and _name(_rows(table)) != _id(path)):
+            self._damaged.append(path)
+            return None
+        return table
+
+    def _enter(self, team: int, name: str, tables: "_Tables") -> None:
+        self._tables[team, name] = tables
+        for key, start, stop in _rows(tables.missions):
+            self._present[team, key].append(range(start, stop))
+
+    def _files(self, kind: str, team: int) -> list[Path]:
+        return sorted(self._partition(kind, team).glob("*.parquet"))
+
+    def _partition(self, kind: str, team: int) -> Path:
+        policy = quote(self.manifest.policies[team].policy, safe="")
+        return self.folder / kind / f"policy={policy}"
+
+    def missing(self, chunk: Chunk) -> Chunk | None:
+        """What is not there of a chunk, if anything."""
+        parts = tuple(
+            Part(part.cell, gap)
+            for part in chunk.parts
+            for gap in _gaps(part.replications, self._present[chunk.team, part.cell.key])
+        )
+        return Chunk(chunk.team, parts) if parts else None
 
     def missing_logs(self, cell: Cell, logged: int) -> list[int]:
-        """The replications below ``logged`` whose event log is not there."""
-        return [r for r in range(logged) if self.load_log(cell, r) is None]
+        """The first replications, that many, whose event log is not there."""
+        wanted = range(cell.first, cell.first + logged)
+        return [r for r in wanted if self.load_log(cell, r) is None]
 
-    def write(self, cell: Cell, part: range, records: Records) -> None:
-        """Keep the records of consecutive replications of a cell."""
+    def write(self, chunk: Chunk, records: Records) -> None:
+        """Keep the records of a chunk.
+
+        Raises:
+            ValueError: If they are not those of the chunk.
+        """
+        cells = np.repeat(
+            [part.cell.key for part in chunk.parts],
+            [len(part.replications) for part in chunk.parts],
+        )
+        missions, uavs = _mission_table(cells, records), _uav_table(cells, records)
+        self._check(chunk, missions)
+        parts = {_PARTS: json.dumps(chunk.rows)}
+        tables = _Tables(*(t.replace_schema_metadata(parts) for t in (missions, uavs)))
         # Missions last: a chunk is there when they are.
-        self._write(self._chunk("uavs", cell, part), cell, _uav_table(records))
-        self._write(self._chunk("missions", cell, part), cell, _mission_table(records))
+        self._write("uavs", chunk.team, chunk.name, tables.uavs)
+        self._write("missions", chunk.team, chunk.name, tables.missions)
+        self._enter(chunk.team, chunk.name, tables)
+        self._failure(chunk).unlink(missing_ok=True)
+
+    def _check(self, chunk: Chunk, missions: pa.Table) -> None:
+        """The door: what comes in is what was asked for, and has no holes."""
+        wanted = np.concatenate([part.replications for part in chunk.parts])
+        if not np.array_equal(missions["replication"], wanted):
+            raise ValueError("the records are not of the replications that were asked for")
+        if set(missions["seed"].to_pylist()) != {self.manifest.seed}:
+            raise ValueError(f"the records are not of seed {self.manifest.seed}")
+        for field in missions.schema:
+            column = missions[field.name]
+            if pa.types.is_floating(field.type) and not np.isfinite(column).all():
+                raise ValueError(f"the records have a {field.name} that is no number")
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
         """Keep the event log of a replication of a cell."""
-        self._write(self._log(cell, replication), cell, pa.table(columns))
+        self._write("events", cell.team, f"{cell.key}-{replication:06}", pa.table(columns))
 
-    def load(self, cell: Cell, missions: int) -> tuple[pa.Table, pa.Table]:
-        """The first missions of a cell, and their UAVs.
+    def _write(self, kind: str, team: int, name: str, table: pa.Table) -> None:
+        sink = pa.BufferOutputStream()
+        pq.write_table(table, sink, compression="zstd")
+        content = sink.getvalue().to_pybytes()
+        path = self._partition(kind, team) / f"{name}-{_hash(content)}.parquet"
+        with _writable(path):
+            path.parent.mkdir(exist_ok=True)
+        with replacing(path) as temporary, _writable(path):
+            temporary.write_bytes(content)
+
+    def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
+        """Keep why a chunk could not be computed; its path."""
+        path = self._failure(chunk)
+        with replacing(path) as temporary, _writable(path):
+            temporary.write_text(json.dumps(asdict(failure), indent=2) + "\n", "utf-8")
+        return path
+
+    def _failure(self, chunk: Chunk) -> Path:
+        return self.folder / "failures" / f"{chunk.name}.json"
+
+    def finish(self, missions: Sequence[Sequence[int]], selected: Sequence[int | None]) -> None:
+        """Note how many missions every team and design point has, and that all of it is there."""
+        update = {"missions": missions, "selected": selected, "complete": True}
+        self.manifest = self.manifest.model_copy(update=update)
+        self._write_manifest()
+        for path in (self.folder / "failures").glob("*.json"):
+            path.unlink()
+
+    def _write_manifest(self) -> None:
+        path = self.folder / MANIFEST
+        with replacing(path) as temporary, _writable(path):
+            temporary.write_text(self.manifest.text, "utf-8")
+
+    def load(self, parts: Sequence[Part]) -> tuple[pd.DataFrame, pd.DataFrame]:
+        """The missions of parts of one team, and their UAVs: with ``point``, in the order asked.
 
         Raises:
             InputError: If some are missing or damaged.
         """
-        tables, damaged, begin = [], "", 0
-        for part, chunk in self._chunks(cell):
-            if chunk is None:
-                damaged = damaged or f" (damaged: {self._chunk('missions', cell, part).name})"
-            elif part.start == begin:
-                tables.append(chunk)
-                begin = part.stop
-        if begin < missions:
-            raise InputError(
-                f"{self.folder}: incomplete, the first {begin} of {missions} missions of "
-                f"{cell}{damaged}; allowed: run the study again to complete it"
-            )
-        of_missions, of_uavs = (pa.concat_tables(kind) for kind in zip(*tables, strict=True))
-        wanted = pc.less(of_uavs["replication"], missions)
-        return of_missions.slice(0, missions), of_uavs.filter(wanted)
+        for part in parts:
+            here = self._present[part.cell.team, part.cell.key]
+            for gap in _gaps(part.replications, here)[:1]:
+                raise InputError(self._incomplete(part, gap))
+        team, wanted = parts[0].cell.team, _wanted(parts)
+        tables = [tables for (whose, _), tables in self._tables.items() if whose == team]
+        missions, uavs = zip(*tables, strict=True)
+        return _taken(_stacked(missions), wanted), _taken(_stacked(uavs), wanted)
+
+    def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
+        """The metrics of the missions of every part."""
+        missions = self.load(parts)[0]
+        ends = np.cumsum([len(part.replications) for part in parts])
+        columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
+        return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
+
+    def _incomplete(self, part: Part, gap: range) -> str:
+        team, values = part.cell.team, self.manifest.points[part.cell.point].values
+        where = f" at {json.dumps(values)}" if values else ""
+        there = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
+        line = f"{self.folder}: incomplete, {there} missions of "
+        line += f"{self.manifest.policies[team].policy}{where}"
+        if self._damaged:
+            line += f" (damaged: {self._damaged[0]})"
+        if failed := sorted((self.folder / "failures").glob("*.json")):
+            line += f" ({len(failed)} chunks failed, see {failed[0]})"
+        return f"{line}; allowed: run the study again to complete it"
 
     def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
         """The event log of a replication of a cell, if it is there."""
-        return _read(self._log(cell, replication), cell)
-
-    def _chunks(self, cell: Cell) -> list[tuple[range, tuple[pa.Table, pa.Table] | None]]:
-        """The chunks of a cell in order, with their missions and UAVs unless these are damaged."""
-        pattern = re.compile(rf"{cell.key}-(\d+)-(\d+)\.parquet")
-        names = (entry.name for entry in (self.folder / "missions").glob("*.parquet"))
-        found = (pattern.fullmatch(name) for name in names)
-        parts = (range(int(match[1]), int(match[2])) for match in found if match)
-        ordered = sorted(parts, key=lambda part: (part.start, part.stop))
-        return [(part, self._records(cell, part)) for part in ordered]
-
-    def _records(self, cell: Cell, part: range) -> tuple[pa.Table, pa.Table] | None:
-        missions = _read(self._chunk("missions", cell, part), cell)
-        uavs = _read(self._chunk("uavs", cell, part), cell)
-        if missions is None or uavs is None:
-            return None
-        in_place = np.array_equal(missions["replication"], part)
-        return (missions, uavs) if in_place else None
-
-    def _chunk(self, kind: str, cell: Cell, part: range) -> Path:
-        return self.folder / kind / f"{cell.key}-{part.start:06}-{part.stop:06}.parquet"
-
-    def _log(self, cell: Cell, replication: int) -> Path:
-        return self.folder / "events" / f"{cell.key}-{replication:06}.parquet"
-
-    def _write(self, path: Path, cell: Cell, table: pa.Table) -> None:
-        write_table(table.replace_schema_metadata({_CELL: cell.text}), path)
+        pattern = f"{cell.key}-{replication:06}-*.parquet"
+        tables = map(_read, self._partition("events", cell.team).glob(pattern))
+        return next((table for table in tables if table is not None), None)
 
 
-@dataclass(frozen=True, eq=False)
-class Results:
-    """The results of a study.
-
-    Attributes:
-        store: The folder that they come from.
-        missions: A row per mission: ``policy``, ``point`` (number of the design point), the swept
-            fields that are no fields of the record, and those of ``MISSION_RECORD``; in the order
-            of policy (as the study names them), point and replication.
-        uavs: A row per UAV of each: ``policy``, ``point``, ``replication``, ``uav`` and the fields
-            of ``UAV_RECORD``, with the name of its ``end``.
-    """
-
-    store: Store
-    missions: pd.DataFrame
-    uavs: pd.DataFrame
-
-    @property
-    def manifest(self) -> dict[str, Any]:
-        """What the results are about, as plain data."""
-        return self.store.manifest.data
-
-    def scenario(self, point: int = 0) -> ScenarioSpace:
-        """The scenario of a design point."""
-        return ScenarioSpace.of(**self.store.manifest.points[point].scenario)
-
-    def events(self, policy: str, point: int = 0, replication: int = 0) -> pd.DataFrame:
-        """The event log of a mission, with the columns of ``dess.record.EventLog``.
-
-        Raises:
-            InputError: If it has not been kept.
-        """
-        manifest = self.store.manifest
-        teams = [team.policy for team in manifest.policies]
-        if policy not in teams:
-            raise InputError(f"policy: {policy!r} is not in the study; allowed: {', '.join(teams)}")
-        if not 0 <= point < len(manifest.points):
-            last = len(manifest.points) - 1
-            raise InputError(f"point: {point} is not in the study; allowed: 0..{last}")
-        log = self.store.load_log(manifest.cell(teams.index(policy), point), replication)
-        if log is None:
-            raise InputError(
-                f"{self.store.folder}: no event log of {policy}, point {point}, replication "
-                f"{replication}; allowed: 0..logged - 1, logged = {manifest.study['logged']}"
-            )
-        return log.to_pandas()
+def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
+    """Parts in their order as chunks of ``size`` missions; a chunk has one team."""
+    waiting: list[Part] = []
+    room = size
+    for part in parts:
+        if waiting and waiting[0].cell.team != part.cell.team:
+            yield Chunk(waiting[0].cell.team, tuple(waiting))
+            waiting, room = [], size
+        rest = part.replications
+        while len(rest):
+            waiting.append(Part(part.cell, rest[:room]))
+            rest, room = rest[room:], room - len(rest[:room])
+            if not room:
+                yield Chunk(part.cell.team, tuple(waiting))
+                waiting, room = [], size
+    if waiting:
+        yield Chunk(waiting[0].cell.team, tuple(waiting))
 
 
-def load_results(out: str | Path) -> Results:
-    """Load the results of a study.
+def _gaps(wanted: range, present: list[range]) -> list[range]:
+    """What of a range is in none of the others."""
+    gaps, begin = [], wanted.start
+    for there in sorted(present, key=lambda r: r.start):
+        if there.start > begin:
+            gaps.append(range(begin, min(there.start, wanted.stop)))
+        begin = max(begin, there.stop)
+        if begin >= wanted.stop:
+            break
+    return [gap for gap in [*gaps, range(begin, wanted.stop)] if len(gap)]
 
-    Raises:
-        InputError: If the folder holds none, or they are incomplete, damaged or of another version.
-    """
-    store = Store(Path(out), Manifest.read(Path(out) / MANIFEST))
-    missions, uavs = [], []
-    for team, point, cell in store.manifest.cells:
-        of_missions, of_uavs = store.load(cell, store.manifest.study["missions"])
-        labels = {"policy": store.manifest.policies[team].policy, "point": point}
-        missions.append(_labelled(of_missions, labels | _swept(store.manifest, point)))
-        uavs.append(_labelled(of_uavs, labels))
-    return Results(
-        store, pd.concat(missions, ignore_index=True), pd.concat(uavs, ignore_index=True)
+
+def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
+    """A row per mission of the parts: its design point, cell and replication."""
+    lengths = [len(part.replications) for part in parts]
+    return pd.DataFrame(
+        {
+            "point": np.repeat([part.cell.point for part in parts], lengths),
+            "cell": np.repeat([part.cell.key for part in parts], lengths),
+            "replication": np.concatenate([part.replications for part in parts]),
+        }
     )
+
+
+def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
+    """The rows of all tables."""
+    frame = pa.concat_tables(tables).unify_dictionaries().to_pandas()
+    return frame.astype({"cell": str})
+
+
+def _taken(table: pd.DataFrame, wanted: pd.DataFrame) -> pd.DataFrame:
+    """The rows of a table that are wanted, in the order in which they are."""
+    by = ["cell", "replication"]
+    rows = wanted.merge(table, on=by, how="left", validate="m:m")
+    return rows[["point", *table.columns.drop("cell")]]
 
 
 @contextmanager
@@ -229,16 +421,6 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_table(table: pa.Table, path: Path) -> None:
-    """Write a parquet file, whole or not at all; its pages carry checksums.
-
-    Raises:
-        InputError: If it cannot be written.
-    """
-    with replacing(path) as temporary, _writable(path):
-        pq.write_table(table, temporary, compression="zstd", write_page_checksum=True)
-
-
 @contextmanager
 def _writable(path: Path) -> Iterator[None]:
     """Turn what the operating system says into one line."""
@@ -249,47 +431,82 @@ def _writable(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: cannot be written: {reason}; allowed: another path") from None
 
 
-def _is_temporary(path: Path) -> bool:
-    """Whether a killed run may have left the file behind."""
-    return path.name.startswith(".") and path.suffix == ".tmp"
+def _extended(folder: Path, manifest: Manifest) -> Manifest:
+    """The manifest of a folder that is to hold this study.
+
+    Raises:
+        InputError: If it holds something else.
+    """
+    path = folder / MANIFEST
+    with _writable(folder):
+        if not path.exists():
+            others = [e for e in folder.iterdir() if not _is_ours(e)] if folder.is_dir() else []
+            if others:
+                raise InputError(
+                    f"{folder}: holds other files and no {MANIFEST}; "
+                    "allowed: a results folder, or a new or empty one (another --out)"
+                )
+            return manifest
+    held = Manifest.read(path)
+    held.check_extended_by(manifest, path)
+    return manifest.carried_on_from(held)
 
 
-def _mission_table(records: Records) -> pa.Table:
-    fields = MISSION_RECORD.names or ()
-    return pa.table({field: np.ascontiguousarray(records.missions[field]) for field in fields})
+def _is_ours(path: Path) -> bool:
+    """Whether a run may have made it before the manifest was there."""
+    return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")
 
 
-def _uav_table(records: Records) -> pa.Table:
-    present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
-    mission, uav = np.nonzero(present)
-    columns = {"replication": records.missions["replication"][mission], "uav": uav}
-    columns |= {field: records.uavs[field][present] for field in UAV_RECORD.names or ()}
-    columns["end"] = np.array(END_NAMES)[columns["end"]]
-    return pa.table(columns)
+def _hash(content: bytes) -> str:
+    return sha256(content).hexdigest()[:16]
 
 
-def _read(path: Path, cell: Cell) -> pa.Table | None:
-    """A parquet file of a cell; nothing if it is not there, damaged, or of another cell."""
+def _rows(table: pa.Table) -> list[tuple[str, int, int]]:
+    """The parts that a table holds."""
+    return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
+
+
+def _name(rows: Sequence[Sequence[Any]]) -> str:
+    """What a file is called that holds these parts."""
+    return _hash(json.dumps(rows).encode())
+
+
+def _id(path: Path) -> str:
+    """What a file's name says of what it holds."""
+    return path.stem.rpartition("-")[0]
+
+
+def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
+    """A parquet file; nothing if it is damaged, or not of the schema."""
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            table = file.read()
+        content = path.read_bytes()
+        if _hash(content) != path.stem.rpartition("-")[2]:
+            return None
+        table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
     except (OSError, pa.ArrowException):
         return None
-    of_cell = (table.schema.metadata or {}).get(_CELL) == cell.text.encode()
-    return table if of_cell else None
+    return table if schema is None or table.schema.equals(schema) else None
 
 
-def _swept(manifest: Manifest, point: int) -> dict[str, Any]:
-    """The values of the swept fields that no record has; as JSON text where some are lists."""
-    designs = [p.values for p in manifest.points]
-    labels = {}
-    for field, value in designs[point].items():
-        if field not in (MISSION_RECORD.names or ()):
-            plain = not any(isinstance(design[field], list) for design in designs)
-            labels[field] = value if plain else json.dumps(value)
-    return labels
+def _mission_table(cells: np.ndarray, records: Records) -> pa.Table:
+    columns = {name: records.missions[name] for name in MISSION_RECORD.names or ()}
+    return _table({"cell": cells} | columns, MISSIONS)
 
 
-def _labelled(table: pa.Table, labels: dict[str, Any]) -> pd.DataFrame:
-    frame = table.to_pandas()
-    return pd.concat([pd.DataFrame(labels, index=frame.index), frame], axis="columns")
+def _uav_table(cells: np.ndarray, records: Records) -> pa.Table:
+    present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
+    mission, uav = np.nonzero(present)
+    columns = {
+        "cell": cells[mission],
+        "replication": records.missions["replication"][mission],
+        "uav": uav,
+    }
+    columns |= {field: records.uavs[field][present] for field in UAV_RECORD.names or ()}
+    columns["end"] = np.array(END_NAMES)[columns["end"]]
+    return _table(columns, UAVS)
+
+
+def _table(columns: dict[str, np.ndarray], schema: pa.Schema) -> pa.Table:
+    arrays = {"cell": pa.array(columns.pop("cell")).dictionary_encode()}
+    arrays |= {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
+    return pa.table(arrays, schema=schema)

@@ -1,8 +1,8 @@
 """Studies: policies x design points x replications, as data."""
 
+from collections import Counter
 from functools import cached_property
 from importlib import resources
-from itertools import product
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
 
@@ -15,6 +15,9 @@ from pydantic import (
     model_validator,
 )
 
+from analysis.design import Design, DesignPoint, Saltelli
+from analysis.precision import Precision
+from analysis.selection import Selection
 from dess.errors import InputError
 from dess.scenario import (
     Integer,
@@ -24,22 +27,27 @@ from dess.scenario import (
     scenario_names,
     validation_line,
 )
-from dess.streams import MAX_REPLICATION, MAX_SEED
+from dess.streams import MAX_SEED
 from policies import load_team
+
+# The first replication of the missions that check a selected setting: none that selected it.
+CHECK = 1_000_000_000
 
 
 class Point(NamedTuple):
-    """A design point: the values of the swept fields, and the scenario that they make."""
+    """A design point: what the design sets, the scenario that this makes, its first replication."""
 
     values: dict[str, Any]
     scenario: ScenarioSpace
+    replication: int = 0
 
 
 class Study(BaseModel):
     """Policies x design points x replications.
 
-    Every policy meets the same replications (common random numbers). ``load_study`` makes one from
-    a file, with one-line errors.
+    Every policy meets the same replications, and so does every design point (common random
+    numbers). How many replications a design point gets is ``missions``, or decided on the way by
+    ``precision`` or ``selection``. ``load_study`` makes one from a file, with one-line errors.
 
     Raises:
         pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
@@ -53,12 +61,18 @@ class Study(BaseModel):
     description: str = Field("", description="what the study is about, in a line")
     scenario: str = Field("paper", description="a shipped scenario or a TOML file")
     set: dict[str, Any] = Field({}, description="fields of the scenario, the same everywhere")
-    sweep: dict[str, tuple[Any, ...]] = Field(
-        {}, description="field -> values; the design points are their cartesian product, in order"
+    design: Design | None = Field(
+        None, description="the design points; without one, the scenario is the only point"
     )
     policies: tuple[str, ...] = Field(min_length=1, description='teams: "P" or "P,P,..."')
     missions: Integer = Field(
-        1000, ge=1, le=MAX_REPLICATION + 1, description="per design point and policy"
+        1000, ge=1, le=CHECK, description="per design point and policy; with a rule, not given"
+    )
+    precision: Precision | None = Field(
+        None, description="a rule: as many missions as narrow intervals take"
+    )
+    selection: Selection | None = Field(
+        None, description="a rule: as many missions as finding the best design point takes"
     )
     seed: Integer = Field(0, ge=0, le=MAX_SEED)
     engine: Literal["batch", "events"] = "batch"
@@ -70,13 +84,6 @@ class Study(BaseModel):
     @classmethod
     def _list_to_tuple(cls, value: Any) -> Any:
         return tuple(value) if isinstance(value, list) else value
-
-    @field_validator("sweep", mode="before")
-    @classmethod
-    def _lists_to_tuples(cls, value: Any) -> Any:
-        if not isinstance(value, dict):
-            return value
-        return {key: tuple(v) if isinstance(v, list) else v for key, v in value.items()}
 
     @field_validator("policies")
     @classmethod
@@ -90,26 +97,55 @@ class Study(BaseModel):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
-        for key, values in self.sweep.items():
-            if key in self.set:
-                raise ValueError(f"sweep: {key} is also in set; allowed: either")
-            if not values:
-                raise ValueError(f"sweep: {key} has no values; allowed: one or more")
-        if self.logged > self.missions:
+        self._check_rule()
+        self._check_design()
+        if self.logged > self.first:
             raise ValueError(
-                f"logged: {self.logged} is more than the missions; allowed: 0..{self.missions}"
+                f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
             )
-        scenarios = [point.scenario for point in self.points]
-        for number, point in enumerate(self.points):
-            if point.scenario in scenarios[:number]:
-                raise ValueError(f"sweep: {_shown(point.values)} is there twice; allowed: once")
+        assert self.points  # their scenarios are valid, or this raises
         return self
+
+    def _check_rule(self) -> None:
+        if self.precision and self.selection:
+            raise ValueError("precision: selection is there too; allowed: either")
+        if self.rule and "missions" in self.model_fields_set:
+            rule = "precision" if self.precision else "selection"
+            raise ValueError(f"missions: are decided by {rule}; allowed: either")
+        if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
+            raise ValueError(
+                "missions: every point of a saltelli design is one mission; allowed: missions = 1"
+            )
+
+    def _check_design(self) -> None:
+        designs = [values for values, _ in self._rows]
+        for values in designs:
+            if both := sorted(self.set.keys() & values.keys()):
+                raise ValueError(f"design: {both[0]} is also in set; allowed: either")
+        if hasattr(self.design, "ranges"):  # drawn integers may well fall together
+            return
+        for shown, count in Counter(map(_shown, designs)).items():
+            if count > 1:
+                raise ValueError(f"design: {shown} is there twice; allowed: once")
+
+    @property
+    def rule(self) -> Precision | Selection | None:
+        """What decides how many replications a design point gets, if they are not fixed."""
+        return self.precision or self.selection
+
+    @property
+    def first(self) -> int:
+        """Replications of every cell before a rule, if there is one, asks for more."""
+        return self.rule.first if self.rule else self.missions
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
-        """The design points: the cartesian product of the sweep, the last field varying fastest."""
-        designs = (dict(zip(self.sweep, v, strict=True)) for v in product(*self.sweep.values()))
-        return tuple(Point(values, self._scenario_at(values)) for values in designs)
+        """The design points in the order of the design."""
+        return tuple(Point(v, self._scenario_at(v), first) for v, first in self._rows)
+
+    @property
+    def _rows(self) -> tuple[DesignPoint, ...]:
+        return self.design.points if self.design else (DesignPoint({}),)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         try:

@@ -65,11 +65,13 @@ def simulate_batch(
         raise ValueError(f"workers and lanes must be at least 1, not {workers} and {lanes}")
     team = team_of(policy)
     if isinstance(scenario, Scenario | ScenarioSpace):
-        spaces, kinds = spaces_of([scenario]), np.zeros(len(numbers), np.int64)
-    else:
-        spaces, kinds = spaces_of(scenario), np.arange(len(numbers))
-        if len(spaces) != len(numbers):
-            raise ValueError(f"{len(spaces)} scenarios for {len(numbers)} replications")
+        scenario = [scenario] * len(numbers)
+    if len(scenario) != len(numbers):
+        raise ValueError(f"{len(scenario)} scenarios for {len(numbers)} replications")
+    distinct = {id(space): space for space in scenario}
+    row = {identity: number for number, identity in enumerate(distinct)}
+    kinds = np.array([row[id(space)] for space in scenario], np.int64)
+    spaces = spaces_of([*distinct.values()])
     records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
     stop = Event()
 

@@ -7,8 +7,8 @@ import json
 import shlex
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -16,15 +16,15 @@ import typer
 from typer.exceptions import TyperException
 
 from dess.errors import InputError
+from reports import console, study
 
 if TYPE_CHECKING:
     import numpy as np
 
     from dess import ScenarioSpace
     from dess.record import EventLog, MissionRecord
-    from policies.ddqn.training import Training
 
-RESULTS, REPORTS = Path("results"), Path("build/reports")
+REPORTS = Path("build/reports")
 INTERRUPTED = 130  # what typer returns after Ctrl-C
 FIGURES = (".png", ".pdf", ".svg")
 
@@ -46,8 +46,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-study_app = typer.Typer(help="Run studies: policies x design points x replications.")
-app.add_typer(study_app, name="study")
+app.add_typer(study.app, name="study")
 
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
@@ -61,8 +60,6 @@ SetOption = Annotated[
     ),
 ]
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all randomness.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
-WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="How many to work at once.")]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -79,16 +76,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TyperException as error:
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context else ""
-        return _fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
+        return console.fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
     except InputError as error:
-        return _fail(f"dess: error: {error}", 2)
-    return _fail("interrupted", 1) if code == INTERRUPTED else code or 0
-
-
-def _fail(message: str, code: int) -> int:
-    """Say in one line on stderr why the command ends with this exit code."""
-    print(" ".join(message.split()), file=sys.stderr)
-    return code
+        return console.fail(f"dess: error: {error}", 2)
+    return console.fail("interrupted", 1) if code == INTERRUPTED else code or 0
 
 
 @app.command()
@@ -106,7 +97,7 @@ def simulate(
     figure: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw the mission.")
     ] = None,
-    as_json: JsonOption = False,
+    as_json: study.JsonOption = False,
 ) -> None:
     """Simulate one mission with the SimPy model."""
     from analysis.store import replacing
@@ -121,7 +112,7 @@ def simulate(
     with ExitStack() as files:
         log_file = files.enter_context(replacing(events)) if events else None
         figure_file = files.enter_context(replacing(figure)) if figure else None
-        with _compile_notice():
+        with console.compile_notice():
             record = simulate(space, team, seed, replication, events=bool(log_file or figure_file))
         if log_file and record.events:
             _write_log(record.events, log_file)
@@ -147,8 +138,8 @@ def evaluate(
     engine: Annotated[
         Literal["batch", "events"], typer.Option(help="Both engines give the same records.")
     ] = "batch",
-    workers: WorkersOption = 1,
-    as_json: JsonOption = False,
+    workers: study.WorkersOption = 1,
+    as_json: study.JsonOption = False,
 ) -> None:
     """Metrics of many missions, with 95 % intervals."""
     from analysis.runner import evaluate
@@ -159,7 +150,7 @@ def evaluate(
     for team in policy:
         load_team(team)
     check_seed(seed, missions - 1)
-    with _compile_notice(), _progress(missions * len(policy)) as progress:
+    with console.compile_notice(), console.missions_bar(missions * len(policy)) as progress:
         evaluations = [
             evaluate(space, team, missions, seed, engine, workers, progress) for team in policy
         ]
@@ -181,45 +172,6 @@ def evaluate(
         _print_evaluations(rows)
 
 
-@study_app.command("run")
-def study_run(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help=f"Results folder.  [default: {RESULTS}/NAME]"),
-    ] = None,
-    workers: WorkersOption = 1,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Run on this dask.distributed scheduler."),
-    ] = None,
-    missions: Annotated[
-        int | None, typer.Option(min=1, help="Missions per design point and policy.")
-    ] = None,
-    policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", help="Policies instead; repeatable.")
-    ] = None,
-) -> None:
-    """Run a study into a results folder; run again to resume or to top up."""
-    from analysis.runner import run_study
-    from analysis.study import load_study
-
-    changes = {"missions": missions, "policies": policy}
-    study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
-    out = out or RESULTS / study.name
-    total = study.missions * len(study.policies) * len(study.points)
-    try:
-        with _compile_notice(), _progress(total) as progress:
-            run_study(study, out, workers, scheduler, progress)
-    except KeyboardInterrupt:
-        line = "interrupted: run the same command again to complete it"
-        raise typer.Exit(_fail(line, 1)) from None
-    print(
-        f"{out}: {total} missions of study {study.name} ({len(study.policies)} policies "
-        f"x {len(study.points)} design points x {study.missions} replications)"
-    )
-
-
 @app.command()
 def train(
     name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A config or a TOML file.")],
@@ -238,7 +190,7 @@ def train(
     config = load_config(name, **({} if seed is None else {"seed": seed}))
     from policies.ddqn.run import train
 
-    with _compile_notice(), _training(config.ticks) as progress:
+    with console.compile_notice(), console.training_bar(config.ticks) as progress:
         training = train(
             config, out, resume=resume, device=device, announce=_say_memory, progress=progress
         )
@@ -246,7 +198,9 @@ def train(
         options = ["--out", str(out), *([] if seed is None else ["--seed", str(seed)])]
         options += [] if device == "auto" else ["--device", device]
         command = shlex.join(["dess", "train", name, *options, "--resume"])
-        raise typer.Exit(_fail(f"interrupted at tick {training.tick}: go on with {command}", 1))
+        raise typer.Exit(
+            console.fail(f"interrupted at tick {training.tick}: go on with {command}", 1)
+        )
     print(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
@@ -260,17 +214,17 @@ def report(
     ] = None,
     results: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
-    ] = RESULTS,
+    ] = study.RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = REPORTS,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
     from reports.render import ReportError, render
 
     try:
-        with _cells() as progress:
+        with console.cells_bar() as progress:
             print(render(names or [], results, out, progress=progress))
     except ReportError as error:
-        raise typer.Exit(_fail(f"dess: error: {error}", 1)) from error
+        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
 
 
 @app.command()
@@ -278,7 +232,7 @@ def policies() -> None:
     """List the policies."""
     from policies.registry import descriptions
 
-    _print_list(descriptions().items())
+    console.print_list(descriptions().items())
 
 
 @app.command()
@@ -286,7 +240,7 @@ def scenarios() -> None:
     """List the shipped scenarios."""
     from dess import scenario_names
 
-    _print_list((name, "") for name in scenario_names())
+    console.print_list((name, "") for name in scenario_names())
 
 
 @app.command()
@@ -294,7 +248,7 @@ def studies() -> None:
     """List the shipped studies."""
     from analysis.study import load_study, study_names
 
-    _print_list((name, load_study(name).description) for name in study_names())
+    console.print_list((name, load_study(name).description) for name in study_names())
 
 
 def _scenario(name: str, settings: list[str] | None) -> "ScenarioSpace":
@@ -347,26 +301,21 @@ def _draw(record: "MissionRecord", space: "ScenarioSpace", path: Path, kind: str
     mission_figure(pd.DataFrame(record.events.columns()), scenario).savefig(path, format=kind)
 
 
-def _print_list(entries: Iterable[tuple[str, str]]) -> None:
-    for name, description in entries:
-        print(f"{name:12} {description}".rstrip())
-
-
 def _print_mission(record: "MissionRecord") -> None:
     metrics = record.metrics
-    _print_table(
+    console.print_table(
         ["", "mission"], [[m, f"{metrics[m].item():g}"] for m in metrics.dtype.names or ()]
     )
     uavs = record.uav_rows()
     rows = [[str(i), *map(str, row.values())] for i, row in enumerate(uavs)]
-    _print_table(["UAV", *uavs[0]], rows)
+    console.print_table(["UAV", *uavs[0]], rows)
 
 
 def _print_evaluations(evaluations: list[dict[str, Any]]) -> None:
     for done in evaluations:
         intervals = {m: value for m, value in done.items() if isinstance(value, dict)}
         rows = [[m, *(f"{x:.4f}" for x in value.values())] for m, value in intervals.items()]
-        _print_table([done["policy"], "mean", "low", "high"], rows)
+        console.print_table([done["policy"], "mean", "low", "high"], rows)
         speed = done["uav_slots"] / done["seconds"]
         print(
             f" {done['missions']} missions, {done['uav_slots']} UAV-slots in "
@@ -374,93 +323,9 @@ def _print_evaluations(evaluations: list[dict[str, Any]]) -> None:
         )
 
 
-def _print_table(header: list[str], rows: list[list[str]]) -> None:
-    from rich.box import SIMPLE_HEAD
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(box=SIMPLE_HEAD)
-    for number, title in enumerate(header):
-        table.add_column(Text(title), justify="right" if number else "left")
-    for row in rows:
-        table.add_row(*map(Text, row))
-    Console().print(table)
-
-
-@contextmanager
-def _progress(missions: int) -> "Iterator[Callable[[int], object]]":
-    """Progress in missions on stderr, if they take longer than a second."""
-    with _bar("mission", missions) as bar:
-        yield bar.update
-
-
-@contextmanager
-def _cells() -> "Iterator[Callable[[str, int, int], None]]":
-    """Progress of the reports on stderr, cell by cell."""
-    with _bar("cell") as bar:
-
-        def show(name: str, done: int, total: int) -> None:
-            if done == 1:
-                bar.reset(total)
-            bar.set_description(name, refresh=False)
-            bar.update(done - bar.n)
-
-        yield show
-
-
 def _say_memory(size: int) -> None:
     """Say what a replay memory takes [bytes]."""
     print(f"replay memory: {size / 2**20:,.0f} MiB", file=sys.stderr)
-
-
-@contextmanager
-def _training(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
-    """Progress of a training on stderr, with the metrics of its last evaluation."""
-    with _bar("tick", ticks) as bar:
-
-        def show(training: "Training", done: int) -> None:
-            if bar.n == 0:  # a resumed one begins where it was
-                bar.initial = bar.n = training.tick - done
-            bar.update(training.tick - bar.n)
-            if training.curve:
-                last = training.curve[-1]
-                bar.set_postfix(
-                    phase=last["phase"],
-                    success=f"{last['evaluation_success']:.3f}",
-                    product=f"{last['evaluation_collection_ratio_and_communication']:.3f}",
-                    refresh=False,
-                )
-
-        yield show
-
-
-def _bar(unit: str, total: int | None = None) -> Any:
-    """A progress bar on stderr; outside a terminal it seldom prints."""
-    from tqdm import tqdm
-
-    interval = 0.1 if sys.stderr.isatty() else 10
-    return tqdm(total=total, unit=unit, delay=1, mininterval=interval)
-
-
-@contextmanager
-def _compile_notice() -> Iterator[None]:
-    """Say it, once, if numba compiles something that its cache has not."""
-    from numba.core.event import Event, Listener, install_listener
-
-    class Notice(Listener):
-        said = False
-
-        def on_start(self, event: Event) -> None:
-            if not self.said:
-                print("compiling the simulator (first run only) ...", file=sys.stderr)
-            self.said = True
-
-        def on_end(self, event: Event) -> None:
-            pass
-
-    with install_listener("numba:compile", Notice()):
-        yield
 
 
 if __name__ == "__main__":

@@ -43,7 +43,9 @@ def provenance(manifests: Iterable[Mapping[str, Any]]) -> HTML:
             "scenario": study["scenario"],
             "policies": " ".join(study["policies"]),
             "design points": len(manifest["points"]),
-            "missions per policy and point": f"{study['missions']:,}",
+            "missions per policy and point": _range(
+                [n for counts in manifest["missions"] for n in counts]
+            ),
             "seed": manifest["seed"],
             "engine": study["engine"],
             "dess": manifest["version"],
@@ -52,6 +54,12 @@ def provenance(manifests: Iterable[Mapping[str, Any]]) -> HTML:
         }
     frame = pd.DataFrame(columns).rename_axis("Study").reset_index()
     return table(frame)
+
+
+def _range(numbers: list[int]) -> str:
+    """``300``, or ``20 to 1,200``."""
+    ends = sorted({min(numbers), max(numbers)})
+    return " to ".join(f"{n:,}" for n in ends)
 
 
 def table(frame: pd.DataFrame, caption: str = "") -> HTML:

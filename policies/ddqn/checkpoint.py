@@ -90,6 +90,7 @@ def load_policy(folder: Path) -> DDQN:
     network.load_state_dict(tensors)
     policy = DDQN(config.name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
+    policy.learner = _learner(config)
     policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])
     return policy
 
@@ -193,6 +194,12 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
     torch.set_rng_state(tensors["random.torch"])
+
+
+def _learner(config: TrainingConfig) -> str:
+    """The name of a config, and a hash of all that it says but the seed."""
+    settings = config.model_dump(mode="json", exclude={"seed", "description"})
+    return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
 
 
 def _digest(tensors: Tensors, use: list[Any]) -> str:

@@ -28,10 +28,13 @@ class DDQN:
         guarded: Whether it chooses among the actions of the return guard only.
         layout: The grid, zone and nodes that it has learned.
         weights: A hash of the weights, for whoever keeps results; empty while they change.
+        learner: What tells trainings apart that differ in more than their seed; empty before one
+            has ended.
     """
 
     exact: nn.Module | None = None
     weights = ""
+    learner = ""
 
     def __init__(
         self, name: str, observation: Any, network: nn.Module, guarded: bool, layout: Layout

@@ -140,7 +140,7 @@ page.table(
 # ## One setting: the paper's Fig. 4
 
 # %%
-setting = fig4.manifest["points"][0]["scenario"]
+setting = fig4.manifest["scenario"]
 display(
     Markdown(
         f"C<sub>S</sub> {setting['charge_start'][0]} %, C<sub>C</sub> "

@@ -1,5 +1,7 @@
 """A scenario and a study whose missions take next to no time."""
 
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -28,19 +30,31 @@ def write_scenario(folder: Path, **changes: Any) -> Path:
 
 
 def small_study(folder: Path, **changes: Any) -> Study:
-    """A study of the small scenario."""
+    """A study of the small scenario; a rule takes the place of the number of missions."""
     values = {
         "scenario": write_scenario(folder).name,
         "policies": ["greedy", "random"],
         "missions": 10,
         "seed": 7,
     }
+    if changes.keys() & {"precision", "selection"}:
+        del values["missions"]
     path = folder / "trial.toml"
     path.write_text(tomli_w.dumps(values), "utf-8")
     return load_study(path, **changes)
 
 
+def grid(**values: Any) -> dict[str, Any]:
+    """The design of every combination of the values."""
+    return {"kind": "grid", "values": values}
+
+
 def files_of(folder: Path) -> dict[str, bytes]:
     """Everything in a folder, by relative path."""
-    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != ".lock")
     return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+def environment() -> dict[str, str]:
+    """A process of its own imports what this one imports."""
+    return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}

@@ -1,3 +1,4 @@
+import shlex
 import sys
 
 import numpy as np
@@ -5,11 +6,13 @@ import pandas as pd
 import pytest
 
 from analysis import evaluate, load_results, run_study, runner
+from analysis.sensitivity import sensitivity
+from analysis.study import CHECK
 from dess import InputError, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.state import END_NAMES
 from policies import load_team
-from tests.analysis.small import files_of, small_study
+from tests.analysis.small import files_of, grid, small_study
 
 
 def assert_same(ours, other):
@@ -18,7 +21,7 @@ def assert_same(ours, other):
 
 
 def test_results_are_tidy(tmp_path):
-    study = small_study(tmp_path, sweep={"quota": [20, 60], "uavs": [1, 2]})
+    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[1, 2]))
     results = run_study(study, tmp_path / "out")
     missions, uavs = results.missions, results.uavs
     assert list(missions.columns) == ["policy", "point", "quota", *MISSION_RECORD.names]
@@ -37,7 +40,7 @@ def test_results_are_tidy(tmp_path):
 
 
 def test_a_swept_range_is_a_column_of_text(tmp_path):
-    study = small_study(tmp_path, sweep={"initial_data": [5, [5, 9.5]]}, missions=1)
+    study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), missions=1)
     missions = run_study(study, tmp_path / "out").missions
     assert list(missions["initial_data"].unique()) == ["5", "[5, 9.5]"]
 
@@ -69,7 +72,7 @@ def test_policies_meet_the_same_sea(tmp_path):
 
 
 def test_equal_runs_have_equal_bytes_under_any_number_of_workers(tmp_path):
-    study = small_study(tmp_path, sweep={"uavs": [1, 3]}, logged=2)
+    study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=2)
     done: list[int] = []
     for workers in (1, 2):
         run_study(study, tmp_path / str(workers), workers, progress=done.append)
@@ -117,15 +120,14 @@ def test_raising_the_missions_tops_up_and_lowering_loads_fewer(tmp_path):
 
 
 def test_policies_and_points_can_be_added(tmp_path):
-    run_study(small_study(tmp_path, sweep={"uavs": [2]}), tmp_path / "out")
+    run_study(small_study(tmp_path, design=grid(uavs=[2])), tmp_path / "out")
     more = small_study(
-        tmp_path, sweep={"uavs": [1, 2]}, policies=["tour", "greedy", "random"], logged=1
+        tmp_path, design=grid(uavs=[1, 2]), policies=["tour", "greedy", "random"], logged=1
     )
     done: list[int] = []
     extended = run_study(more, tmp_path / "out", progress=done.append)
     assert done[0] == 2 * 10
     assert_same(extended, run_study(more, tmp_path / "fresh"))
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "fresh")
 
 
 @pytest.mark.parametrize("after", [1, 7, 14])
@@ -148,7 +150,7 @@ def test_an_interrupted_run_is_completed(after, tmp_path):
 
 
 def test_event_logs_are_those_of_the_missions(tmp_path):
-    study = small_study(tmp_path, sweep={"uavs": [1, 2]}, logged=2)
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
     results = run_study(study, tmp_path / "out")
     alone = simulate(study.points[1].scenario, load_team("random"), 7, 1, events=True)
     log = results.events("random", point=1, replication=1)
@@ -172,7 +174,7 @@ def test_event_logs_that_are_not_there(tmp_path):
 
 
 def test_the_scenario_of_a_point_is_at_hand(tmp_path):
-    study = small_study(tmp_path, sweep={"uavs": [1, 2]}, missions=1)
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), missions=1)
     results = run_study(study, tmp_path / "out")
     assert [results.scenario(point) for point in (0, 1)] == [p.scenario for p in study.points]
 
@@ -196,6 +198,122 @@ def test_evaluate_is_the_same_by_both_engines(tmp_path, monkeypatch):
     events = evaluate(scenario, "greedy,random", 10, 7, engine="events")
     for ours, other in zip(batch.records, events.records, strict=True):
         assert np.array_equal(ours, other)
+
+
+def test_a_chunk_holds_many_cells(tmp_path):
+    study = small_study(
+        tmp_path, policies=["greedy"], design=grid(quota=[*range(20, 60)]), missions=1
+    )
+    run_study(study, tmp_path / "out")
+    assert len([*(tmp_path / "out").rglob("*.parquet")]) == 2 * 40 / runner.CHUNK["batch"]
+
+
+def test_a_chunk_gives_every_design_point_its_own_missions(tmp_path):
+    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[2, 1]), missions=3)
+    missions = run_study(study, tmp_path / "out").missions
+    for row in missions.sample(12, random_state=1).itertuples():
+        space = study.points[row.point].scenario
+        alone = simulate(space, load_team(row.policy), study.seed, row.replication)
+        assert (alone.metrics["reward"], alone.uavs.size) == (row.reward, row.uavs)
+
+
+def precise(folder, **changes):
+    """A study that runs until the success of every cell is known well enough."""
+    targets = {"success": {"absolute": 0.2}, "reward": {"relative": 0.2}}
+    rule = {"first": 5, "look_ahead": 3, "budget": 60, "targets": targets}
+    return small_study(folder, precision=rule, design=grid(quota=[20, 60]), **changes)
+
+
+def selecting(folder, **changes):
+    """A study that selects the best of some settings."""
+    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 2000, "check": 5}
+    return small_study(folder, selection=rule, design=grid(quota=[20, 40, 60, 80]), **changes)
+
+
+def test_precision_decides_how_many_missions_there_are(tmp_path):
+    study = precise(tmp_path)
+    results = run_study(study, tmp_path / "out")
+    counts = results.missions.groupby(["policy", "point"], sort=False).size()
+    assert counts.nunique() > 1  # or this test says little
+    assert counts.tolist() == [n for of_team in results.manifest["missions"] for n in of_team]
+    fields = ["success", "reward"]
+    for (_, _), cell in results.missions.groupby(["policy", "point"]):
+        assert cell["replication"].tolist() == [*range(len(cell))]
+        assert study.precision.wanted([{f: cell[f].to_numpy() for f in fields}]) == [len(cell)]
+
+
+def test_a_selection_is_checked_by_missions_that_did_not_select(tmp_path):
+    study = selecting(tmp_path)
+    results = run_study(study, tmp_path / "out")
+    for policy, best in zip(study.policies, results.manifest["selected"], strict=True):
+        assert results.choice(policy).best == best
+        checks = results.checks[results.checks["policy"] == policy]
+        assert (checks["point"] == best).all()
+        assert checks["replication"].tolist() == [CHECK + n for n in range(5)]
+        assert checks["quota"].iloc[0] == study.points[best].values["quota"]
+    assert results.missions["replication"].max() < CHECK
+    assert len(results.checks) == 10
+
+
+def test_rounds_are_announced_before_their_missions(tmp_path):
+    told, done = [], []
+    run_study(selecting(tmp_path), tmp_path / "out", announce=told.append, progress=done.append)
+    assert [each.number for each in told] == [*range(len(told))]
+    assert told[-1].missions == sum(done)
+    assert len(told) > 2
+    again = []
+    run_study(selecting(tmp_path), tmp_path / "out", announce=again.append)
+    assert sum(each.present for each in again) == again[-1].missions == told[-1].missions
+
+
+@pytest.mark.parametrize("kind", [precise, selecting])
+@pytest.mark.parametrize("after", [11, 47, 71])
+def test_an_interrupted_run_of_rounds_is_completed(kind, after, tmp_path):
+    study, done = kind(tmp_path), 0
+
+    def interrupt(missions: int) -> None:
+        nonlocal done
+        done += missions
+        if done >= after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, tmp_path / "out", progress=interrupt)
+    with pytest.raises(InputError, match="incomplete"):
+        load_results(tmp_path / "out")
+    run_study(study, tmp_path / "out", workers=2)
+    run_study(study, tmp_path / "undisturbed")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):
+    design = {"kind": "saltelli", "base": 4, "ranges": {"uavs": [1, 2], "quota": [20, 60]}}
+    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
+    missions = run_study(study, tmp_path / "out").missions
+    assert missions["point"].tolist() == [*range(len(study.points))]
+    assert missions["replication"].tolist() == [point.replication for point in study.points]
+    assert missions["quota"].tolist() == [point.values["quota"] for point in study.points]
+    assert missions["replication"].nunique() > 4
+    indices = sensitivity(study.design, missions, ["reward"])
+    assert np.isfinite(indices["total"]).all()
+
+
+def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
+    study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), set={"max_slots": 99})
+    results = run_study(study, tmp_path / "out")
+    program, command, *options = shlex.split(results.replay("random", 1, 3))
+    assert (program, command) == ("dess", "simulate")
+    monkeypatch.chdir(tmp_path)
+    asked = {
+        "--scenario=small.toml",
+        "--set=max_slots=99",
+        "--set=initial_data=[5, 9.5]",
+        "--policy=random",
+        "--seed=7",
+        "--replication=3",
+    }
+    pairs = zip(options[::2], options[1::2], strict=True) if "--set" in options else ()
+    assert {f"{key}={value}" for key, value in pairs} == asked
 
 
 def test_there_is_at_least_one_worker(tmp_path):

@@ -1,12 +1,19 @@
 import json
+import signal
+import subprocess
+import sys
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import dess
 from analysis import load_results, manifest, run_study
-from analysis.store import replacing
-from dess import InputError
-from tests.analysis.small import files_of, small_study, write_scenario
+from analysis.manifest import Cell
+from analysis.store import Chunk, Part, Store, _gaps, replacing, split
+from dess import InputError, simulate_batch
+from policies import load
+from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
 
 
 @pytest.fixture
@@ -22,7 +29,10 @@ def test_the_manifest_says_what_was_run(out):
     assert data["version"] == dess.__version__
     assert data["seed"] == 7
     assert data["study"]["name"] == "trial"
-    assert data["points"][0]["scenario"]["grid"] == 8
+    assert data["scenario"]["grid"] == 8
+    assert data["points"] == [{"values": {}, "replication": 0}]
+    assert data["missions"] == [[10], [10]]
+    assert data["complete"]
     assert [team["policy"] for team in data["policies"]] == ["greedy", "random"]
     assert data["policies"][0]["members"][0]["class"] == "policies.heuristics:Greedy"
     assert data["libraries"].keys() == {"python", *manifest.LIBRARIES}
@@ -50,7 +60,7 @@ def _text(path):
 @pytest.mark.parametrize("damage", [_cut, _flip, _empty, _text])
 def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_path):
     whole = files_of(out)
-    path = next((out / kind).iterdir())
+    path = next((out / kind).rglob("*.parquet"))
     damage(path)
     with pytest.raises(InputError, match="run the study again|no event log"):
         results = load_results(out)
@@ -62,7 +72,7 @@ def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_pat
 
 @pytest.mark.parametrize("other", [1, 3])
 def test_a_file_in_the_place_of_another_does_not_pass(other, out):
-    files = sorted((out / "missions").iterdir())  # three of one cell, then three of the other
+    files = sorted((out / "missions").rglob("*.parquet"))  # three of one policy, then the other's
     files[0].write_bytes(files[other].read_bytes())
     with pytest.raises(InputError, match="damaged"):
         load_results(out)
@@ -79,7 +89,7 @@ FOREIGN = {
     "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),
-        r"made by dess 0\.0\.9 \(schema 1\), not",
+        r"made by dess 0\.0\.9 \(schema 2\), not",
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
@@ -105,7 +115,7 @@ OTHERS = {
     "holds seed 7, not 8": {"seed": 8},
     "holds study trial, not other": {"name": "other"},
     "holds other scenarios": {"set": {"quota": 50}},
-    "holds other scenarios than": {"sweep": {"uavs": [1, 2]}},
+    "holds other scenarios than": {"design": grid(uavs=[1, 2])},
     "holds policy random, which study trial has not": {"policies": ["greedy", "tour"]},
 }
 
@@ -169,6 +179,72 @@ def test_what_a_killed_run_leaves_does_not_matter(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / ".manifest.json.1.tmp").touch()
     assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
+
+
+def test_two_runs_of_one_folder_at_once(tmp_path):
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out"):
+        for other in (study, small_study(tmp_path, missions=20)):
+            with pytest.raises(InputError, match="in use by another run; allowed: another --out"):
+                run_study(other, tmp_path / "out")
+    assert len(run_study(study, tmp_path / "out").missions) == 20
+
+
+def test_a_run_that_was_killed_leaves_no_lock(tmp_path):
+    small_study(tmp_path)
+    script = (
+        "import os, signal; from analysis import load_study; from analysis.store import Store; "
+        "store = Store.open(load_study('trial.toml'), 'out'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment())
+    assert done.returncode == -signal.SIGKILL
+    assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
+
+
+RECORDS = {
+    "other replications": ("replication", 3, "not of the replications"),
+    "another seed": ("seed", 8, "not of seed 7"),
+    "no number": ("reward", float("nan"), "a reward that is no number"),
+}
+
+
+@pytest.mark.parametrize("case", RECORDS)
+def test_records_that_were_not_asked_for_do_not_enter(case, tmp_path):
+    field, value, line = RECORDS[case]
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out") as store:
+        cell = store.manifest.cells[0][0]
+        chunk = Chunk(0, (Part(cell, range(2)),))
+        records = simulate_batch(study.points[0].scenario, load("greedy"), 7, 2)
+        records.missions[field][0] = value
+        before = files_of(tmp_path)
+        with pytest.raises(ValueError, match=line):
+            store.write(chunk, records)
+        assert files_of(tmp_path) == before
+        assert store.missing(chunk) == chunk
+
+
+def test_chunks_have_their_size_and_one_team():
+    cells = [Cell(team, point, f"{team}{point}", 0) for team in (0, 1) for point in (0, 1, 2)]
+    chunks = [*split([Part(cell, range(3)) for cell in cells], 4)]
+    assert [chunk.missions for chunk in chunks] == [4, 4, 1, 4, 4, 1]
+    assert [(c.team, c.rows) for c in chunks[:2]] == [
+        (0, [("00", 0, 3), ("01", 0, 1)]),
+        (0, [("01", 1, 3), ("02", 0, 2)]),
+    ]
+    rows = [(key, r) for chunk in chunks for key, a, b in chunk.rows for r in range(a, b)]
+    assert rows == [(cell.key, r) for cell in cells for r in range(3)]
+
+
+@given(
+    st.tuples(st.integers(0, 30), st.integers(0, 30)),
+    st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=6),
+)
+def test_gaps_are_what_is_in_no_other_range(wanted, present):
+    ranges = [range(*sorted(each)) for each in present]
+    gaps = _gaps(range(*sorted(wanted)), ranges)
+    there = {r for each in ranges for r in each}
+    assert [r for gap in gaps for r in gap] == [r for r in range(*sorted(wanted)) if r not in there]
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):

@@ -1,21 +1,56 @@
 import pytest
 
 from analysis import load_study, study_names
-from dess import InputError
-from tests.analysis.small import small_study, write_scenario
+from dess import InputError, load_scenario
+from dess.scenario import SAMPLED
+from policies.registry import SHIPPED, trained_names
+from tests.analysis.small import grid, small_study, write_scenario
 
 
 def test_the_shipped_studies():
-    assert study_names() == ["fig4", "table4"]
+    names = ["comparison", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"]
+    assert study_names() == names
+    assert [load_study(name).name for name in names] == names
     table4, fig4 = load_study("table4"), load_study("fig4")
     assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
-    assert table4.policies == fig4.policies == ("random", "nearest", "greedy", "tour", "ddqn")
+    assert table4.policies == fig4.policies == (*SHIPPED, *trained_names())
     assert [point.scenario.uavs for point in fig4.points] == [(1, 1), (2, 2), (3, 3)]
     assert fig4.logged == 1
 
 
+def test_the_papers_studies_run_every_shipped_policy():
+    for name in ("table4", "fig4", "fig5", "sweet-spot"):
+        assert load_study(name).policies == (*SHIPPED, *trained_names())
+
+
+def test_fig5_moves_one_parameter_of_table_2_at_a_time():
+    study, space = load_study("fig5"), load_scenario("paper")
+    assert study.missions == 300
+    fields = dict.fromkeys(field for point in study.points for field in point.values)
+    assert set(fields) == {*SAMPLED, "initial_data"}
+    for point in study.points:
+        (field,) = point.values
+        low, high = getattr(space, field)
+        ours = getattr(point.scenario, field)
+        assert low <= ours[0] <= ours[1] <= high
+        others = set(fields) - {field}
+        assert all(getattr(point.scenario, f) == getattr(space, f) for f in others)
+    for field in fields:  # both ends are visited
+        seen = [getattr(p.scenario, field) for p in study.points if field in p.values]
+        assert (min(low for low, _ in seen), max(high for _, high in seen)) == getattr(space, field)
+
+
+def test_a_rule_decides_how_many_missions_there_are(tmp_path):
+    targets = {"success": {"absolute": 0.02}}
+    precise = small_study(tmp_path, precision={"first": 40, "targets": targets})
+    assert precise.rule is precise.precision
+    assert precise.first == 40
+    assert small_study(tmp_path).rule is None
+    assert small_study(tmp_path).first == 10
+
+
 def test_design_points_are_the_product_in_the_given_order(tmp_path):
-    study = small_study(tmp_path, sweep={"uavs": [2, 1], "quota": [30, 20]}, set={"pads": 1})
+    study = small_study(tmp_path, design=grid(uavs=[2, 1], quota=[30, 20]), set={"pads": 1})
     designs = [(point.values["uavs"], point.values["quota"]) for point in study.points]
     assert designs == [(2, 30), (2, 20), (1, 30), (1, 20)]
     for point in study.points:
@@ -55,14 +90,37 @@ BAD = {
     "scenario = 'nope'": ["nope: no such scenario", "paper"],
     "set.uavs = 99": ["uavs: 99", "1..16"],
     "set.uavz = 2": ["uavz: unknown key", "flying_time"],
-    "sweep.uavs = [1, 20]": ["at uavs=20", "1..16"],
-    "sweep.uavs = []": ["uavs has no values"],
-    "sweep.uavs = 2": ["sweep.uavs"],
-    "sweep.uavs = [1, 2, 1]": ["uavs=1 is there twice"],
-    "set.uavs = 1\nsweep.uavs = [1, 2]": ["uavs is also in set"],
-    "sweep.charge_start = [30, 70]": ["at charge_start=70", "charge_complete"],
+    "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
+    "design = {kind = 'grid', values.uavs = []}": ["uavs has no values"],
+    "design = {kind = 'grid', values.uavs = 2}": ["values.uavs"],
+    "design = {kind = 'grid', values.uavs = [1, 2, 1]}": ["uavs=1 is there twice"],
+    "design = {kind = 'grid', values.uavz = [1, 2]}": ["at uavz=1", "uavz: unknown key"],
+    "design = {kind = 'cube', values.uavs = [1]}": ["kind: 'cube' is unknown", "grid", "sobol"],
+    "design = {values.uavs = [1]}": ["design", "kind"],
+    "design = {kind = 'saltelli', base = 2, ranges.uavs = [1, 2]}": ["missions = 1"],
+    "set.uavs = 1\ndesign = {kind = 'grid', values.uavs = [1, 2]}": ["uavs is also in set"],
+    "design = {kind = 'grid', values.charge_start = [30, 70]}": [
+        "at charge_start=70",
+        "charge_complete",
+    ],
+    "sweep.uavs = [1, 2]": ["sweep: unknown key", "design"],
+    "missions = 9\nprecision.targets.success.absolute = 0.1": [
+        "missions: are decided by precision"
+    ],
+    "missions = 9\nselection = {procedure = 'kn', indifference = 0.1}": [
+        "missions: are decided by selection"
+    ],
+    "selection = {procedure = 'kn', indifference = 0.1}\nprecision.targets.success.absolute = 0.1": [
+        "precision: selection is there too"
+    ],
+    "selection = {procedure = 'kn', indifference = -0.1}": [
+        "selection.indifference",
+        "greater than 0",
+    ],
+    "selection.procedure = 'best'": ["selection.procedure", "'kn'", "'ocba'"],
+    "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
-    "missions = 1\n[sweep": ["not valid TOML"],
+    "missions = 1\n[design": ["not valid TOML"],
 }
 
 
@@ -80,7 +138,7 @@ def test_a_bad_study_gets_one_line(text, tmp_path):
 
 
 def test_a_study_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="no such study; allowed: fig4, table4, or a TOML file"):
+    with pytest.raises(InputError, match="no such study; allowed: .*, table4, or a TOML file"):
         load_study(tmp_path / "none.toml")
     with pytest.raises(InputError, match="cannot be read"):
         load_study(tmp_path)

@@ -1,5 +1,7 @@
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -11,8 +13,9 @@ import pytest
 from numba import njit
 
 from analysis import load_results
-from reports import cli
-from tests.analysis.small import files_of, small_study
+from reports import cli, console
+from tests.analysis import troublesome
+from tests.analysis.small import environment, files_of, small_study
 
 SIMULATE_KEYS = [
     "policy",
@@ -41,11 +44,6 @@ EVALUATE_KEYS = [
     "collection_ratio_and_communication",
     "reward",
 ]
-
-
-def environment():
-    """A process of its own imports what this one imports."""
-    return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
 
 @pytest.fixture
@@ -160,7 +158,7 @@ def test_what_there_is(dess):
     for command, names in {
         "policies": ["random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"],
         "scenarios": ["fig4", "paper"],
-        "studies": ["fig4", "table4"],
+        "studies": ["comparison", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"],
     }.items():
         code, out, err = dess(command)
         assert (code, err) == (0, "")
@@ -172,6 +170,60 @@ def test_a_study_lands_in_the_results_by_default(dess, tmp_path):
     assert code == 0
     assert out.startswith("results/trial: 6 missions of study trial")
     assert len(load_results(tmp_path / "results" / "trial").missions) == 6
+
+
+def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
+    before = files_of(tmp_path)
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 30, "--dry-run")
+    assert code == 0
+    assert "60 missions of study trial (2 policies x 1 design points x 30 replications)" in out
+    assert re.search(r"about \d+ s with 1 at work", out)
+    assert files_of(tmp_path) == before
+
+
+def test_a_study_is_shown(dess, dess_json):
+    assert dess("study", "run", "trial.toml", "--missions", 30)[0] == 0
+    code, out, _ = dess("study", "show", "results/trial", "--worst", 2)
+    assert code == 0
+    data = dess_json("study", "show", "results/trial", "--worst", 2)
+    assert data["study"] == "trial"
+    assert {row["policy"] for row in data["means"]} == {"greedy", "random"}
+    assert [row["baseline"] for row in data["comparisons"]] == ["greedy"] * 3
+    assert len(data["worst"]) == 2
+    for row in data["worst"]:
+        assert row["policy"] == "greedy"
+        assert row["command"] in out
+    product = next(r for r in data["means"] if r["metric"] == "collection_ratio")
+    assert f"{100 * product['mean']:.1f} %" in out
+
+
+def test_a_selection_is_shown_with_its_check(dess, tmp_path):
+    with open("trial.toml") as file:
+        text = file.read().replace("missions = 10\n", "")
+    rule = "procedure = 'kn'\nfirst = 8\nindifference = 0.05\nbudget = 900\ncheck = 9\n"
+    design = "[design]\nkind = 'grid'\nvalues.quota = [20, 60]\n"
+    (tmp_path / "best.toml").write_text(f"{text}\n{design}[selection]\n{rule}")
+    code, out, _ = dess("study", "run", "best.toml")
+    assert code == 0
+    assert re.search(r"greedy +quota (20|60) +\d+ +1", out)
+    assert "9 further missions" in out
+    assert "with probability at least 0.95" in out
+
+
+def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatch):
+    troublesome.install(tmp_path / "plugin", monkeypatch)
+    asked = ["study", "run", "trial.toml", "--policy", "raising", "--policy", "greedy"]
+    code, out, err = dess(*asked)
+    assert (code, out) == (1, "")
+    first, last = err.splitlines()
+    assert first.startswith(
+        "failed: ZeroDivisionError: nothing to divide by (results/trial/failures/"
+    )
+    assert last == "dess: error: 1 of the chunks of study trial failed, the rest is done"
+    command = shlex.split(first.partition("replay: ")[2])
+    assert command[:2] == ["dess", "simulate"]
+    with pytest.raises(ZeroDivisionError):
+        dess(*command[1:])
 
 
 # Arguments, and what the line on stderr must name.
@@ -201,12 +253,14 @@ BAD = {
     "evaluate --policy greedy --missions 0": ["--missions", "1"],
     "evaluate --policy greedy --engine fast": ["--engine", "'batch', 'events'"],
     "evaluate --policy greedy --policy gredy": ["'gredy' is unknown"],
-    "study run nope": ["nope: no such study", "fig4, table4"],
+    "study run nope": ["nope: no such study", "fig4, fig5", "table4"],
     "study run trial.toml --policy gredy": ["trial.toml: policies", "'gredy' is unknown"],
     "study run trial.toml --missions 0": ["--missions", "1"],
     "study run trial.toml --out small.toml": ["small.toml: cannot be written"],
     "study run trial.toml --out small.toml/out": ["small.toml/out: cannot be written"],
     "study run trial.toml --out .": ["no manifest.json", "another --out"],
+    "study run trial.toml --dry-run --out .": ["no manifest.json", "another --out"],
+    "study show nope": ["nope/manifest.json: no such file", "made by dess study run"],
     "study": ["Missing command", "dess study --help"],
     "fly": ["No such command 'fly'", "dess --help"],
     "simulate --fly": ["--fly"],
@@ -276,10 +330,10 @@ def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
 
 def test_compilation_is_announced_once(capsys):
     double = njit(lambda x: 2 * x)
-    with cli._compile_notice():
+    with console.compile_notice():
         assert (double(1), double(1.5)) == (2, 3.0)  # compiled twice
     assert capsys.readouterr().err == "compiling the simulator (first run only) ...\n"
-    with cli._compile_notice():
+    with console.compile_notice():
         assert double(2) == 4
     assert capsys.readouterr().err == ""
 
@@ -308,7 +362,7 @@ def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
     heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     start = partial(subprocess.Popen, env=environment(), preexec_fn=heed, **pipes)
     with start([*command, *missions]) as running:
-        while len(list(tmp_path.glob("out/missions/*.parquet"))) < 2:
+        while len(list(tmp_path.glob("out/missions/*/*.parquet"))) < 2:
             assert running.poll() is None
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)

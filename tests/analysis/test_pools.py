@@ -1,0 +1,116 @@
+import json
+import shlex
+
+import pytest
+
+from analysis import load_results, run_study
+from analysis.runner import ChunkError
+from dess import InputError
+from tests.analysis import troublesome
+from tests.analysis.small import files_of, small_study
+
+
+@pytest.fixture
+def plugin(tmp_path, monkeypatch):
+    troublesome.install(tmp_path / "plugin", monkeypatch)
+    yield
+    monkeypatch.undo()
+
+
+@pytest.fixture
+def cluster():
+    """A dask cluster of two worker processes; its address."""
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        yield cluster.scheduler_address
+
+
+def failing(study, out, **options):
+    """The only failure of a study: its file and what it says."""
+    with pytest.raises(ChunkError) as error:
+        run_study(study, out, **options)
+    ((path, failure),) = error.value.failures.items()
+    assert path.parent == out / "failures"
+    assert json.loads(path.read_text()) == vars(failure)
+    return failure
+
+
+def check_that_the_rest_is_there(study, out, policy, missing):
+    """All chunks but one of one policy are there, and the results say that they are incomplete."""
+    with pytest.raises(InputError, match=f"missions of {policy} .*1 chunks failed, see .*failures"):
+        load_results(out)
+    done = []
+    with pytest.raises(ChunkError):
+        run_study(study, out, progress=done.append)
+    assert done[0] == study.missions * len(study.policies) - missing
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(workers, plugin, tmp_path):
+    study = small_study(tmp_path, policies=["raising", "greedy"])
+    failure = failing(study, tmp_path / "out", workers=workers)
+    assert failure.policy == "raising"
+    assert failure.missions == 4
+    assert failure.error == "ZeroDivisionError: nothing to divide by"
+    assert "in trouble" in failure.traceback
+    assert shlex.split(failure.replay)[-4:] == ["--seed", "7", "--replication", "5"]
+    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+
+
+def test_a_policy_that_raises_leaves_the_others_whole(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["greedy", "raising"])
+    failing(study, tmp_path / "out")
+    run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "alone")
+    ours, alone = (
+        files_of(tmp_path / folder / "missions" / "policy=greedy") for folder in ("out", "alone")
+    )
+    assert ours == alone
+
+
+def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["raising"], logged=6, missions=6)
+    with pytest.raises(ChunkError) as error:
+        run_study(study, tmp_path / "out")
+    assert sorted(failure.missions for failure in error.value.failures.values()) == [0, 2]
+
+
+def test_a_killed_worker_is_replaced(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+    done: list[int] = []
+    run_study(study, tmp_path / "out", workers=2, progress=done.append)
+    assert (tmp_path / "plugin" / "killed").exists()
+    assert sum(done) == 20
+    run_study(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_chunk_that_kills_every_worker_is_given_up(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+    failure = failing(study, tmp_path / "out", workers=2)
+    assert failure.policy == "killed-always"
+    assert failure.missions == 4
+    assert "worker died" in failure.error
+    assert shlex.split(failure.replay)[:3] == ["dess", "study", "run"]
+
+
+def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+    run_study(study, tmp_path / "out", scheduler=cluster)
+    assert (tmp_path / "plugin" / "killed").exists()
+    run_study(study, tmp_path / "undisturbed")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_dask_records_a_chunk_that_raises(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["raising", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert failure.error == "ZeroDivisionError: nothing to divide by"
+    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+
+
+@pytest.mark.slow
+def test_dask_gives_up_a_chunk_that_kills_every_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert "workers died" in failure.error
