@@ -18,6 +18,7 @@ from analysis.statistics import (
     Interval,
     bootstrap_interval,
     check_columns,
+    expanded_level,
     groups,
     mean_interval,
 )
@@ -89,9 +90,10 @@ def paired(
         share: Whether the values are outcomes 0 or 1, of which the means are shares.
 
     Returns:
-        The interval of Student's t and the BCa bootstrap interval over the pairs, and the p-value
-        of the paired t test. For shares the interval of Bonett and Price (2012), which holds for
-        few discordant pairs as well, and the exact test of McNemar. Nothing is ever nan:
+        The interval of Student's t, the BCa bootstrap interval over the pairs (at the level of
+        ``expanded_level``), and the p-value of the paired t test. For shares the interval of Bonett
+        and Price (2012), which holds for few discordant pairs as well, and the exact test of
+        McNemar. Nothing is ever nan:
 
         - All differences equal (up to rounding), n = 1 included: the intervals are degenerate (low
           = difference = high), save that of shares; p is that of the sign test, 2^(1 - n), which is
@@ -106,7 +108,8 @@ def paired(
         raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
     differences = _differences(a, b)
     mean, p = _share_test(a, b, level) if share else _t_test(differences, level)
-    bootstrap = bootstrap_interval(differences, np.mean, generator, level, resamples=resamples)
+    expanded = expanded_level(level, a.size)
+    bootstrap = bootstrap_interval(differences, np.mean, generator, expanded, resamples=resamples)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
@@ -313,7 +316,7 @@ def _tables(
     level: float,
     correction: str | None,
 ) -> dict[Any, pd.DataFrame]:
-    """The metrics of every policy (or point), in the order of the missions that they are of."""
+    """The metrics of every policy (or point), by the keys of the missions that they are of."""
     if not 0 < level < 1:
         raise InputError(f"level: {level}; allowed: between 0 and 1")
     if correction not in (*get_args(Correction), None):
@@ -333,7 +336,7 @@ def _tables(
         row = missions.loc[twice, [of, *keys]]
         raise InputError(f"missions: {_shown(row)} is there twice; allowed: every mission once")
     return {
-        name: part.set_index(keys)[list(metrics)].astype(float).sort_index()
+        name: part.set_index(keys)[list(metrics)].astype(float)
         for (name,), part in groups(missions, [of])
     }
 

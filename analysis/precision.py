@@ -76,6 +76,10 @@ class Precision(BaseModel):
     as well. Everything is a function of a cell's values in the order of their replications, so
     the counts are the same however a run was interrupted.
 
+    After stopping, the intervals cover what they promise as well as with a fixed number. Where a
+    rare event (a failed mission) moves a metric a lot, that is less: Student's interval is narrow
+    until it happens. A larger ``first`` helps.
+
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
     a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644; here with |mean|, because
     a relative half-width of a negative mean is negative, and met at once.
@@ -126,7 +130,7 @@ class Precision(BaseModel):
         excess = np.max([self._excess(metric, sample) for metric in self.targets], axis=0)
         last_miss = self._last_miss(excess)
         stop = self._stop(last_miss)
-        enough = self.budget if stop is None else min(stop + self.look_ahead, self.budget)
+        enough = self.budget if stop is None else min(stop, self.budget)
         count = self.first
         while count < enough and count <= len(excess):
             # It takes some count * excess^2 missions. Sums of squares can only grow, so that

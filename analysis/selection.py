@@ -20,7 +20,7 @@ those of all missions so far, taken anew whenever r has grown by half (as in Kim
 whose promise is asymptotic), and the margin W_il(r) is as if Bernstein's inequality added
     2 ln((k - 1) / alpha) / (3 r)
 to the errors of the means, for what has not happened yet: no difference is further than 2 from its
-mean. It takes more missions: per point some ln((k - 1) / alpha) / lead at least.
+mean. It takes more missions: a point that lags by g stays for some 2 ln((k - 1) / alpha) / (3 g).
 
 ``ocba``, the optimal computing budget allocation of Chen et al., spends a fixed budget so that the
 best is found most probably, and promises nothing. With b the point of the best mean, gap_i its

@@ -121,6 +121,21 @@ def bootstrap_interval(
     return Interval(estimate, float(low), float(high))
 
 
+def expanded_level(level: float, n: float) -> float:
+    """The level at which a bootstrap interval of a mean of few values holds ``level``.
+
+    Resamples vary by (n - 1) / n of what samples do, and take the normal distribution where
+    Student's t is due (Hesterberg 2015, the expanded percentile interval).
+
+    Args:
+        level: The level that is wanted.
+        n: Number of values; fewer than 2 count as 2.
+    """
+    n = max(n, 2)
+    end = np.sqrt(n / (n - 1)) * stats.t.ppf((1 + level) / 2, n - 1)
+    return float(1 - 2 * stats.norm.sf(end))
+
+
 def quantile_interval(
     values: Sequence[float] | np.ndarray, share: float, level: float = LEVEL
 ) -> Interval:
@@ -240,7 +255,7 @@ def distribution(
     for group, part in groups(missions, by):
         values = part[metric].to_numpy(float)
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
-        expanded = _expanded(level, tail * len(values))
+        expanded = expanded_level(level, tail * len(values))
         risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
@@ -265,17 +280,6 @@ def _takes_axis(statistic: Callable[..., Any]) -> bool:
         return "axis" in inspect.signature(statistic).parameters
     except ValueError:  # some builtins show no signature
         return False
-
-
-def _expanded(level: float, size: float) -> float:
-    """The level at which a bootstrap interval of a mean of few values holds ``level``.
-
-    Resamples vary by (n - 1) / n of what samples do, and are as good as normal where Student's t is
-    due (Hesterberg 2015, expanded percentile interval).
-    """
-    size = max(size, 2)
-    end = np.sqrt(size / (size - 1)) * stats.t.ppf((1 + level) / 2, size - 1)
-    return float(1 - 2 * stats.norm.sf(end))
 
 
 def _intervals(missions: pd.DataFrame, level: float) -> list[tuple[str, Interval]]:

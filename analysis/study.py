@@ -103,7 +103,7 @@ class Study(BaseModel):
             raise ValueError(
                 f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
             )
-        assert self.points  # their scenarios are valid, or this raises
+        self._check_budget()
         return self
 
     def _check_rule(self) -> None:
@@ -115,6 +115,15 @@ class Study(BaseModel):
         if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
             raise ValueError(
                 "missions: every point of a saltelli design is one mission; allowed: missions = 1"
+            )
+
+    def _check_budget(self) -> None:
+        """A selection must be able to afford its first round; needs valid design points."""
+        least = self.first * len(self.points)
+        if self.selection and least > self.selection.budget:
+            raise ValueError(
+                f"selection.budget: {self.selection.budget} is less than the first missions of all "
+                f"design points; allowed: {least} or more"
             )
 
     def _check_design(self) -> None:

@@ -82,18 +82,31 @@ def slow_race(data, first, delta, alpha, bounded=False):
         r += 1
 
 
-@pytest.mark.parametrize("procedure", ["kn", "kn-bounded"])
-@pytest.mark.parametrize("seed", range(12))
-def test_the_race_is_the_one_of_the_paper(procedure, seed):
+def mixed(seed):
+    """Two to six points of any means."""
     generator = np.random.default_rng(seed)
-    k, first = int(generator.integers(2, 7)), int(generator.integers(4, 15))
-    means, alpha = generator.normal(0.0, 0.3, k), float(generator.choice([0.01, 0.05, 0.3]))
-    data = normal([1, seed], means, correlation=0.5 * (seed % 2))
+    means = generator.normal(0.0, 0.3, generator.integers(2, 7))
+    return normal([1, seed], means, correlation=0.5 * (seed % 2))
+
+
+def in_pairs(seed):
+    """Six points, two by two almost alike: margins of very different widths."""
+    means = np.random.default_rng(seed).normal(0.0, 0.2, 3)
+    pairs = np.repeat(normal([2, seed], means), 2, axis=0)
+    return pairs + normal([3, seed], np.zeros(6), spread=0.3)
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded"])
+@pytest.mark.parametrize("draw", [mixed, in_pairs])
+@pytest.mark.parametrize("seed", [*range(8), 16, 40])
+def test_the_race_is_the_one_of_the_paper(procedure, draw, seed):
+    data = draw(seed)
+    first, alpha = (4, 0.3) if draw is in_pairs else (5 + seed, [0.01, 0.05, 0.3][seed % 3])
     best, stage, left_at = slow_race(data, first, 0.4, alpha, procedure == "kn-bounded")
     race = rule(procedure, first=first, indifference=0.4, confidence=1 - alpha)
     choice = chosen(race, data)
     assert (choice.best, choice.stage) == (best, stage)
-    assert set(choice.survivors) == set(range(k)) - left_at.keys()
+    assert set(choice.survivors) == set(range(len(data))) - left_at.keys()
     assert all(choice.counts[i] >= r for i, r in left_at.items())
     assert choice.counts[best] == max(choice.counts) >= stage
     assert choice.guaranteed
@@ -295,6 +308,16 @@ def test_points_that_are_alike_tie_and_the_first_wins():
     choice = chosen(rule("ocba", budget=300), np.stack([row - 0.5, row, row]))
     assert choice.best in (1, 2)
     assert choice.probability == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_tie_is_decided_by_what_came_before_it():
+    data = normal(14, [0.0, 0.5])
+    data = np.stack([*data, data[1]])
+    tied = chosen(rule(), data)
+    assert (tied.best, tied.survivors) == (1, (1, 2))
+    assert 10 < tied.stage < max(tied.counts)
+    data[2, tied.stage :] += 1.0  # too late
+    assert chosen(rule(), data).best == 1
 
 
 @pytest.mark.parametrize("procedure", ["kn", "kn-bounded", "ocba"])

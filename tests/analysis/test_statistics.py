@@ -6,6 +6,7 @@ from analysis import statistics
 from analysis.statistics import (
     bootstrap_interval,
     distribution,
+    expanded_level,
     mean_interval,
     quantile_interval,
     summary,
@@ -117,6 +118,13 @@ def test_bootstrap_at_a_level_beyond_bca_holds_the_estimate():
     sample = np.array([1.0] + [0.0] * 29)
     mean, low, high = bootstrap_interval(sample, np.mean, np.random.default_rng(1), 1 - 1e-10)
     assert low <= mean < high
+
+
+def test_few_values_need_a_higher_level():
+    # t(0.975, 4) sqrt(5 / 4) = 2.776445 x 1.118034 = 3.104160, of which normal: 0.998092
+    assert expanded_level(0.95, 5) == pytest.approx(0.998092, abs=1e-6)
+    assert expanded_level(0.95, 10**6) == pytest.approx(0.95, abs=1e-6)
+    assert expanded_level(0.95, 0.5) == expanded_level(0.95, 2) <= 1
 
 
 def test_the_median_lies_between_order_statistics():

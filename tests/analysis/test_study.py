@@ -117,6 +117,7 @@ BAD = {
         "selection.indifference",
         "greater than 0",
     ],
+    "selection = {procedure = 'ocba', first = 9, budget = 8}": ["selection.budget: 8", "9 or more"],
     "selection.procedure = 'best'": ["selection.procedure", "'kn'", "'ocba'"],
     "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
