@@ -36,8 +36,11 @@ def pytest_terminal_summary(terminalreporter) -> None:
     speeds = {row.name: row.extra_info["uav_slots"] / row.stats.min for row in rows}
     if not speeds:
         return
+    engines = {row.name: row.extra_info.get("engine") for row in rows}
     terminalreporter.section("UAV-slots per second, best round")
     floor = speeds.get("test_floor")
     for name, speed in speeds.items():
         share = f"{floor / speed:6.2f} x the floor's time" if floor else ""
+        if engine := engines.get(name):
+            share = f"{100 * engine:4.0f} % of the time in the engine"
         terminalreporter.write_line(f"{name[5:]:34}{speed:14,.0f}{1e9 / speed:9.0f} ns  {share}")

@@ -3,18 +3,17 @@
 Every round starts from an empty folder; compilation and the start of workers are apart.
 """
 
+import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pytest
 
-from analysis import load_study, run_study
-from analysis.results import Results, parts_of
-from analysis.runner import CHUNK
-from analysis.store import Store, split
+from analysis import jobs, load_study, run_study
+from analysis.results import Results
 from analysis.study import Study
 from dess import simulate_batch
-from policies import load
 
 ROUNDS = 5
 
@@ -43,33 +42,26 @@ def run(study: Study, **where) -> Results:
         return run_study(study, Path(folder) / "out", **where)
 
 
-def test_fig5_engine_alone(benchmark, fig5, uav_slots) -> None:
-    """The chunks of the study, simulated and thrown away."""
-    with TemporaryDirectory() as folder:
-        (cells,) = Store.peek(fig5, Path(folder) / "out").manifest.cells
-    parts = parts_of(cells, [fig5.missions] * len(cells))
-    greedy = load("greedy")
-    jobs = [
-        [
-            (fig5.points[part.cell.point].scenario, r)
-            for part in chunk.parts
-            for r in part.replications
-        ]
-        for chunk in split(parts, CHUNK["batch"])
-    ]
+def test_fig5_here(benchmark, fig5, uav_slots, monkeypatch) -> None:
+    """One process, and the share of its time that it spends in the engine."""
+    seconds = []
 
-    def engine() -> None:
-        for rows in jobs:
-            spaces, replications = [list(column) for column in zip(*rows, strict=True)]
-            simulate_batch(spaces, greedy, fig5.seed, replications)
+    def timed(*arguments, **options) -> Any:
+        begin = time.perf_counter()
+        records = simulate_batch(*arguments, **options)
+        seconds.append(time.perf_counter() - begin)
+        return records
 
-    benchmark.pedantic(engine, rounds=ROUNDS, warmup_rounds=1)
+    monkeypatch.setattr(jobs, "simulate_batch", timed)
+    benchmark.pedantic(run, (fig5,), rounds=ROUNDS, warmup_rounds=1)
     benchmark.extra_info["uav_slots"] = uav_slots
+    studies = ROUNDS + 1
+    engine = sum(seconds[len(seconds) // studies :])  # without the warm-up
+    benchmark.extra_info["engine"] = engine / (benchmark.stats.stats.total)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_fig5_workers(benchmark, fig5, uav_slots, workers: int) -> None:
-    benchmark.pedantic(run, (fig5,), {"workers": workers}, rounds=ROUNDS, warmup_rounds=2)
+def test_fig5_two_workers(benchmark, fig5, uav_slots) -> None:
+    benchmark.pedantic(run, (fig5,), {"workers": 2}, rounds=ROUNDS, warmup_rounds=2)
     benchmark.extra_info["uav_slots"] = uav_slots
 
 
