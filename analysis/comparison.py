@@ -30,6 +30,7 @@ Correction = Literal["holm", "fdr"]
 # What the row of a learner's comparison is about: trainings at large, or the one there is.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"
 
+_ENDS = ("low", "high", "new_low", "new_high")
 _MISSION = ("policy", "point", "seed", "replication")  # what tells missions apart
 _ROUNDING = 64 * np.finfo(float).eps  # relative; differences of differences below are none
 
@@ -87,13 +88,14 @@ def paired(
         generator: Draws the resamples.
         level: Confidence level.
         resamples: Number of bootstrap resamples.
-        share: Whether the values are outcomes 0 or 1, of which the means are shares.
+        share: Whether the values are outcomes 0 or 1, or means of such: shares.
 
     Returns:
         The interval of Student's t, the BCa bootstrap interval over the pairs (at the level of
-        ``expanded_level``), and the p-value of the paired t test. For shares the interval of Bonett
-        and Price (2012), which holds for few discordant pairs as well, and the exact test of
-        McNemar. Nothing is ever nan:
+        ``expanded_level``), and the p-value of the paired t test. For shares one gain and one loss
+        are added to the differences before t (as Bonett and Price 2012 do), so that few discordant
+        pairs, or none, are not taken for certainty; outcomes have the exact test of McNemar.
+        Nothing is ever nan:
 
         - All differences equal (up to rounding), n = 1 included: the intervals are degenerate (low
           = difference = high), save that of shares; p is that of the sign test, 2^(1 - n), which is
@@ -107,7 +109,9 @@ def paired(
     if a.shape != b.shape or not a.size:
         raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
     differences = _differences(a, b)
-    mean, p = _share_test(a, b, level) if share else _t_test(differences, level)
+    if share and (min(a.min(), b.min()) < 0 or max(a.max(), b.max()) > 1):
+        raise ValueError("paired: no shares; allowed: values from 0 to 1")
+    mean, p = (_share_test if share else _t_test)(differences, level)
     expanded = expanded_level(level, a.size)
     bootstrap = bootstrap_interval(differences, np.mean, generator, expanded, resamples=resamples)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
@@ -146,8 +150,7 @@ def compare(
         metric: ``policy`` (or ``point``), ``baseline``, the columns ``by``, ``metric``, the fields
         of ``Paired`` and, after ``p``, ``p_adjusted``. Differences are to the baseline, positive if
         more. Where a group holds several missions of a replication - at several points, which share
-        its sea - their means are compared: ``n`` counts replications, and shares count as other
-        metrics do.
+        its sea - their means are compared, and ``n`` counts replications.
 
     Raises:
         InputError: If a column is missing or not of numbers, the baseline is not there or alone, a
@@ -163,9 +166,9 @@ def compare(
     rows = []
     for name in others:
         _check_same_missions(tables, name, baseline)
-        for group, (a, b), single in _grouped([tables[name], reference], by):
+        for group, (a, b) in _grouped([tables[name], reference], by):
             for metric in metrics:
-                share = single and metric in SHARES
+                share = metric in SHARES
                 result = paired(a[metric], b[metric], generator, level, resamples, share)
                 rows.append((name, baseline, *group, metric, *result))
     return _adjusted(rows, [of, "baseline", *by, "metric", *Paired._fields], correction)
@@ -254,7 +257,8 @@ def compare_learners(
         ``metric``, ``about``, the fields of ``Crossed``, after ``p`` ``p_adjusted``, ``trainings``
         and ``n``, the number of missions (of replications, where ``compare`` would take means).
         ``about`` says what ``low``, ``high`` and ``p`` are about: ``the learner``, trainings to
-        come included, or ``this checkpoint``, the only one there is.
+        come included, or ``this checkpoint``, the only one there is. Shares have the intervals and
+        the p-value with one gain and one loss added, as of ``paired``.
 
     Raises:
         InputError: As of ``compare``; if a learner has no checkpoint, or one twice.
@@ -271,13 +275,12 @@ def compare_learners(
         trained = [_taken(tables, "policy", checkpoint) for checkpoint in checkpoints]
         for checkpoint in checkpoints:
             _check_same_missions(tables, checkpoint, baseline)
-        for group, (b, *parts), single in _grouped([reference, *trained], by):
+        for group, (b, *parts) in _grouped([reference, *trained], by):
             for metric in metrics:
                 differences = _differences(np.stack([a[metric] for a in parts]), b[metric])
                 result = crossed(differences, level)
-                if len(parts) == 1 and single and metric in SHARES:
-                    alone, p = _share_test(parts[0][metric], b[metric], level)
-                    result = result._replace(low=alone.low, high=alone.high, p=p)
+                if metric in SHARES:
+                    result = _as_share(result, differences, level)
                 about = LEARNER if len(parts) > 1 else CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
@@ -364,18 +367,16 @@ def _shown(keys: pd.DataFrame) -> str:
 
 def _grouped(
     tables: Sequence[pd.DataFrame], by: Sequence[str]
-) -> Iterator[tuple[tuple, list[dict[str, np.ndarray]], bool]]:
+) -> Iterator[tuple[tuple, list[dict[str, np.ndarray]]]]:
     """Groups of units that share no sea: missions, or the means of a replication's missions.
 
-    Yields the group, the metrics of each table in the order of the units, and whether these are
-    missions.
+    Yields the group and the metrics of each table, in the order of the units.
     """
     names = tables[0].index.names
     unit = [name for name in names if name in (*by, "seed", "replication")]
     means = [table.groupby(level=unit, dropna=False).mean() for table in tables]
     for group, part in groups(means[0].reset_index(), by):
-        values = [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
-        yield group, values, len(means[0]) == len(tables[0])
+        yield group, [{metric: m[metric].to_numpy()[part.index] for metric in m} for m in means]
 
 
 def _adjusted(rows: list[tuple], columns: list[str], correction: Correction | None) -> pd.DataFrame:
@@ -403,16 +404,29 @@ def _t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     return mean, float(2 * stats.t.sf(t, differences.size - 1))
 
 
-def _share_test(a: np.ndarray, b: np.ndarray, level: float) -> tuple[Interval, float]:
-    """Bonett and Price's interval: Wald's, with one more pair of each discordant kind."""
-    if not np.isin([a, b], (0, 1)).all():
-        raise ValueError("paired: shares are of values 0 and 1 only")
-    gains, losses, n = int(np.sum(a > b)), int(np.sum(a < b)), len(a) + 2
-    up, down = (gains + 1) / n, (losses + 1) / n
-    half = stats.norm.isf((1 - level) / 2) * np.sqrt((up + down - (up - down) ** 2) / n)
-    ends = max(up - down - half, -1.0), min(up - down + half, 1.0)
-    p = stats.binomtest(gains, gains + losses).pvalue if gains + losses else 1.0
-    return Interval((gains - losses) / len(a), *map(float, ends)), float(p)
+def _share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
+    smooth, p = _t_test(_smoothed(differences), level)
+    if np.isin(differences, (-1, 0, 1)).all():
+        gains, losses = int(np.sum(differences > 0)), int(np.sum(differences < 0))
+        p = float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
+    mean = float(differences.mean())
+    return Interval(mean, max(smooth.low, -1.0), min(smooth.high, 1.0)), p
+
+
+def _as_share(result: Crossed, differences: np.ndarray, level: float) -> Crossed:
+    """The result with the intervals and the p-value of shares."""
+    if len(differences) == 1:
+        mean, p = _share_test(differences[0], level)
+        return result._replace(low=mean.low, high=mean.high, p=p)
+    smooth = crossed(_smoothed(differences), level)
+    ends = {name: float(np.clip(getattr(smooth, name), -1, 1)) for name in _ENDS}
+    return result._replace(**ends, p=smooth.p)
+
+
+def _smoothed(differences: np.ndarray) -> np.ndarray:
+    """One gain and one loss more, along the last axis."""
+    more = np.broadcast_to([1.0, -1.0], (*differences.shape[:-1], 2))
+    return np.concatenate([differences, more], axis=-1)
 
 
 def _sign_p(equal: np.ndarray) -> float:

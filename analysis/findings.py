@@ -9,9 +9,10 @@ import pandas as pd
 from analysis.comparison import compare, compare_learners
 from analysis.design import Saltelli
 from analysis.paper import METRICS
-from analysis.results import Results
+from analysis.precision import Precision
+from analysis.results import Results, parts_of
 from analysis.sensitivity import sensitivity
-from analysis.statistics import summary
+from analysis.statistics import distribution, summary
 
 PRODUCT = "collection_ratio_and_communication"
 
@@ -56,13 +57,15 @@ def comparisons(results: Results) -> pd.DataFrame:
     """Every policy against the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as ``analysis.comparison.compare`` has it; empty if there is
-        one policy, or a rule gave each its own missions.
+        A row per policy and metric, as ``analysis.comparison.compare`` has it, ``p_adjusted`` also
+        for the choice of the best; empty if there is one policy, or a rule gave each its own
+        missions.
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
     generator = np.random.default_rng(results.store.manifest.seed)
-    return compare(results.missions, best_policy(results), generator, [*METRICS])
+    table = compare(results.missions, best_policy(results), generator, [*METRICS])
+    return _chosen_among(table, len(results.policies))
 
 
 def learners(results: Results) -> dict[str, list[str]]:
@@ -84,20 +87,60 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per learner and metric, as ``analysis.comparison.compare_learners`` has it: about the
-        learner where there are several trainings of it, else about this one checkpoint. Empty if
-        there is nothing to compare, or a rule gave each policy its own missions.
+        learner where there are several trainings of it, else about this one checkpoint;
+        ``p_adjusted`` also for the choice of the best. Empty if there is nothing to compare, or a
+        rule gave each policy its own missions.
     """
     trained = learners(results)
     learned = {policy for policies in trained.values() for policy in policies}
     others = results.missions[~results.missions["policy"].isin(learned)]
     if not trained or others.empty or not _same_missions(results):
         return pd.DataFrame()
-    return compare_learners(results.missions, trained, _best(others), [*METRICS])
+    table = compare_learners(results.missions, trained, _best(others), [*METRICS])
+    return _chosen_among(table, others["policy"].nunique())
+
+
+def _chosen_among(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
+    """Comparisons with a baseline that these data chose: by Bonferroni, any of the candidates."""
+    return table.assign(p_adjusted=(table["p_adjusted"] * candidates).clip(upper=1))
 
 
 def _same_missions(results: Results) -> bool:
     counts = results.store.manifest.missions
     return all(of_team == counts[0] for of_team in counts)
+
+
+def distributions(results: Results) -> pd.DataFrame:
+    """How collection ratio and communication spreads over the missions of every policy.
+
+    Returns:
+        A row per policy and view, as ``analysis.statistics.distribution`` has it; empty if there
+        are several design points, whose missions are not alike.
+    """
+    if len(results.store.manifest.points) > 1:
+        return pd.DataFrame()
+    generator = np.random.default_rng(results.store.manifest.seed)
+    return distribution(results.missions, PRODUCT, generator)
+
+
+def precisions(results: Results) -> pd.DataFrame:
+    """How narrow the intervals became that the study asked for.
+
+    Returns:
+        A row per policy, design point and metric: ``policy``, and the fields of
+        ``analysis.precision.Reached``. Empty if the study asked for none.
+    """
+    data, manifest = results.manifest["study"]["precision"], results.store.manifest
+    if data is None:
+        return pd.DataFrame()
+    rule = Precision.model_validate_json(json.dumps(data))
+    tables = []
+    for team, policy in enumerate(results.policies):
+        parts = parts_of(manifest.cells[team], manifest.missions[team])
+        table = pd.DataFrame(rule.reached(results.store.samples(parts)))
+        table.insert(0, "policy", policy)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
 
 
 def sensitivities(results: Results) -> pd.DataFrame:

@@ -53,6 +53,9 @@ def rounds_bar() -> "Iterator[tuple[Callable[[int], object], Callable[[Round], o
     with _bar("mission", 0) as bar:
 
         def begin(a_round: "Round") -> None:
+            if not a_round.number:
+                there = f", {a_round.present:,} of them there" if a_round.present else ""
+                print(f"{a_round.missions:,} missions{there}", file=sys.stderr)
             bar.total = a_round.missions
             bar.initial += a_round.present  # took no time
             if a_round.number:

@@ -76,7 +76,7 @@ def run(
         count = len(error.failures)
         line = f"dess: error: {count} of the chunks of study {study.name} failed, the rest is done"
         raise typer.Exit(console.fail(line, 1)) from None
-    _print_summary(results, out)
+    _print_summary(results, out, short=True)
     print(f"more: dess study show {out}")
 
 
@@ -98,6 +98,8 @@ def show(
     whose = policy or findings.best_policy(results)
     tables = {
         "means": findings.means(results),
+        "distributions": findings.distributions(results),
+        "precisions": findings.precisions(results),
         "comparisons": findings.comparisons(results),
         "learned_against_heuristic": findings.learned_against_heuristic(results),
         "sensitivities": findings.sensitivities(results),
@@ -109,10 +111,11 @@ def show(
         rows = {name: json.loads(t.to_json(orient="records")) for name, t in tables.items()}
         print(json.dumps({"study": results.manifest["study"]["name"]} | rows, indent=2))
         return
-    _print_summary(results, folder)
+    _print_summary(results, folder, short=False)
     _print_sensitivities(tables["sensitivities"])
-    if len(findings.settings(results)) > 1:
-        _print_by_point(results, tables["means"])
+    _print_by_point(results, tables["means"], list(NAMES))
+    _print_distributions(tables["distributions"])
+    _print_precisions(results, tables["precisions"])
     _print_comparisons(tables["comparisons"])
     _print_learners(tables["learned_against_heuristic"])
     _print_worst(tables["worst"], whose)
@@ -137,8 +140,8 @@ def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
     print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
 
 
-def _print_summary(results: "Results", folder: Path) -> None:
-    """The means at the only design point, or what was selected and its check, in short."""
+def _print_summary(results: "Results", folder: Path, short: bool) -> None:
+    """The means at the only design point, or what was selected and its check."""
     from analysis import findings, paper
 
     study = results.manifest["study"]
@@ -148,8 +151,12 @@ def _print_summary(results: "Results", folder: Path) -> None:
         _print_selections(findings.selections(results))
         title = f"{study['selection']['check']} further missions"
         _print_metrics(findings.checks(results), title, printed)
-    elif len(findings.settings(results)) == 1:
-        _print_metrics(findings.means(results), "mean, 95 % interval", printed)
+        return
+    means = findings.means(results)
+    if len(findings.settings(results)) == 1:
+        _print_metrics(means, "mean, 95 % interval", printed)
+    elif short:
+        _print_by_point(results, means, [PRODUCT])
 
 
 def _print_selections(selected: "pd.DataFrame") -> None:
@@ -169,21 +176,59 @@ def _print_metrics(means: "pd.DataFrame", title: str, printed: dict[str, float])
     console.print_table([title, *NAMES.values()], rows)
 
 
-def _print_by_point(results: "Results", means: "pd.DataFrame") -> None:
-    """A table per metric, a row per design point, if these are not too many."""
+def _print_by_point(results: "Results", means: "pd.DataFrame", metrics: list[str]) -> None:
+    """A table per metric, a row per design point, if these are some and not too many."""
     from analysis.findings import settings
 
     named = settings(results)
+    if len(named) == 1:
+        return
     if len(named) > MANY:
         print(f"{len(named)} design points are too many to list; --json has them")
         return
     cells = {(row.metric, row.point, row.policy): _interval(row) for row in means.itertuples()}
-    for metric, name in NAMES.items():
+    for metric in metrics:
         rows = [
             [setting, *(cells[metric, point, policy] for policy in results.policies)]
             for point, setting in enumerate(named)
         ]
-        console.print_table([name, *results.policies], rows)
+        console.print_table([NAMES[metric], *results.policies], rows)
+
+
+def _print_distributions(table: "pd.DataFrame") -> None:
+    """The spread of the product: what 5 %, half and 95 % of the missions stay below, the worst."""
+    if table.empty:
+        return
+    rows = []
+    for policy, views in table.groupby("policy", sort=False):
+        quantiles = views[views["view"] == "quantile"].set_index("share")["value"]
+        (worst,) = views[views["view"] == "worst mean"].itertuples()
+        cells = [f"{100 * quantiles[share]:.1f} %" for share in (0.05, 0.5, 0.95)]
+        cells.append(f"{100 * worst.value:.1f} % [{100 * worst.low:.1f}, {100 * worst.high:.1f}]")
+        rows.append([policy, *cells])
+    head = ["spread of the product", "5 % quantile", "median", "95 % quantile"]
+    console.print_table([*head, "mean of the worst 5 %"], rows)
+
+
+def _print_precisions(results: "Results", table: "pd.DataFrame") -> None:
+    """What came of the targets."""
+    from analysis.findings import settings
+
+    named = settings(results)
+    rows = [
+        [
+            " ".join([row.policy, named[row.point]]).strip(),
+            row.metric,
+            f"{row.missions:,}",
+            f"{row.mean:.4g} ± {row.half_width:.2g}",
+            f"{row.target:.2g}",
+            "yes" if row.met else "no: the budget ended",
+        ]
+        for row in table.itertuples()
+    ]
+    if rows:
+        head = ["precision", "metric", "missions", "mean", "asked for", "reached"]
+        console.print_table(head, rows)
 
 
 def _print_sensitivities(table: "pd.DataFrame") -> None:

@@ -5,7 +5,7 @@ from pandas.testing import assert_frame_equal
 from scipy import stats
 
 from analysis.comparison import adjust, compare, compare_learners, crossed, paired
-from analysis.statistics import mean_interval
+from analysis.statistics import bootstrap_interval, expanded_level, mean_interval
 from dess.errors import InputError
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -38,10 +38,18 @@ def test_pairs_by_hand():
 def test_shares_by_hand():
     a, b = [1] * 5 + [0] + [1] * 4, [0] * 5 + [1] + [1] * 4
     result = small(a, b, share=True)
-    # 5 gains, 1 loss: 2 (1 + 6) / 2^6; (6 - 2) / 12 -+ 1.959964 sqrt((8 / 12 - 1 / 9) / 12)
+    # 5 gains, 1 loss: 2 (1 + 6) / 2^6; one more of each: mean 1 / 3, squares 8 - 12 / 9,
+    # t(0.975, 11) = 2.200985: 1 / 3 -+ 2.200985 sqrt(6.66667 / 11 / 12)
     assert result.p == pytest.approx(14 / 64)
-    assert result[:3] == pytest.approx((0.4, -0.08838, 0.75505), abs=1e-5)
-    assert small(b, a, share=True)[:3] == pytest.approx((-0.4, -0.75505, 0.08838), abs=1e-5)
+    assert result[:3] == pytest.approx((0.4, -0.16130, 0.82797), abs=1e-5)
+    assert small(b, a, share=True)[:3] == pytest.approx((-0.4, -0.82797, 0.16130), abs=1e-5)
+
+
+def test_means_of_outcomes_are_shares():
+    halves = small([1.0, 0.5, 1.0], [0.5, 0.5, 1.0], share=True)
+    smooth = small([1.0, 0.5, 1.0, 1.0, 0.0], [0.5, 0.5, 1.0, 0.0, 1.0])
+    assert (halves.low, halves.high, halves.p) == (smooth.low, min(smooth.high, 1), smooth.p)
+    assert halves.difference == pytest.approx(1 / 6)
 
 
 def test_the_bootstrap_is_over_pairs():
@@ -49,6 +57,9 @@ def test_the_bootstrap_is_over_pairs():
     a = sea + rng(3).normal(1, 1, 400)
     result = paired(a, sea, rng())
     assert result[3:5] == pytest.approx(result[1:3], abs=0.02)  # of pairs: a tenth of the sea's
+    few = paired(a[:5], sea[:5], rng())
+    expanded = bootstrap_interval(a[:5] - sea[:5], np.mean, rng(), expanded_level(0.95, 5))
+    assert few[3:5] == expanded[1:]
 
 
 def test_what_is_shared_needs_no_missions():
@@ -94,7 +105,7 @@ def test_shares_without_spread_are_not_certain(a, b):
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "share"), [([], [], False), ([1.0, 2.0], [1.0], False), ([0.5, 1], [0, 1], True)]
+    ("a", "b", "share"), [([], [], False), ([1.0, 2.0], [1.0], False), ([2, 1], [0, 1], True)]
 )
 def test_what_is_no_pair_is_refused(a, b, share):
     with pytest.raises(ValueError, match="paired: "):
@@ -357,6 +368,16 @@ def test_one_checkpoint_is_compared_as_a_policy_is(metric):
     learner = compare_learners(STUDY, {"greedy": ["greedy"]}, "tour", [metric], by=["point"])
     policy = compared(metrics=[metric], by=["point"])[lambda rows: rows["policy"] == "greedy"]
     assert_frame_equal(learner[ends], policy[ends])
+
+
+def test_learners_that_never_fail_are_not_certain_not_to():
+    never = STUDY.assign(success=1)
+    ends = ["low", "high", "new_low", "new_high"]
+    row = compare_learners(never, {"ddqn": ["ddqn", "ddqn-2"]}, "tour", ["success"]).iloc[0]
+    # two trainings alike: t of 12 pairs, a gain and a loss, t(0.975, 13) = 2.160369
+    half = 2.160369 * np.sqrt(2 / 13 / 14)
+    assert row[ends].tolist() == pytest.approx([-half, half] * 2, rel=1e-6)
+    assert row[["difference", "p", "mission_sd"]].tolist() == [0, 1, 0]
 
 
 def test_points_of_one_sea_are_no_more_missions_of_a_learner():

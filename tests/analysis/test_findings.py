@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis import findings, run_study
+from analysis import compare, findings, run_study
 from analysis.statistics import mean_interval
 from dess import simulate
 from policies import load, load_team
@@ -68,6 +68,9 @@ def test_the_best_policy_is_compared_with_the_others(results):
     expected = missions["random"] - missions["greedy"]
     assert table.loc[findings.PRODUCT, "difference"] == pytest.approx(expected)
     assert table.loc[findings.PRODUCT, "n"] == 20  # replications: points share their sea
+    alone = compare(results.missions, "greedy", np.random.default_rng(7), table.index.tolist())
+    either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
+    assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
 
 
 def test_one_policy_is_compared_with_nothing(tmp_path):

@@ -215,7 +215,7 @@ def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatc
     asked = ["study", "run", "trial.toml", "--policy", "raising", "--policy", "greedy"]
     code, out, err = dess(*asked)
     assert (code, out) == (1, "")
-    first, last = err.splitlines()
+    _, first, last = err.splitlines()
     assert first.startswith(
         "failed: ZeroDivisionError: nothing to divide by (results/trial/failures/"
     )
