@@ -76,10 +76,10 @@ def learners(results: Results) -> dict[str, list[str]]:
     """
     found: dict[str, list[str]] = {}
     for team in results.store.manifest.policies:
-        for learner in {member.learner for member in team.members} - {""}:
-            if len(team.members) == 1:
-                found.setdefault(learner.rpartition(" ")[0], []).append(team.policy)
-    return found
+        if len(team.members) == 1 and (learner := team.members[0].learner):
+            found.setdefault(learner, []).append(team.policy)
+    names = [learner.rpartition(" ")[0] for learner in found]  # without the hash, if they differ
+    return dict(zip(names, found.values(), strict=True)) if len({*names}) == len(names) else found
 
 
 def learned_against_heuristic(results: Results) -> pd.DataFrame:
@@ -107,7 +107,7 @@ def _chosen_among(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
 
 def _same_missions(results: Results) -> bool:
     counts = results.store.manifest.missions
-    return all(of_team == counts[0] for of_team in counts)
+    return len({n for of_team in counts for n in of_team}) == 1
 
 
 def distributions(results: Results) -> pd.DataFrame:
@@ -186,7 +186,8 @@ def checks(results: Results) -> pd.DataFrame:
 
 
 def _best(missions: pd.DataFrame) -> str:
-    return str(missions.groupby("policy", sort=False)[PRODUCT].mean().idxmax())
+    at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
+    return str(at_points.groupby("policy", sort=False).mean().idxmax())
 
 
 def _mission_of(missions: pd.DataFrame) -> Sequence[tuple[int, int]]:

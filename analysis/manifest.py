@@ -15,18 +15,30 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationError,
     field_validator,
     model_validator,
 )
 
 import dess
-from analysis.study import Study
+from analysis.design import Design
+from analysis.precision import Precision
+from analysis.selection import Selection
+from analysis.study import CHECK, Study
 from dess.errors import InputError
-from dess.scenario import ScenarioSpace, load_scenario, validation_line
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
 from policies import load_team
 
 SCHEMA_VERSION = 2
+
+# The parts of a study that are read back from its data.
+_PARTS: dict[str, TypeAdapter] = {
+    "set": TypeAdapter(dict[str, Any]),
+    "design": TypeAdapter(Design | None),
+    "precision": TypeAdapter(Precision | None),
+    "selection": TypeAdapter(Selection | None),
+}
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "pandas", "pyarrow")
 
 
@@ -104,13 +116,25 @@ class Manifest(_Part):
         numbers = (study.get("missions"), study.get("logged"))
         if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
             raise ValueError("is not the data of a study")
+        for field in ("set", "design", "precision", "selection"):
+            try:
+                _PARTS[field].validate_json(json.dumps(study[field]))
+            except ValidationError:
+                raise ValueError(f"has a {field} that is none") from None
         return study
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
+        names = {team.policy for team in self.policies}
+        if not self.points or not names or len(names) < len(self.policies):
+            raise ValueError("policies, points: none, or one twice")
         shape = [len(self.points)] * len(self.policies)
         if [*map(len, self.missions)] != shape or len(self.selected) != len(self.policies):
             raise ValueError("missions, selected: not one for every policy and design point")
+        if not all(1 <= n <= CHECK for of_team in self.missions for n in of_team):
+            raise ValueError(f"missions: out of range; allowed: 1..{CHECK}")
+        if not all(best is None or best in range(len(self.points)) for best in self.selected):
+            raise ValueError("selected: no design point")
         return self
 
     @classmethod
@@ -132,7 +156,7 @@ class Manifest(_Part):
             seed=study.seed,
             study=data,
             scenario=base.model_dump(mode="json"),
-            policies=[Team(policy=team, members=_members(team)) for team in study.policies],
+            policies=[Team(policy=team, members=members_of(team)) for team in study.policies],
             points=points,
             missions=[[study.first] * len(points)] * len(study.policies),
             selected=[None] * len(study.policies),
@@ -198,11 +222,16 @@ class Manifest(_Part):
 
     def replay(self, cell: Cell, replication: int) -> str:
         """The command that simulates a mission of a cell again."""
+        name = self.study["scenario"]
         values = self.study["set"] | self.points[cell.point].values
+        if name not in scenario_names():  # its file may be anywhere: say what it changes
+            name, usual = "paper", load_scenario("paper").model_dump(mode="json")
+            ours = self.scenarios[cell.point].model_dump(mode="json")
+            values = {key: value for key, value in ours.items() if value != usual[key]}
         settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
         who = ["--policy", self.policies[cell.team].policy]
         which = ["--seed", str(self.seed), "--replication", str(replication)]
-        scenario = ["--scenario", self.study["scenario"]]
+        scenario = ["--scenario", name]
         return shlex.join(["dess", "simulate", *scenario, *settings, *who, *which])
 
     @cached_property
@@ -264,7 +293,8 @@ def fingerprint(module: str) -> str:
     return digest.hexdigest()
 
 
-def _members(team: str) -> list[Member]:
+def members_of(team: str) -> list[Member]:
+    """The identities of a team's policies, as this process has them."""
     identities = []
     for policy in load_team(team):
         kind = type(policy)

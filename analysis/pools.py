@@ -7,14 +7,15 @@ done again; a job that kills its worker each time has a ``Problem`` too.
 import os
 import signal
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from threading import Thread
 from typing import Any, Protocol, Self
 
 from analysis.jobs import Job, MissionsJob, Problem, Progress, attempt
-from analysis.manifest import fingerprint
+from analysis.manifest import Member, fingerprint, members_of
+from analysis.store import Part
 from dess.errors import InputError
 
 DEATHS = 2  # of workers that a job was alone with, after which it is given up
@@ -29,7 +30,7 @@ class Pool(Protocol):
 
     def run(
         self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Iterator[tuple[int, Any]]:
+    ) -> Generator[tuple[int, Any], None, None]:
         """Do the jobs; their numbers and results as they come in."""
         ...
 
@@ -48,7 +49,7 @@ class Here:
 
     def run(
         self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Iterator[tuple[int, Any]]:
+    ) -> Generator[tuple[int, Any], None, None]:
         """Do the jobs; their numbers and results as they come in."""
         if self.workers == 1:
             for number, job in enumerate(jobs):
@@ -69,7 +70,15 @@ class Here:
         for _ in range(DEATHS):
             for _, result in self._finished({0: job}, set()):
                 return result
-        return Problem(f"its worker died {DEATHS} times: killed, out of memory, or crashed")
+        line = f"its worker died {DEATHS} times: killed, out of memory, or crashed"
+        return Problem(line, mission=self._deadly(job))
+
+    def _deadly(self, job: Job) -> Part | None:
+        """The first mission of a job that kills its worker alone."""
+        for single in job.alone():
+            if not [*self._finished({0: single}, set())]:
+                return single.chunk.parts[0]
+        return None
 
     def _finished(self, jobs: dict[int, Job], started: set[int]) -> Iterator[tuple[int, Any]]:
         """Results by number as they come in, until a worker dies; who was ``started`` by then."""
@@ -120,9 +129,12 @@ def _told(job: Job, result: Any, progress: Progress | None) -> Any:
 
 
 def _compile(jobs: Sequence[Job]) -> None:
-    """Compile what the jobs need, once, so that the workers only load it."""
-    for job in {job.policy: job for job in jobs if isinstance(job, MissionsJob)}.values():
-        attempt(next(job.alone()))
+    """Compile the engine, once, so that the workers only load it.
+
+    With a policy of our own: what others do in this process is not known.
+    """
+    for job in [job for job in jobs if isinstance(job, MissionsJob)][:1]:
+        replace(next(job.alone()), policy="random").run()
 
 
 def _numbered(number: int, job: Job) -> tuple[int, Any]:
@@ -168,12 +180,15 @@ class Cluster:
 
     def run(
         self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Iterator[tuple[int, Any]]:
+    ) -> Generator[tuple[int, Any], None, None]:
         """Do the jobs; their numbers and results as they come in."""
         from distributed import as_completed
 
         code = fingerprint("dess")
-        futures = [self.client.submit(_checked, job, code, pure=False) for job in jobs]
+        teams = {policy: members_of(policy) for policy in {job.policy for job in jobs}}
+        futures = [
+            self.client.submit(_checked, job, code, teams[job.policy], pure=False) for job in jobs
+        ]
         numbers = {future.key: number for number, future in enumerate(futures)}
         finished = as_completed(
             futures, loop=self.client.loop, with_results=True, raise_errors=False
@@ -189,9 +204,12 @@ class Cluster:
             self.client.cancel(futures)
 
 
-def _checked(job: Job, code: str) -> Any:
-    if fingerprint("dess") != code:
-        raise InputError("scheduler: a worker has other code of dess; allowed: the same version")
+def _checked(job: Job, code: str, members: list[Member]) -> Any:
+    other = "code of dess" if fingerprint("dess") != code else ""
+    if members_of(job.policy) != members:
+        other = f"code or weights of {job.policy}"
+    if other:
+        raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
     return attempt(job)
 
 

@@ -12,6 +12,8 @@ from dess.scenario import Integer, Number
 
 Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
 
+# Missions that a rule may ask for.
+MOST = 1_000_000_000
 # The level of ``analysis.statistics``, which is not imported: studies load without scipy.stats.
 _LEVEL = 0.95
 # No round multiplies the missions of a cell by more.
@@ -90,11 +92,13 @@ class Precision(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    first: Integer = Field(30, ge=2, description="missions of a cell before the first check")
-    look_ahead: Integer = Field(
-        50, ge=0, description="further missions in which the targets must hold as well"
+    first: Integer = Field(
+        30, ge=2, le=MOST, description="missions of a cell before the first check"
     )
-    budget: Integer = Field(5000, ge=2, description="missions of a cell at most")
+    look_ahead: Integer = Field(
+        50, ge=0, le=MOST, description="further missions in which the targets must hold as well"
+    )
+    budget: Integer = Field(5000, ge=2, le=MOST, description="missions of a cell at most")
     targets: dict[Metric, Target] = Field(
         min_length=1, description="metric -> { absolute = ..., relative = ... }"
     )

@@ -7,7 +7,9 @@ round asks for depends on the missions of the rounds before it alone.
 
 import shlex
 import time
+from collections import defaultdict
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +20,7 @@ from analysis.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.manifest import Cell
 from analysis.pools import Cluster, Here, Pool
 from analysis.results import Results, parts_of, results_of
-from analysis.store import Chunk, Failure, Part, Store, split
+from analysis.store import Chunk, Failure, Part, Store, gaps, split
 from analysis.study import CHECK, Study, load_study
 from dess import simulate_batch
 from dess.errors import InputError
@@ -207,21 +209,20 @@ class _Run:
     def _do(self, jobs: Sequence[Job]) -> None:
         """Do the jobs and keep what comes of them."""
         failures = {}
-        for number, result in self.pool.run(jobs, self.progress):
-            job = jobs[number]
-            if not isinstance(result, Problem):
-                job.save(self.store, result)
-                continue
-            failure = self._failure(job, result)
-            failures[self.store.write_failure(job.chunk, failure)] = failure
+        with closing(self.pool.run(jobs, self.progress)) as results:
+            for number, result in results:
+                job = jobs[number]
+                if not isinstance(result, Problem):
+                    job.save(self.store, result)
+                    continue
+                failure = self._failure(job, result)
+                failures[self.store.write_failure(job.chunk, failure)] = failure
         if failures:
             raise ChunkError(failures)
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """What is told of a job that failed; without a culprit, the same study does it again."""
-        replay = shlex.join(
-            ["dess", "study", "run", self.study.name, "--out", str(self.store.folder)]
-        )
+        replay = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if mission := problem.mission:
             replay = self.store.manifest.replay(mission.cell, mission.replications[0])
         policy = self.study.policies[job.chunk.team]
@@ -230,13 +231,15 @@ class _Run:
 
 def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
     """What is wanted beyond what was, each mission once, in the order of the study."""
-    parts = [
-        Part(cell, range(cell.first + begin, cell.first + end))
-        for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True)
-        for cell, begin, end in zip(cells, begins, ends, strict=True)
-        if end > begin
-    ]
-    return [*{(p.cell.team, p.cell.key, p.replications): p for p in parts}.values()]
+    parts: list[Part] = []
+    asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
+    for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True):
+        for cell, begin, end in zip(cells, begins, ends, strict=True):
+            earlier = asked[cell.team, cell.key]
+            new = gaps(range(cell.first + begin, cell.first + end), earlier)
+            parts += [Part(cell, gap) for gap in new]
+            earlier += new
+    return parts
 
 
 @dataclass(frozen=True)

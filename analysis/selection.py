@@ -47,7 +47,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.special import ndtr
 
-from analysis.precision import Metric
+from analysis.precision import MOST, Metric
 from dess.scenario import Integer, Number
 
 # Stages of the race that are summed at once; their number changes no result.
@@ -109,16 +109,21 @@ class Selection(BaseModel):
     metric: Metric = Field(
         "collection_ratio_and_communication", description="the best has its largest mean"
     )
-    first: Integer = Field(20, ge=2, description="missions of every design point in round one")
+    first: Integer = Field(
+        20, ge=2, le=MOST, description="missions of every design point in round one"
+    )
     indifference: Number | None = Field(
         None, gt=0, description="of kn: the least lead of the best that matters"
     )
     confidence: Number = Field(0.95, gt=0.5, lt=1, description="of kn: probability of finding it")
     budget: Integer = Field(
-        100_000, ge=2, description="missions over all design points: of kn at most, of ocba exactly"
+        100_000,
+        ge=2,
+        le=MOST,
+        description="missions over all design points: of kn at most, of ocba exactly",
     )
     check: Integer = Field(
-        300, ge=0, description="further, independent missions of the selected design point"
+        300, ge=0, le=MOST, description="further, independent missions of the selected design point"
     )
 
     @model_validator(mode="after")

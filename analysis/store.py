@@ -10,6 +10,7 @@ in which order or by how many workers it was computed.
 
 import json
 import os
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -32,8 +33,10 @@ from dess.record import MISSION_RECORD, UAV_RECORD, Records
 from dess.state import END_NAMES
 
 MANIFEST, LOCK = "manifest.json", ".lock"
+LONG = 150  # characters of a policy in the name of a folder
 FOLDERS = ("missions", "uavs", "events", "failures")
 
+_NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
 _PARTS = b"dess.parts"  # the parquet metadata that says what a file holds, in its order
 _KEY = pa.dictionary(pa.int32(), pa.string())
 
@@ -116,6 +119,7 @@ class Store:
         self._lock = FileLock(folder / LOCK)
         self._tables: dict[tuple[int, str], _Tables] = {}  # by team and name of the chunk
         self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
+        self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
         self._damaged: list[Path] = []
 
     @classmethod
@@ -184,8 +188,9 @@ class Store:
         for name in FOLDERS:
             with _writable(self.folder / name):
                 (self.folder / name).mkdir(exist_ok=True)
-        for path in [*self.folder.glob(".*.tmp"), *self.folder.glob("*/*/.*.tmp")]:
-            path.unlink()
+        for pattern in (".*.tmp", "failures/.*.tmp", "*/policy=*/.*.tmp"):
+            for path in self.folder.glob(pattern):
+                path.unlink()
         self._scan()
         while self._damaged:
             self._damaged.pop().unlink()
@@ -199,12 +204,15 @@ class Store:
                 if missions is not None and of_uavs is not None:
                     self._enter(team, _id(path), _Tables(missions, of_uavs))
             for path in self._files("events", team):
-                self._whole(path)
+                if _read(path) is None:
+                    self._damaged.append(path)
+                else:
+                    self._logs[team, _id(path)] = path
 
-    def _whole(self, path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
+    def _whole(self, path: Path, schema: pa.Schema) -> pa.Table | None:
         """What a file holds; if that is not what its name says, it is damaged."""
         table = _read(path, schema)
-        if table is None or (schema and _name(_rows(table)) != _id(path)):
+        if table is None or _name(_rows(table)) != _id(path):
             self._damaged.append(path)
             return None
         return table
@@ -215,10 +223,14 @@ class Store:
             self._present[team, key].append(range(start, stop))
 
     def _files(self, kind: str, team: int) -> list[Path]:
-        return sorted(self._partition(kind, team).glob("*.parquet"))
+        """The files of a kind that a run may have written."""
+        files = self._partition(kind, team).glob("*.parquet")
+        return sorted(path for path in files if _NAME.fullmatch(path.name))
 
     def _partition(self, kind: str, team: int) -> Path:
         policy = quote(self.manifest.policies[team].policy, safe="")
+        if len(policy) > LONG:
+            policy = f"{policy[:LONG]}~{_hash(policy.encode())}"
         return self.folder / kind / f"policy={policy}"
 
     def missing(self, chunk: Chunk) -> Chunk | None:
@@ -226,7 +238,7 @@ class Store:
         parts = tuple(
             Part(part.cell, gap)
             for part in chunk.parts
-            for gap in _gaps(part.replications, self._present[chunk.team, part.cell.key])
+            for gap in gaps(part.replications, self._present[chunk.team, part.cell.key])
         )
         return Chunk(chunk.team, parts) if parts else None
 
@@ -269,9 +281,10 @@ class Store:
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
         """Keep the event log of a replication of a cell."""
-        self._write("events", cell.team, f"{cell.key}-{replication:06}", pa.table(columns))
+        name = f"{cell.key}-{replication:06}"
+        self._logs[cell.team, name] = self._write("events", cell.team, name, pa.table(columns))
 
-    def _write(self, kind: str, team: int, name: str, table: pa.Table) -> None:
+    def _write(self, kind: str, team: int, name: str, table: pa.Table) -> Path:
         sink = pa.BufferOutputStream()
         pq.write_table(table, sink, compression="zstd")
         content = sink.getvalue().to_pybytes()
@@ -280,6 +293,7 @@ class Store:
             path.parent.mkdir(exist_ok=True)
         with replacing(path) as temporary, _writable(path):
             temporary.write_bytes(content)
+        return path
 
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Keep why a chunk could not be computed; its path."""
@@ -310,21 +324,30 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        for part in parts:
-            here = self._present[part.cell.team, part.cell.key]
-            for gap in _gaps(part.replications, here)[:1]:
-                raise InputError(self._incomplete(part, gap))
-        team, wanted = parts[0].cell.team, _wanted(parts)
-        tables = [tables for (whose, _), tables in self._tables.items() if whose == team]
-        missions, uavs = zip(*tables, strict=True)
+        tables, wanted = self._tables_with(parts), _wanted(parts)
+        missions, uavs = ([getattr(each, kind) for each in tables] for kind in _Tables._fields)
         return _taken(_stacked(missions), wanted), _taken(_stacked(uavs), wanted)
 
     def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
-        """The metrics of the missions of every part."""
-        missions = self.load(parts)[0]
+        """The metrics of the missions of every part of one team.
+
+        Raises:
+            InputError: If some are missing or damaged.
+        """
+        tables = self._tables_with(parts)
+        missions = _taken(_stacked([each.missions for each in tables]), _wanted(parts))
         ends = np.cumsum([len(part.replications) for part in parts])
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
+
+    def _tables_with(self, parts: Sequence[Part]) -> list[_Tables]:
+        """The tables of a team, all of whose parts are there."""
+        for part in parts:
+            here = self._present[part.cell.team, part.cell.key]
+            for gap in gaps(part.replications, here)[:1]:
+                raise InputError(self._incomplete(part, gap))
+        team = parts[0].cell.team
+        return [tables for (whose, _), tables in self._tables.items() if whose == team]
 
     def _incomplete(self, part: Part, gap: range) -> str:
         team, values = part.cell.team, self.manifest.points[part.cell.point].values
@@ -340,9 +363,8 @@ class Store:
 
     def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
         """The event log of a replication of a cell, if it is there."""
-        pattern = f"{cell.key}-{replication:06}-*.parquet"
-        tables = map(_read, self._partition("events", cell.team).glob(pattern))
-        return next((table for table in tables if table is not None), None)
+        path = self._logs.get((cell.team, f"{cell.key}-{replication:06}"))
+        return _read(path) if path else None
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
@@ -364,16 +386,16 @@ def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
         yield Chunk(waiting[0].cell.team, tuple(waiting))
 
 
-def _gaps(wanted: range, present: list[range]) -> list[range]:
+def gaps(wanted: range, present: list[range]) -> list[range]:
     """What of a range is in none of the others."""
-    gaps, begin = [], wanted.start
+    missing, begin = [], wanted.start
     for there in sorted(present, key=lambda r: r.start):
         if there.start > begin:
-            gaps.append(range(begin, min(there.start, wanted.stop)))
+            missing.append(range(begin, min(there.start, wanted.stop)))
         begin = max(begin, there.stop)
         if begin >= wanted.stop:
             break
-    return [gap for gap in [*gaps, range(begin, wanted.stop)] if len(gap)]
+    return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
 
 
 def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
@@ -390,8 +412,9 @@ def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
 
 def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of all tables."""
-    frame = pa.concat_tables(tables).unify_dictionaries().to_pandas()
-    return frame.astype({"cell": str})
+    frame = pa.concat_tables(tables).unify_dictionaries().to_pandas().astype({"cell": str})
+    one = [name for name in ("cell", "replication", "uav") if name in frame]
+    return frame.drop_duplicates(one)  # somebody may have put folders together
 
 
 def _taken(table: pd.DataFrame, wanted: pd.DataFrame) -> pd.DataFrame:
@@ -477,13 +500,20 @@ def _id(path: Path) -> str:
 
 
 def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
-    """A parquet file; nothing if it is damaged, or not of the schema."""
+    """A parquet file; nothing if it is damaged, or not of the schema.
+
+    Raises:
+        InputError: If it cannot be read.
+    """
     try:
         content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; allowed: a file") from None
+    try:
         if _hash(content) != path.stem.rpartition("-")[2]:
             return None
         table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
-    except (OSError, pa.ArrowException):
+    except (OSError, pa.ArrowException):  # what pyarrow raises
         return None
     return table if schema is None or table.schema.equals(schema) else None
 

@@ -10,13 +10,14 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    PrivateAttr,
     ValidationError,
     field_validator,
     model_validator,
 )
 
 from analysis.design import Design, DesignPoint, Saltelli
-from analysis.precision import Precision
+from analysis.precision import MOST, Precision
 from analysis.selection import Selection
 from dess.errors import InputError
 from dess.scenario import (
@@ -31,7 +32,7 @@ from dess.streams import MAX_SEED
 from policies import load_team
 
 # The first replication of the missions that check a selected setting: none that selected it.
-CHECK = 1_000_000_000
+CHECK = MOST
 
 
 class Point(NamedTuple):
@@ -66,7 +67,7 @@ class Study(BaseModel):
     )
     policies: tuple[str, ...] = Field(min_length=1, description='teams: "P" or "P,P,..."')
     missions: Integer = Field(
-        1000, ge=1, le=CHECK, description="per design point and policy; with a rule, not given"
+        1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"
     )
     precision: Precision | None = Field(
         None, description="a rule: as many missions as narrow intervals take"
@@ -79,6 +80,8 @@ class Study(BaseModel):
     logged: Integer = Field(
         0, ge=0, description="first replications of every cell whose event log is kept"
     )
+
+    _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
 
     @field_validator("policies", mode="before")
     @classmethod
@@ -138,6 +141,14 @@ class Study(BaseModel):
                 raise ValueError(f"design: {shown} is there twice; allowed: once")
 
     @property
+    def command(self) -> list[str]:
+        """The command that runs it, as far as it came from ``load_study``."""
+        name, changes = self._origin
+        policies = [word for team in changes.get("policies", ()) for word in ("--policy", team)]
+        missions = ["--missions", str(changes["missions"])] if "missions" in changes else []
+        return ["dess", "study", "run", name or self.name, *policies, *missions]
+
+    @property
     def rule(self) -> Precision | Selection | None:
         """What decides how many replications a design point gets, if they are not fixed."""
         return self.precision or self.selection
@@ -187,9 +198,13 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         allowed = ", ".join(Study.model_fields)
         raise InputError(f"{where}: {unknown[0]}: unknown key; allowed: {allowed}")
     try:
-        return Study.model_validate(values)
+        study = Study.model_validate(values)
     except ValidationError as error:
         raise InputError(validation_line(error, where)) from None
+    except InputError as error:  # of a design point's scenario
+        raise InputError(f"{where}: {error}") from None
+    study._origin = (text, overrides)
+    return study
 
 
 def study_names() -> list[str]:
@@ -213,4 +228,8 @@ def _read(path: str) -> str:
 
 
 def _shown(values: dict[str, Any]) -> str:
-    return ", ".join(f"{key}={value}" for key, value in values.items())
+    return (
+        "the scenario as it is"
+        if not values
+        else ", ".join(f"{key}={value}" for key, value in values.items())
+    )

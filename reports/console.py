@@ -59,7 +59,7 @@ def rounds_bar() -> "Iterator[tuple[Callable[[int], object], Callable[[Round], o
             bar.total = a_round.missions
             bar.initial += a_round.present  # took no time
             if a_round.number:
-                bar.set_description(f"round {a_round.number + 1}")
+                bar.set_description(f"round {a_round.number + 1}", refresh=False)
 
         yield bar.update, begin
 

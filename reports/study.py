@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from dess.errors import InputError
 from reports import console
 
 if TYPE_CHECKING:
@@ -95,6 +96,9 @@ def show(
     from analysis.results import load_results
 
     results = load_results(folder)
+    if policy and policy not in results.policies:
+        allowed = ", ".join(results.policies)
+        raise InputError(f"--policy: {policy} is not in the study; allowed: {allowed}")
     whose = policy or findings.best_policy(results)
     tables = {
         "means": findings.means(results),
@@ -149,8 +153,9 @@ def _print_summary(results: "Results", folder: Path, short: bool) -> None:
     printed = paper.PRINTED.get(study["name"], {})
     if study["selection"]:
         _print_selections(findings.selections(results))
-        title = f"{study['selection']['check']} further missions"
-        _print_metrics(findings.checks(results), title, printed)
+        if checks := study["selection"]["check"]:
+            title = f"{checks} further missions"
+            _print_metrics(findings.checks(results), title, printed)
         return
     means = findings.means(results)
     if len(findings.settings(results)) == 1:
@@ -283,7 +288,7 @@ def _by_metric(table: "pd.DataFrame", who: str) -> Iterator[tuple[str, list[str]
 def _gain(row: Any) -> str:
     """How many times as many missions it would take without common random numbers."""
     reduction = row.variance_reduction
-    return f"{1 / (1 - reduction):.1f} x" if 0 < reduction < 1 else ""
+    return f"{1 / (1 - reduction):.1f} x" if reduction < 1 else ""
 
 
 def _difference(row: Any) -> str:

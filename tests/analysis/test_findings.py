@@ -1,3 +1,4 @@
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -54,7 +55,7 @@ def test_a_replay_command_gives_the_row(results, tmp_path, monkeypatch, capsys):
     small_study(tmp_path)
     monkeypatch.chdir(tmp_path)
     worst = findings.worst(results, "random", 1).iloc[0]
-    assert cli.main([*worst["command"].split()[1:], "--json"]) == 0
+    assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
     told = capsys.readouterr().out
     assert f'"collection_ratio": {float(worst["collection_ratio"])!r}' in told
 
@@ -102,6 +103,9 @@ def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
     policies = ["greedy", "random", first, second]
     results = run_study(small_study(tmp_path, policies=policies), tmp_path / "out")
     assert findings.learners(results) == {"tiny": [first, second]}
+    policies = ["greedy", first, other, f"{first},greedy"]
+    mixed = run_study(small_study(tmp_path, policies=policies), tmp_path / "mixed")
+    assert sorted(findings.learners(mixed).values()) == sorted([[first], [other]])
     table = findings.learned_against_heuristic(results)
     assert set(table["about"]) == {"the learner"}
     assert set(table["trainings"]) == {2}

@@ -5,13 +5,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import evaluate, load_results, run_study, runner
+from analysis import evaluate, load_results, load_study, run_study, runner
 from analysis.sensitivity import sensitivity
 from analysis.study import CHECK
-from dess import InputError, simulate
+from dess import InputError, load_scenario, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.state import END_NAMES
 from policies import load_team
+from reports import cli
 from tests.analysis.small import files_of, grid, small_study
 
 
@@ -304,16 +305,35 @@ def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
     program, command, *options = shlex.split(results.replay("random", 1, 3))
     assert (program, command) == ("dess", "simulate")
     monkeypatch.chdir(tmp_path)
-    asked = {
-        "--scenario=small.toml",
-        "--set=max_slots=99",
-        "--set=initial_data=[5, 9.5]",
-        "--policy=random",
-        "--seed=7",
-        "--replication=3",
-    }
-    pairs = zip(options[::2], options[1::2], strict=True) if "--set" in options else ()
-    assert {f"{key}={value}" for key, value in pairs} == asked
+    assert options[:2] == ["--scenario", "paper"]  # whose file needs not be there
+    settings = [value for key, value in zip(options, options[1:], strict=False) if key == "--set"]
+    ours = load_scenario("paper", **dict(cli._setting(text) for text in settings))
+    assert ours == results.scenario(1)
+    assert ours.max_slots == 99
+    assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]
+    shipped = load_study("fig4", policies=["greedy"], missions=1)
+    command = run_study(shipped, tmp_path / "fig4").replay("greedy", 1, 0)
+    assert command == (
+        "dess simulate --scenario fig4 --set uavs=2 --policy greedy --seed 2022 --replication 0"
+    )
+
+
+def test_points_that_are_one_scenario_share_their_missions(tmp_path):
+    """Where a list holds the scenario's own value, or drawn integers fall together."""
+    rule = {"procedure": "ocba", "first": 4, "budget": 60, "check": 0}
+    values = {"quota": [20, 60], "flying_time": [[20, 30], 20]}
+    design = {"kind": "one-at-a-time", "values": values}
+    study = small_study(tmp_path, selection=rule, design=design)
+    told = []
+    results = run_study(study, tmp_path / "out", announce=told.append)
+    cells = results.store.manifest.cells[0]
+    assert cells[1].key == cells[2].key
+    for counts in results.manifest["missions"]:
+        assert sum(counts) <= 60
+    sizes = results.missions.groupby(["policy", "point"], sort=False).size().tolist()
+    assert sizes == [n for of_team in results.manifest["missions"] for n in of_team]
+    there = [row for table in results.store._tables.values() for row in table.missions.to_pylist()]
+    assert len({(row["cell"], row["replication"]) for row in there}) == len(there)
 
 
 def test_there_is_at_least_one_worker(tmp_path):

@@ -1,8 +1,10 @@
 import json
+import shutil
 import signal
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 import dess
 from analysis import load_results, manifest, run_study
 from analysis.manifest import Cell
-from analysis.store import Chunk, Part, Store, _gaps, replacing, split
+from analysis.store import Chunk, Part, Store, gaps, replacing, split
 from dess import InputError, simulate_batch
 from policies import load
 from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
@@ -224,6 +226,63 @@ def test_records_that_were_not_asked_for_do_not_enter(case, tmp_path):
         assert store.missing(chunk) == chunk
 
 
+def test_folders_that_were_put_together_count_once(tmp_path):
+    few, more = small_study(tmp_path), small_study(tmp_path, missions=13)
+    run_study(few, tmp_path / "out")
+    expected = run_study(more, tmp_path / "more")
+    for kind in ("missions", "uavs"):
+        shutil.copytree(tmp_path / "out" / kind, tmp_path / "more" / kind, dirs_exist_ok=True)
+    together = load_results(tmp_path / "more")
+    pd.testing.assert_frame_equal(together.missions, expected.missions)
+    pd.testing.assert_frame_equal(together.uavs, expected.uavs)
+
+
+def test_a_file_under_another_name_does_not_pass(out):
+    path = sorted((out / "missions").rglob("*.parquet"))[0]
+    path.rename(path.with_name("0" * 16 + path.name[16:]))
+    with pytest.raises(InputError, match="damaged"):
+        load_results(out)
+
+
+def test_foreign_files_stay(out, tmp_path):
+    notes = next((out / "missions").iterdir()) / "my-notes.parquet"
+    notes.write_text("mine")
+    (out / "missions" / "policy=greedy" / ".x.parquet.1.tmp").touch()  # of a killed run
+    run_study(small_study(tmp_path, logged=1), out)
+    assert notes.read_text() == "mine"
+    assert not [*out.rglob("*.tmp")]
+
+
+def test_a_long_team_has_a_short_folder(tmp_path):
+    team = ",".join(["greedy", "random"] * 30)
+    results = run_study(small_study(tmp_path, policies=[team], missions=1), tmp_path / "out")
+    assert results.policies == [team]
+    assert len(load_results(tmp_path / "out").missions) == 1
+
+
+MANIFESTS = {
+    "missions": [[0], [10]],
+    "selected": [9, None],
+    "policies": [],
+    "points": [],
+}
+
+
+@pytest.mark.parametrize("field", MANIFESTS)
+def test_a_manifest_that_makes_no_sense(field, out):
+    _rewrite(out, **{field: MANIFESTS[field]})
+    with pytest.raises(InputError, match="manifest.json"):
+        load_results(out)
+
+
+@pytest.mark.parametrize("part", ["set", "design", "precision", "selection"])
+def test_a_manifest_whose_study_makes_no_sense(part, out):
+    study = json.loads((out / "manifest.json").read_text())["study"]
+    _rewrite(out, study=study | {part: 3})
+    with pytest.raises(InputError, match=f"study: has a {part} that is none"):
+        load_results(out)
+
+
 def test_chunks_have_their_size_and_one_team():
     cells = [Cell(team, point, f"{team}{point}", 0) for team in (0, 1) for point in (0, 1, 2)]
     chunks = [*split([Part(cell, range(3)) for cell in cells], 4)]
@@ -242,9 +301,11 @@ def test_chunks_have_their_size_and_one_team():
 )
 def test_gaps_are_what_is_in_no_other_range(wanted, present):
     ranges = [range(*sorted(each)) for each in present]
-    gaps = _gaps(range(*sorted(wanted)), ranges)
+    missing = gaps(range(*sorted(wanted)), ranges)
     there = {r for each in ranges for r in each}
-    assert [r for gap in gaps for r in gap] == [r for r in range(*sorted(wanted)) if r not in there]
+    assert [r for gap in missing for r in gap] == [
+        r for r in range(*sorted(wanted)) if r not in there
+    ]
 
 
 def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):

@@ -260,6 +260,7 @@ BAD = {
     "study run trial.toml --out small.toml/out": ["small.toml/out: cannot be written"],
     "study run trial.toml --out .": ["no manifest.json", "another --out"],
     "study run trial.toml --dry-run --out .": ["no manifest.json", "another --out"],
+    "study show trial --policy tour": ["trial/manifest.json: no such file"],
     "study show nope": ["nope/manifest.json: no such file", "made by dess study run"],
     "study": ["Missing command", "dess study --help"],
     "fly": ["No such command 'fly'", "dess --help"],
