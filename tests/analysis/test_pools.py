@@ -4,7 +4,11 @@ import shlex
 import pytest
 
 from analysis import load_results, run_study
+from analysis.jobs import MissionsJob
+from analysis.manifest import Manifest, fingerprint, members_of
+from analysis.pools import _checked
 from analysis.runner import ChunkError
+from analysis.store import Chunk, Part
 from dess import InputError
 from tests.analysis import troublesome
 from tests.analysis.small import files_of, small_study
@@ -100,6 +104,18 @@ def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
     assert (tmp_path / "plugin" / "killed").exists()
     run_study(study, tmp_path / "undisturbed")
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
+    study = small_study(tmp_path)
+    cell = Manifest.of(study).cells[0][0]
+    chunk = Chunk(0, (Part(cell, range(1)),))
+    job = MissionsJob(chunk, (study.points[0].scenario,), "greedy", 7, "batch")
+    code, members = fingerprint("dess"), members_of("greedy")
+    assert len(_checked(job, code, members).missions) == 1
+    for others in (("0" * 64, members), (code, members_of("random"))):
+        with pytest.raises(InputError, match="a worker has other code"):
+            _checked(job, *others)
 
 
 def test_dask_records_a_chunk_that_raises(plugin, cluster, tmp_path):

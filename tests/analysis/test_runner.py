@@ -131,9 +131,9 @@ def test_policies_and_points_can_be_added(tmp_path):
     assert_same(extended, run_study(more, tmp_path / "fresh"))
 
 
-@pytest.mark.parametrize("after", [1, 7, 14])
-def test_an_interrupted_run_is_completed(after, tmp_path):
-    study, done = small_study(tmp_path, logged=1), 0
+def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
+    """Interrupt a run after some missions, and run it again."""
+    done = 0
 
     def interrupt(missions: int) -> None:
         nonlocal done
@@ -142,12 +142,18 @@ def test_an_interrupted_run_is_completed(after, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_study(study, tmp_path / "out", progress=interrupt)
-    with pytest.raises(InputError, match="incomplete, the first .* allowed: run the study again"):
-        load_results(tmp_path / "out")
-    run_study(study, tmp_path / "out")
-    run_study(study, tmp_path / "undisturbed")
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+        run_study(study, folder / "out", progress=interrupt)
+    with pytest.raises(InputError, match="incomplete.*; allowed: run the study again"):
+        load_results(folder / "out")
+    run_study(study, folder / "out", workers)
+    run_study(study, folder / "undisturbed")
+    assert files_of(folder / "out") == files_of(folder / "undisturbed")
+
+
+@pytest.mark.parametrize("after", [1, 7, 14])
+def test_an_interrupted_run_is_completed(after, tmp_path):
+    study = small_study(tmp_path, logged=1)
+    check_that_an_interrupted_run_is_completed(study, tmp_path, after, workers=1)
 
 
 def test_event_logs_are_those_of_the_missions(tmp_path):
@@ -270,21 +276,7 @@ def test_rounds_are_announced_before_their_missions(tmp_path):
 @pytest.mark.parametrize("kind", [precise, selecting])
 @pytest.mark.parametrize("after", [11, 47, 71])
 def test_an_interrupted_run_of_rounds_is_completed(kind, after, tmp_path):
-    study, done = kind(tmp_path), 0
-
-    def interrupt(missions: int) -> None:
-        nonlocal done
-        done += missions
-        if done >= after:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_study(study, tmp_path / "out", progress=interrupt)
-    with pytest.raises(InputError, match="incomplete"):
-        load_results(tmp_path / "out")
-    run_study(study, tmp_path / "out", workers=2)
-    run_study(study, tmp_path / "undisturbed")
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+    check_that_an_interrupted_run_is_completed(kind(tmp_path), tmp_path, after, workers=2)
 
 
 def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import dess
 from analysis import load_results, manifest, run_study
 from analysis.manifest import Cell
-from analysis.store import Chunk, Part, Store, gaps, replacing, split
+from analysis.store import Chunk, Failure, Part, Store, gaps, replacing, split
 from dess import InputError, simulate_batch
 from policies import load
 from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
@@ -281,6 +281,16 @@ def test_a_manifest_whose_study_makes_no_sense(part, out):
     _rewrite(out, study=study | {part: 3})
     with pytest.raises(InputError, match=f"study: has a {part} that is none"):
         load_results(out)
+
+
+def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out") as store:
+        chunk = Chunk(0, (Part(store.manifest.cells[0][0], range(2)),))
+        path = store.write_failure(chunk, Failure("greedy", 2, "no", "dess", ""))
+        assert path.exists()
+        store.write(chunk, simulate_batch(study.points[0].scenario, load("greedy"), 7, 2))
+        assert not path.exists()
 
 
 def test_chunks_have_their_size_and_one_team():
