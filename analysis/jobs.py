@@ -7,8 +7,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from analysis.chunks import Chunk, Part
 from analysis.manifest import Cell
-from analysis.store import Chunk, Part, Store
+from analysis.store import Store
 from dess import simulate, simulate_batch
 from dess.errors import InputError
 from dess.record import Records, empty_records

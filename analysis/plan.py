@@ -5,9 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.chunks import Part, split
 from analysis.results import parts_of
 from analysis.runner import CHUNK, check_workers
-from analysis.store import Part, Store, split
+from analysis.store import Store
 from analysis.study import CHECK, Study
 from dess import simulate, simulate_batch
 from policies import load_team
@@ -93,9 +94,8 @@ def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
         checks = range(CHECK, CHECK + study.selection.check)
         parts.append(Part(manifest.cells[team][point], checks))
     missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
-    return sum(chunk.missions for chunk in missing if chunk), sum(
-        len(p.replications) for p in parts
-    )
+    wanted = sum(len(part.replications) for part in parts)
+    return sum(chunk.missions for chunk in missing if chunk), wanted
 
 
 def _budget(study: Study) -> int:

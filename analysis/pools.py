@@ -13,9 +13,9 @@ from dataclasses import replace
 from threading import Thread
 from typing import Any, Protocol, Self
 
+from analysis.chunks import Part
 from analysis.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.manifest import Member, fingerprint, members_of
-from analysis.store import Part
 from dess.errors import InputError
 
 DEATHS = 2  # of workers that a job was alone with, after which it is given up

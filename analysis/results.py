@@ -9,9 +9,10 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.chunks import Part
 from analysis.manifest import Cell, Manifest
 from analysis.selection import Choice, Selection
-from analysis.store import Part, Store
+from analysis.store import Store
 from analysis.study import CHECK
 from dess.errors import InputError
 from dess.record import MISSION_RECORD

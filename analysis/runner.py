@@ -12,15 +12,16 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from analysis.chunks import Chunk, Part, gaps, split
 from analysis.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.manifest import Cell
 from analysis.pools import Cluster, Here, Pool
 from analysis.results import Results, parts_of, results_of
-from analysis.store import Chunk, Failure, Part, Store, gaps, split
+from analysis.store import Failure, Store
 from analysis.study import CHECK, Study, load_study
 from dess import simulate_batch
 from dess.errors import InputError
@@ -212,13 +213,20 @@ class _Run:
         with closing(self.pool.run(jobs, self.progress)) as results:
             for number, result in results:
                 job = jobs[number]
-                if not isinstance(result, Problem):
-                    job.save(self.store, result)
-                    continue
-                failure = self._failure(job, result)
-                failures[self.store.write_failure(job.chunk, failure)] = failure
+                problem = result if isinstance(result, Problem) else self._save(job, result)
+                if problem:
+                    failure = self._failure(job, problem)
+                    failures[self.store.write_failure(job.chunk, failure)] = failure
         if failures:
             raise ChunkError(failures)
+
+    def _save(self, job: Job, result: Any) -> Problem | None:
+        """Keep what came of a job; what the store refuses at its door is a problem of the job."""
+        try:
+            job.save(self.store, result)
+        except ValueError as error:
+            return Problem.of(error)
+        return None
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """What is told of a job that failed; without a culprit, the same study does it again."""

@@ -12,12 +12,11 @@ import json
 import os
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from hashlib import sha256
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 from urllib.parse import quote
 
 import numpy as np
@@ -26,6 +25,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
+from analysis.chunks import Chunk, Part, gaps, name_of, short_hash
 from analysis.manifest import Cell, Manifest
 from analysis.study import Study
 from dess.errors import InputError
@@ -52,37 +52,6 @@ UAVS = pa.schema(
     [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
 )
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
-
-
-@dataclass(frozen=True)
-class Part:
-    """Consecutive replications of a cell."""
-
-    cell: Cell
-    replications: range
-
-
-@dataclass(frozen=True)
-class Chunk:
-    """What is computed and kept together: parts of the cells of one team."""
-
-    team: int
-    parts: tuple[Part, ...]
-
-    @property
-    def missions(self) -> int:
-        """How many missions it has."""
-        return sum(len(part.replications) for part in self.parts)
-
-    @property
-    def rows(self) -> list[tuple[str, int, int]]:
-        """The key, start and stop of every part."""
-        return [(p.cell.key, p.replications.start, p.replications.stop) for p in self.parts]
-
-    @property
-    def name(self) -> str:
-        """A hash of what it holds."""
-        return _name(self.rows)
 
 
 @dataclass(frozen=True)
@@ -212,7 +181,7 @@ class Store:
     def _whole(self, path: Path, schema: pa.Schema) -> pa.Table | None:
         """What a file holds; if that is not what its name says, it is damaged."""
         table = _read(path, schema)
-        if table is None or _name(_rows(table)) != _id(path):
+        if table is None or name_of(_rows(table)) != _id(path):
             self._damaged.append(path)
             return None
         return table
@@ -230,7 +199,7 @@ class Store:
     def _partition(self, kind: str, team: int) -> Path:
         policy = quote(self.manifest.policies[team].policy, safe="")
         if len(policy) > LONG:
-            policy = f"{policy[:LONG]}~{_hash(policy.encode())}"
+            policy = f"{policy[:LONG]}~{short_hash(policy.encode())}"
         return self.folder / kind / f"policy={policy}"
 
     def missing(self, chunk: Chunk) -> Chunk | None:
@@ -288,7 +257,7 @@ class Store:
         sink = pa.BufferOutputStream()
         pq.write_table(table, sink, compression="zstd")
         content = sink.getvalue().to_pybytes()
-        path = self._partition(kind, team) / f"{name}-{_hash(content)}.parquet"
+        path = self._partition(kind, team) / f"{name}-{short_hash(content)}.parquet"
         with _writable(path):
             path.parent.mkdir(exist_ok=True)
         with replacing(path) as temporary, _writable(path):
@@ -365,37 +334,6 @@ class Store:
         """The event log of a replication of a cell, if it is there."""
         path = self._logs.get((cell.team, f"{cell.key}-{replication:06}"))
         return _read(path) if path else None
-
-
-def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
-    """Parts in their order as chunks of ``size`` missions; a chunk has one team."""
-    waiting: list[Part] = []
-    room = size
-    for part in parts:
-        if waiting and waiting[0].cell.team != part.cell.team:
-            yield Chunk(waiting[0].cell.team, tuple(waiting))
-            waiting, room = [], size
-        rest = part.replications
-        while len(rest):
-            waiting.append(Part(part.cell, rest[:room]))
-            rest, room = rest[room:], room - len(rest[:room])
-            if not room:
-                yield Chunk(part.cell.team, tuple(waiting))
-                waiting, room = [], size
-    if waiting:
-        yield Chunk(waiting[0].cell.team, tuple(waiting))
-
-
-def gaps(wanted: range, present: list[range]) -> list[range]:
-    """What of a range is in none of the others."""
-    missing, begin = [], wanted.start
-    for there in sorted(present, key=lambda r: r.start):
-        if there.start > begin:
-            missing.append(range(begin, min(there.start, wanted.stop)))
-        begin = max(begin, there.stop)
-        if begin >= wanted.stop:
-            break
-    return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
 
 
 def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
@@ -480,18 +418,9 @@ def _is_ours(path: Path) -> bool:
     return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")
 
 
-def _hash(content: bytes) -> str:
-    return sha256(content).hexdigest()[:16]
-
-
 def _rows(table: pa.Table) -> list[tuple[str, int, int]]:
     """The parts that a table holds."""
     return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
-
-
-def _name(rows: Sequence[Sequence[Any]]) -> str:
-    """What a file is called that holds these parts."""
-    return _hash(json.dumps(rows).encode())
 
 
 def _id(path: Path) -> str:
@@ -510,7 +439,7 @@ def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}; allowed: a file") from None
     try:
-        if _hash(content) != path.stem.rpartition("-")[2]:
+        if short_hash(content) != path.stem.rpartition("-")[2]:
             return None
         table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
     except (OSError, pa.ArrowException):  # what pyarrow raises

@@ -4,11 +4,12 @@ import shlex
 import pytest
 
 from analysis import load_results, run_study
+from analysis.chunks import Chunk, Part
 from analysis.jobs import MissionsJob
 from analysis.manifest import Manifest, fingerprint, members_of
 from analysis.pools import _checked
 from analysis.runner import ChunkError
-from analysis.store import Chunk, Part
+from analysis.store import Store
 from dess import InputError
 from tests.analysis import troublesome
 from tests.analysis.small import files_of, small_study
@@ -70,6 +71,17 @@ def test_a_policy_that_raises_leaves_the_others_whole(plugin, tmp_path):
         files_of(tmp_path / folder / "missions" / "policy=greedy") for folder in ("out", "alone")
     )
     assert ours == alone
+
+
+def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
+    def refuse_the_second(store, chunk, missions):
+        if chunk.team == 1 and chunk.parts[0].replications.start == 4:
+            raise ValueError("not what was asked for")
+
+    monkeypatch.setattr(Store, "_check", refuse_the_second)
+    failure = failing(small_study(tmp_path), tmp_path / "out")
+    assert (failure.policy, failure.missions) == ("random", 4)
+    assert failure.error == "ValueError: not what was asked for"
 
 
 def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):

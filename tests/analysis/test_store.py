@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 import dess
 from analysis import load_results, manifest, run_study
+from analysis.chunks import Chunk, Part, gaps, split
 from analysis.manifest import Cell
-from analysis.store import Chunk, Failure, Part, Store, gaps, replacing, split
+from analysis.store import Failure, Store, replacing
 from dess import InputError, simulate_batch
 from policies import load
 from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
