@@ -14,6 +14,7 @@ _HOME = {
     "evaluate": "runner",
     "Results": "results",
     "load_results": "results",
+    "fly": "replay",
     "summary": "statistics",
     "distribution": "statistics",
     "bootstrap_interval": "statistics",

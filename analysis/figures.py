@@ -212,9 +212,9 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     with style():
         figure = Figure(figsize=(5.2, 1.15 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
         ax = figure.subplots()
-        colours = _policy_colours(rows["policy"])
+        colours = policy_colours(rows["policy"])
         for y, row in rows.iterrows():
-            ax.errorbar(row["mean"], y, xerr=_arms(row), **_dot(row["policy"], colours))
+            ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
             ax.annotate(
                 f"{row['mean']:.1%}",
                 (row["high"], y),
@@ -250,15 +250,15 @@ def by_fleet(
     with style():
         figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
         ax = figure.subplots()
-        colours = _policy_colours(rows["policy"])
+        colours = policy_colours(rows["policy"])
         offsets = np.linspace(-0.12, 0.12, len(colours)) if len(colours) > 1 else [0.0]
         for offset, (policy, own) in zip(offsets, rows.groupby("policy", sort=False), strict=True):
             own = own.sort_values("uavs")
             ax.errorbar(
                 own["uavs"] + offset,
                 own["mean"],
-                yerr=_arms(own),
-                **_dot(policy, colours),
+                yerr=arms(own),
+                **dot(policy, colours),
                 linewidth=1,
                 alpha=0.9,
                 label=policy,
@@ -277,19 +277,19 @@ def by_fleet(
     return figure
 
 
-def _policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
+def policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
     """Colour and marker of every policy."""
     names = list(dict.fromkeys(policies))
     palette = sns.color_palette("colorblind", len(names)).as_hex()
     return {name: (palette[n], "os^vPX*"[n % 7]) for n, name in enumerate(names)}
 
 
-def _dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
+def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
     colour, marker = colours[policy]
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
 
 
-def _arms(rows: pd.DataFrame | pd.Series) -> np.ndarray:
+def arms(rows: pd.DataFrame | pd.Series) -> np.ndarray:
     """Lengths of the arms of error bars, (2, N)."""
     return np.array([rows["mean"] - rows["low"], rows["high"] - rows["mean"]]).reshape(2, -1)
 

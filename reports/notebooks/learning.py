@@ -1,0 +1,331 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: []
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Learning
+#
+# How the learned policies came about: with and without transfer learning as in the paper's Fig. 3,
+# what each means of learning is worth, and the curves of the policies that are shipped.
+
+# %% tags=["parameters"]
+trained = None  # folder with curves.parquet and a folder per policy; None for those shipped
+
+# %%
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import Markdown, display
+
+from analysis import curves, learning_figures
+from analysis.paper import METRICS
+from analysis.statistics import LEVEL
+from reports import page
+
+folder = Path(trained or str(files("policies") / "trained"))
+trainings = pd.read_parquet(folder / "curves.parquet")
+each = trainings.groupby(["variant", "seed"]).last()  # the end of every training
+seeds = each.groupby("variant").size()
+product = "collection_ratio_and_communication"
+baseline = "quick"
+
+pairs = {  # what a training has besides -> the variants with and without transfer learning
+    "all means of this project": (baseline, "no transfer"),
+    "no return guard": ("no guard", "no guard, no transfer"),
+    "the paper's means alone": ("none of the three", "none of the three, no transfer"),
+}
+pairs = {name: pair for name, pair in pairs.items() if {*pair} <= {*seeds.index}}
+
+
+def percent(level):
+    return f"{100 * level:g} %"
+
+
+def spread(numbers, form):
+    """The least and the largest number as text, or the one that all are."""
+    return " to ".join(dict.fromkeys(form.format(n) for n in (numbers.min(), numbers.max())))
+
+
+def points(interval):
+    """A difference with its interval, in percentage points."""
+    ends = [page.difference(end, 0) for end in interval]
+    return f"{ends[0]} [{ends[1]}, {ends[2]}]"
+
+
+# %% [markdown]
+# ## With and without transfer learning: the paper's Fig. 3
+
+# %%
+display(
+    Markdown(
+        "With transfer learning, phase I trains without any battery decrease, and phase II begins "
+        "with its weights (the paper's Algorithm 1); without, every step is one of phase II. Each "
+        f"training makes {spread(each['updates'], '{:,}')} updates and sees "
+        f"{spread(each['uav_slots'] / 1e6, '{:.1f}')} million UAV-slots; those of one variant "
+        "differ in their seed alone. What is shown is the greedy policy on evaluation missions, "
+        "which in phase I have no battery decrease either: left of the vertical line the curve is "
+        "no measure of what is right of it."
+    )
+)
+
+
+# %%
+def captioned(name, metric):
+    using, without = pairs[name]
+    labels = {using: "with transfer", without: "without"}
+    figure = learning_figures.transfer(trainings, metric, labels)
+    fewest = seeds[[using, without]].min()
+    band = (
+        f"Bands: {percent(curves.BAND)} by Student's t over n = {seeds[using]} and "
+        f"{seeds[without]} trainings."
+        if fewest >= curves.FEWEST
+        else f"No band: over n = {fewest}, one of {percent(curves.BAND)} would be of no use."
+    )
+    caption = (
+        f"{name[0].upper() + name[1:]}. Thick: mean of the exponential moving averages (weight of "
+        f"the newest evaluation {curves.ALPHA:g}); thin: single trainings; dotted: phase I. {band}"
+    )
+    title = learning_figures.NAMES[metric]
+    return figure, f"{title} against training step, {name}, with and without transfer", caption
+
+
+fig3 = ("evaluation_reward", f"evaluation_{product}")
+shown = [*pairs][:1] + [*pairs][1:][-1:]
+page.gallery([captioned(name, metric) for name in shown for metric in fig3])
+
+# %%
+averages = {metric: curves.smoothed(trainings, metric) for metric in fig3}
+found = {
+    (name, metric): curves.transfer(averages[metric], *pair)
+    for name, pair in pairs.items()
+    for metric in fig3
+}
+verdicts = {comparison.verdict for comparison in found.values()}
+agreed = len(verdicts) == 1
+(overall,) = verdicts if agreed else (curves.IN_PART,)
+
+
+def told(metric, transfer):
+    """Where the curve with transfer learning lies, in words."""
+    scale = points if metric != fig3[0] else lambda ends: "{:+.0f} [{:+.0f}, {:+.0f}]".format(*ends)
+    gap = scale(transfer.last).replace("-", "−")
+    if transfer.last.low == transfer.last.high:
+        gap = f"{gap.split()[0]}, the same in all trainings"
+    if transfer.since is None:
+        where = "ends below, or level"
+    elif transfer.throughout:
+        where = "is above in all of phase II"
+    else:
+        where = f"is above from step {transfer.since:,} on"
+    return f"{where}; at the end {gap}"
+
+
+display(
+    Markdown(
+        "**The paper's claim**: the agent with transfer learning has the higher reward throughout, "
+        "passes the other in collection ratio and communication, and ends higher; without it, "
+        "training levels off early and low. **The rule here**: the claim holds for a metric if, in "
+        "phase II, the mean curve with transfer is above from some step to the end, and the "
+        f"{percent(curves.BAND)} interval of the last difference (Welch's t over the trainings) "
+        "lies above 0; in part if the curve alone is above; else it does not hold.\n\n"
+        f"By this rule the claim **{overall}**"
+        + (f", in all {len(found)} comparisons." if agreed else ": the comparisons disagree.")
+    )
+)
+
+
+def judged(name):
+    using, without = pairs[name]
+    lines = [f"- With {name} (n = {seeds[using]} and {seeds[without]}):"]
+    return lines + [
+        f"    - {learning_figures.NAMES[metric]} **{found[name, metric].verdict}**: "
+        + told(metric, found[name, metric])
+        for metric in fig3
+    ]
+
+
+display(
+    Markdown(
+        f"Where the curve with transfer lies, with {percent(curves.BAND)} intervals of the last "
+        "difference, of the product in percentage points:\n\n"
+        + "\n".join(line for name in pairs for line in judged(name))
+    )
+)
+
+# %%
+unclear = [f for f in found.values() if f.last.low <= 0 <= f.last.high]
+alone = [*pairs][-1]
+ends = {v: 100 * each.loc[v, f"final_{product}"].max() for v in pairs[alone]}
+display(
+    Markdown(
+        f"In {len(unclear)} of {len(found)} comparisons the interval of the last difference holds "
+        "0: so few trainings cannot tell whether transfer helps or harms there. The paper sees its "
+        f"crossing at 0.8 million steps, far beyond this budget of {each['updates'].max():,}; a "
+        f"longer one might say otherwise. With {alone}, the best training with transfer reaches "
+        f"{ends[pairs[alone][0]]:.1f} %, the best without {ends[pairs[alone][1]]:.1f} % in "
+        "collection ratio and communication."
+    )
+)
+
+# %% [markdown]
+# ## What each means of learning is worth
+#
+# Trainings of the config `quick`, each with one thing changed and the same number of updates. The
+# weights that were kept fly missions that no training and no selection has seen, the same for all.
+#
+# - **guard**: the return guard masks actions that leave no way back to the charger.
+# - **low-battery starts**: some missions begin in the zone, with little battery left.
+# - **early returns**: some UAVs come home to charge as soon as they may.
+# - **none of the three**: none of these; the paper's means alone.
+# - **transfer**: phase I without battery decrease comes first.
+# - **relations**, **maps**: another observation and network; **maps** is the paper's.
+# - **lanes**: missions side by side; fewer bring less fresh experience per update.
+
+# %%
+last = curves.finals(trainings)
+table = curves.ablation(last, f"final_{product}", baseline)
+table = table.sort_values("mean", ascending=False, kind="stable").reset_index(drop=True)
+single = table[table["n"] == 1]
+page.figure(
+    learning_figures.ablation(table, last, f"final_{product}", baseline),
+    "Collection ratio and communication that the trainings of every variant reach",
+    f"Dots are trainings, n of them; a diamond is their mean, with its {percent(LEVEL)} interval "
+    "by Student's t over the trainings. One training has no interval, and no diamond. Dashed: the "
+    f"mean of {baseline}. An arrow: all trainings are left of the axis.",
+)
+
+
+# %%
+def line(row):
+    same = row["variant"] == baseline
+    ends = row["difference_low"], row["difference_high"]
+    others = last[last["variant"] == row["variant"]][["final_success", "final_collection_ratio"]]
+    return [
+        row["variant"],
+        row["n"],
+        page.interval(row["mean"], row["low"], row["high"])
+        if row["low"] < row["high"]
+        else page.percent(row["mean"]),
+        "" if same else points((row["difference"], *ends)),
+        "" if same else f"{row['p_adjusted']:.2g}",
+        *map(page.percent, others.mean()),
+    ]
+
+
+*others, name = METRICS.values()
+head = ["Variant", "n", name, f"To {baseline} [points]", "p (Holm)", *others]
+page.table(
+    pd.DataFrame([line(row) for _, row in table.iterrows()], columns=head),
+    f"Means over n trainings with {percent(LEVEL)} intervals; none of one training, or where all "
+    "are the same. Differences: Welch's t; of a single training, Student's t with the spread of "
+    f"{baseline}, so the interval holds 0 if one more training of {baseline} might have come out "
+    "like that",
+)
+
+# %%
+compared = table[table["variant"] != baseline]
+below, above = compared["difference_high"] < 0, compared["difference_low"] > 0
+groups = {
+    "worse": compared[below],
+    "better": compared[above],
+    "not distinguishable": compared[~below & ~above],
+}
+sure = compared[compared["p_adjusted"] <= 1 - LEVEL]["variant"]
+listed = [
+    f"- **{words}**: {'; '.join(rows['variant'])}" for words, rows in groups.items() if len(rows)
+]
+display(
+    Markdown(
+        f"Against {baseline}, by the whole interval, each for itself:\n\n"
+        + "\n".join(listed)
+        + f"\n\nOf {len(compared)} such intervals some miss by chance. Corrected for their number "
+        "(Holm), what is left to differ is: "
+        + (f"**{'; '.join(sure)}**." if len(sure) else "nothing.")
+        + f" {len(single)} of {len(table)} variants were trained once: of these only large "
+        "differences show."
+    )
+)
+
+# %% [markdown]
+# ## The policies that are shipped
+
+# %%
+shipped = {path.parent.name: path.parent for path in sorted(folder.glob("*/training.parquet"))}
+ran = {name: pd.read_parquet(path / "training.parquet") for name, path in shipped.items()}
+configs = {
+    name: json.loads((path / "config.json").read_text("utf-8"))["training"]
+    for name, path in shipped.items()
+}
+
+
+def trained_once(name):
+    caption = (
+        f"n = 1 training, of seed {configs[name]['seed']}, so no interval over trainings; every "
+        f"evaluation is over {configs[name]['evaluation_missions']:,} missions. The star: the "
+        "weights that were kept, by the best moving average."
+    )
+    figure = learning_figures.training(ran[name], name)
+    return figure, f"Evaluations of {name} against training step", caption
+
+
+page.gallery([trained_once(name) for name in ran])
+
+# %%
+margin = 0.01
+
+
+def course(name):
+    curve = ran[name]
+    near, end = curves.settled(curve, f"evaluation_{product}", margin), curve.iloc[-1]
+    return (
+        f"- **{name}** ends at {page.percent(end[f'evaluation_{product}'])} after "
+        f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots and "
+        f"{end['seconds'] / 60:.0f} minutes. From update {near['updates']:,} on "
+        f"({near['seconds'] / 60:.0f} minutes) its moving average stays within "
+        f"{100 * margin:g} point of its end: the other "
+        f"{page.percent(1 - near['updates'] / end['updates'])} of the updates moved it no further."
+    )
+
+
+display(
+    Markdown(
+        "Where more training stops paying, by the collection ratio and communication of the "
+        "evaluations:\n\n" + "\n".join(map(course, ran))
+    )
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+display(
+    Markdown(
+        "No study is read: the curves come with the policies, in `policies/trained`. To make them "
+        "anew:\n\n- `python benchmarks/learning.py --out runs/learning`"
+        + "".join(f"\n- `dess train {name} --out runs/{name}`" for name in ran)
+    )
+)
+page.table(
+    pd.DataFrame(
+        [
+            [
+                name,
+                config["observation"],
+                ", ".join(f"{p['name']} ({p['ticks']:,} ticks)" for p in config["phases"]),
+                config["seed"],
+                f"{config['discount']:g}",
+                config["steps"],
+            ]
+            for name, config in configs.items()
+        ],
+        columns=["Policy", "Observation", "Phases", "Seed", "Discount", "Steps of return"],
+    ),
+)

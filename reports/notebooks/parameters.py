@@ -1,0 +1,413 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [fig5, sweet-spot, sensitivity]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Scenario parameters
+#
+# What the number of UAVs, the charging thresholds, the initial data and the flying time do to a
+# mission: one by one as in the paper's Fig. 5, all together at the best setting, and as shares of
+# the variance.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder with the results folders of fig5, sweet-spot and sensitivity
+learned = None  # the learned policy to show; None for the best of the study, if there is one
+heuristic = None  # the other policy to show; None for the best that has not learned
+
+# %%
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import Markdown, display
+
+from analysis import effects, figures, findings, load_results, paper, parameter_figures, summary
+from analysis.design import NOISE
+from analysis.statistics import LEVEL
+from reports import page
+
+folder = Path(results)
+fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
+product = "collection_ratio_and_communication"
+
+means = summary(fig5.missions, by=["policy"])
+ranked = means[means["metric"] == product].sort_values("mean", ascending=False)["policy"]
+taught = {policy for those in findings.learners(fig5).values() for policy in those}
+learned = learned or next((policy for policy in ranked if policy in taught), None)
+heuristic = heuristic or next((policy for policy in ranked if policy not in taught), None)
+drawn = [policy for policy in (learned, heuristic) if policy]
+leading = drawn[0]
+
+table = effects.effects(fig5)
+table = table[table["policy"].isin(drawn)]
+fields = [f for f, own in table.groupby("field", sort=False) if own["position"].nunique() > 1]
+values = {
+    field: table[table["field"] == field].drop_duplicates("position")["value"].tolist()
+    for field in fields
+}
+pairs = {
+    (policy, field, metric): effects.changes(fig5, table, policy, field, metric)
+    for policy in drawn
+    for field in fields
+    for metric in ("success", product)
+}
+
+
+def points(mean, low, high):
+    ends = [page.difference(end, 0) for end in (mean, low, high)]
+    return f"{ends[0]} [{ends[1]}, {ends[2]}]"
+
+
+def percent(level):
+    return f"{100 * level:g} %"
+
+
+def name_of(field):
+    return effects.parameter(field).name
+
+
+def within(field):
+    """The name of a parameter inside a sentence."""
+    return name_of(field)[0].lower() + name_of(field)[1:]
+
+
+# %% [markdown]
+# ## One by one: the paper's Fig. 5
+
+# %%
+display(
+    Markdown(
+        f"Shown {'are' if len(drawn) > 1 else 'is'} "
+        + page.words([f"**{policy}**" for policy in drawn])
+        + (": the best learned policy of the study, and the best heuristic" if learned else "")
+        + f". Every value of a parameter was flown in {table['n'].min():,} missions per policy, "
+        "everything else drawn from Table II. All values, and all policies, meet the same "
+        "missions otherwise. So the lowest panel shows more than the others: the change from the "
+        "first value on, mission by mission, without what the missions have in common. Its axis is "
+        "its own; those of the metrics are the same for all parameters."
+    )
+)
+
+
+# %%
+def captioned(field):
+    changes = {policy: pairs[policy, field, product] for policy in drawn}
+    shapes = [f"{policy} {effects.shape(own).words}" for policy, own in changes.items()]
+    caption = (
+        f"Collection ratio and communication: {'; '.join(shapes)}. n = "
+        f"{table.loc[table['field'] == field, 'n'].min():,} missions per point, bars are "
+        f"{percent(LEVEL)} intervals."
+    )
+    figure = parameter_figures.effect(table, field, changes, fig5.policies)
+    return figure, f"The three metrics against the {within(field)}", caption
+
+
+page.gallery([captioned(field) for field in fields])
+
+# %% [markdown]
+# ### What one sees
+#
+# Two values differ if they do mission by mission, at 95 % after Holm's correction for the number of
+# pairs. Along the values, a metric *rises* if some values differ and all that do go up, *falls* if
+# all go down, *stays level* if none differ; *rises, then falls* if nothing before a value falls and
+# nothing behind it rises.
+
+
+# %%
+def at(policy, field, position):
+    rows = table[(table["policy"] == policy) & (table["field"] == field)]
+    (row,) = rows[(rows["metric"] == product) & (rows["position"] == position)].itertuples()
+    return row
+
+
+def seen(policy, field):
+    """How collection ratio and communication goes along a parameter, in words."""
+    found = effects.shape(pairs[policy, field, product])
+    first, last = (at(policy, field, n) for n in (0, len(values[field]) - 1))
+    change = pairs[policy, field, product].query("first == 0 and second == @last.position").iloc[0]
+    ends = points(change["difference"], change["low"], change["high"])
+    text = (
+        f"{policy} **{found.words}**: {page.percent(first.mean)} at {first.value}, "
+        f"{page.percent(last.mean)} at {last.value}, {ends} points"
+    )
+    if found.words == effects.PEAK:
+        tops = page.words([values[field][n] for n in found.peaks])
+        text += f", highest at {tops}{' or so' if len(found.peaks) > 1 else ''}"
+    return text
+
+
+lines = [
+    f"- **{name_of(field)}**" + "".join(f"\n    - {seen(policy, field)}" for policy in drawn)
+    for field in fields
+]
+display(Markdown("Collection ratio and communication, from the first value to the last:"))
+display(Markdown("\n".join(lines)))
+
+# %% [markdown]
+# ### What the paper sees
+
+# %%
+margin = sweet.manifest["study"]["selection"]["indifference"] or 0.01
+too_little = f"{100 * margin:g} point{'' if margin == 0.01 else 's'}"  # to matter
+
+
+def judged(judge, field, metric, named=()):
+    """The verdict on a claim about a parameter; none if the study lacks the values named."""
+    if field not in fields or not {*named} <= {*values[field]}:
+        return None
+    return judge(pairs[leading, field, metric], *(values[field].index(v) for v in named))
+
+
+claims = [
+    (
+        "Performance is best with three UAVs",
+        judged(effects.best_at, "uavs", product, ["3"]),
+        "every other number differs, downwards",
+    ),
+    (
+        "Success is no lower at C_S 10–20 % than above",
+        judged(
+            lambda own, *low: effects.no_lower(own, low, margin),
+            "charge_start",
+            "success",
+            ["10", "20"],
+        ),
+        f"no interval of a difference reaches {too_little} down",
+    ),
+    (
+        "All values of C_C are served well",
+        judged(lambda own: effects.alike(own, margin), "charge_complete", product),
+        f"all intervals of differences lie within {too_little}",
+    ),
+    (
+        "More initial data is good up to 15–17.5 data units, and bad above",
+        judged(effects.peaks_at, "initial_data", product, ["15–17.5"]),
+        "the metric rises, then falls, and may be highest there",
+    ),
+    (
+        "More flying time is better",
+        judged(effects.rises, "flying_time", product),
+        "the metric rises",
+    ),
+]
+claims = [claim for claim in claims if claim[1]]
+display(
+    Markdown(
+        f"The claims of Section V-D, and what they are worth for {leading}: by collection ratio "
+        "and communication, that of C_S by success. One cannot be told where the missions are too "
+        "few for either answer.\n\n"
+        + "\n".join(
+            f"- {claim}: **{verdict}**. (It holds if {condition}.)"
+            for claim, verdict, condition in claims
+        )
+    )
+)
+
+# %%
+verdicts = [verdict for _, verdict, _ in claims]
+counted = {v: verdicts.count(v) for v in (effects.HOLDS, effects.OPEN, effects.REFUTED)}
+sizes = {field: max(pairs[leading, field, product]["difference"].abs()) for field in fields}
+order = sorted(fields, key=sizes.get, reverse=True)
+display(
+    Markdown(
+        f"Claims that hold for {leading}: {counted[effects.HOLDS]} of {len(claims)}; that do not: "
+        f"{counted[effects.REFUTED]}; that cannot be told: {counted[effects.OPEN]}. By the "
+        "largest difference between two values, the parameters rank: "
+        + page.words([f"{within(f)} ({100 * sizes[f]:.1f} points)" for f in order])
+        + "."
+    )
+)
+
+# %% [markdown]
+# ## All together: the sweet spot
+
+# %%
+selections = findings.selections(sweet)
+checks = findings.checks(sweet)
+rule = sweet.manifest["study"]["selection"]
+by = checks.set_index(["policy", "metric"])
+designs = sweet.manifest["points"]
+marks = {paper.ABOVE: "▲", paper.LEVEL: "≈", paper.BELOW: "▼"}
+display(
+    Markdown(
+        f"Of {len(designs):,} settings, the one with the highest mean of "
+        f"{paper.METRICS[rule['metric']].lower()} was selected for every policy, by `"
+        f"{rule['procedure']}`"
+        + (f" with an indifference of {too_little}" if rule["indifference"] else "")
+        + ". A winner's mean is too high, because it won for it; so it flew "
+        f"{rule['check']:,} further missions that had no part in the selection, and only these "
+        "are shown beside the paper's figures "
+        f"(means of {paper.SWEET_SPOT_MISSIONS:,} missions, all parameters at their best)."
+    )
+)
+page.gallery(
+    [
+        (
+            figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
+            f"{name} of every policy at its best setting, beside the paper's figure",
+            f"The check: n = {checks['n'].min():,} missions per policy, bars are {percent(LEVEL)} "
+            "intervals. Dashed: the paper.",
+        )
+        for metric, name in paper.METRICS.items()
+    ]
+    if len(checks)
+    else []
+)
+
+
+# %%
+def beside(policy, metric):
+    """A checked mean with its interval, and how it lies to the paper's figure."""
+    mean, *ends = by.loc[(policy, metric), ["mean", "low", "high"]]
+    return f"{page.interval(mean, *ends)} {marks[paper.verdict(*ends, paper.SWEET_SPOT[metric])]}"
+
+
+def setting_of(point):
+    return [effects.words(value) for value in designs[point]["values"].values()]
+
+
+swept = [*designs[0]["values"]]
+printed = ["paper", *[""] * len(swept), *map(page.percent, paper.SWEET_SPOT.values()), "", ""]
+lines = [
+    [row.policy, *setting_of(row.point)]
+    + ([beside(row.policy, m) for m in paper.METRICS] if len(checks) else [""] * len(paper.METRICS))
+    + [f"{row.missions:,}", row.left]
+    for row in selections.itertuples()
+]
+shorts = [effects.parameter(field).short for field in swept]
+head = ["Policy", *shorts, *paper.METRICS.values(), "Missions", "Settings left"]
+page.table(
+    pd.DataFrame([printed, *lines], columns=head),
+    f"The setting selected, and its check: means with {percent(LEVEL)} intervals, ▲ wholly above "
+    "the paper's figure, ▼ below it, ≈ around it. Then the missions that the selection took, and "
+    "the settings that were not ruled out, itself among them",
+)
+
+# %%
+top = by["mean"].xs(product, level="metric").idxmax() if len(checks) else None
+if top:
+    (point,) = selections[selections["policy"] == top]["point"]
+    at_best = page.words(
+        [f"{short} {value}" for short, value in zip(shorts, setting_of(point), strict=True)]
+    )
+    mean, *ends = by.loc[(top, product), ["mean", "low", "high"]]
+    verdict = paper.verdict(*ends, paper.SWEET_SPOT[product])
+    display(
+        Markdown(
+            f"The best at its best setting is **{top}**, with {at_best}: "
+            f"{page.interval(mean, *ends)} in collection ratio and communication, {verdict} "
+            f"{'from ' if verdict == paper.LEVEL else ''}"
+            f"the paper's {page.percent(paper.SWEET_SPOT[product])}."
+        )
+    )
+
+# %%
+display(
+    Markdown(
+        "What is known of the selections:\n\n"
+        + "\n".join(f"- **{row.policy}**: {row.guarantee}." for row in selections.itertuples())
+    )
+)
+
+# %% [markdown]
+# ## What matters at all: sensitivity
+
+# %%
+indices = findings.sensitivities(sobol)
+ranges = sobol.manifest["study"]["design"]["ranges"]
+told = indices.dropna()
+of_product = told[told["metric"] == product]
+display(
+    Markdown(
+        "Here all parameters are drawn together: "
+        + page.words([f"{within(f)} {effects.words(ends)}" for f, ends in ranges.items()])
+        + ". A Sobol index is the share of a metric's variance that a parameter accounts for: "
+        "*alone*, or *with all interactions* that it takes part in. The replication, which is the "
+        "sea, the arrivals and the start, is a parameter too: what it accounts for, no setting "
+        "removes."
+    )
+)
+page.gallery(
+    [
+        (
+            parameter_figures.sensitivity(rows, policy),
+            f"Sobol indices of {policy}",
+            f"{paper.METRICS[product]} of {policy}. n = {rows['n'].min():,} missions; lines: "
+            f"{percent(LEVEL)} intervals by bootstrap. Estimates are not cut: that of a small "
+            "share may be negative, an interval may go beyond 100 %. Below the dotted line: noise.",
+        )
+        for policy, rows in of_product.groupby("policy", sort=False)
+    ]
+)
+
+
+# %%
+def weighed(policy):
+    """What the indices of a policy say, in words."""
+    rows = of_product[of_product["policy"] == policy].set_index("parameter")
+    most = rows.drop(NOISE)["first"].idxmax()
+    small = [f for f in rows.drop(NOISE).index if rows.loc[f, "total_high"] < margin_of_share]
+    text = (
+        f"- **{policy}**: {name_of(most)} matters most, alone "
+        f"{share(rows.loc[most], 'first')} of the variance. The noise leaves "
+        f"{share(rows.loc[NOISE], 'total')} that no setting removes."
+    )
+    few = page.words([within(f) for f in small])
+    return text + (
+        f" Less than {page.percent(margin_of_share)} of it has to do with {few}, by the whole "
+        "interval, interactions included."
+        if small
+        else ""
+    )
+
+
+def share(row, index):
+    return page.interval(row[index], row[f"{index}_low"], row[f"{index}_high"])
+
+
+margin_of_share = 0.05
+flat = indices[indices["first"].isna()]
+silent = [
+    f"{paper.METRICS[metric].lower()} of {page.words(rows['policy'].unique().tolist())}"
+    for metric, rows in flat.groupby("metric", sort=False)
+]
+display(
+    Markdown(
+        "\n".join(map(weighed, of_product["policy"].unique()))
+        + (
+            f"\n\nNo shares can be told of {page.words(silent)}: there it is the same in all the "
+            "missions that they are computed from."
+            if silent
+            else ""
+        )
+    )
+)
+
+# %%
+page.table(
+    pd.DataFrame(
+        [
+            [
+                row["policy"],
+                paper.METRICS[row["metric"]],
+                "noise" if row["parameter"] == NOISE else name_of(row["parameter"]),
+                share(row, "first"),
+                share(row, "total"),
+            ]
+            for _, row in told.iterrows()
+        ],
+        columns=["Policy", "Metric", "Parameter", "Alone", "With all interactions"],
+    ),
+    f"Sobol indices as shares of the variance, with {percent(LEVEL)} intervals",
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+page.provenance([study.manifest for study in (fig5, sweet, sobol)])

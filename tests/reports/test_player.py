@@ -1,0 +1,343 @@
+"""The player shows what happened, slot by slot, in a page that needs nothing else."""
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pytest
+from plotly import graph_objects
+
+import dess
+import policies
+from analysis.figures import node_colours
+from analysis.slots import battery_levels, duration, residual_data, uav_slots
+from dess.errors import InputError
+from dess.state import sample_scenario
+from reports import player as module
+from reports.player import library, player
+from tests.reports import browser
+
+# One UAV; three in a queue for one pad, of which one runs dry long before the others are done;
+# quotas that are filled at once; nothing to serve, in a mission that is truncated.
+CASES: dict[str, dict[str, Any]] = {
+    "alone": {"uavs": 1},
+    "queue": {"uavs": 3, "pads": 1, "zone": [26, 2, 4, 1]},
+    "short": {"uavs": 2, "quota": 4},
+    "empty sea": {"uavs": 2, "initial_data": 0, "arrival_rate": 0, "max_slots": 9},
+}
+
+
+class Mission(NamedTuple):
+    log: pd.DataFrame
+    scenario: dess.Scenario
+
+
+def flown(**fields: Any) -> Mission:
+    """A mission of the ``fig4`` scenario."""
+    space = dess.load_scenario("fig4", **fields)
+    record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
+    return Mission(pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0))
+
+
+@pytest.fixture(scope="module", params=CASES)
+def mission(request: pytest.FixtureRequest) -> Mission:
+    return flown(**CASES[request.param])
+
+
+@pytest.fixture(scope="module")
+def queue() -> Mission:
+    return flown(**CASES["queue"])
+
+
+def figure(html: str) -> dict[str, Any]:
+    """The traces, the layout and the frames in the HTML of a player."""
+    read = json.JSONDecoder().raw_decode
+    found = {}
+    for call, names in (("newPlot", ("name", "data", "layout")), ("addFrames", ("", "frames"))):
+        at = html.index(f"Plotly.{call}(") + len(f"Plotly.{call}(")
+        for name in names:
+            at += len(html[at:]) - len(html[at:].lstrip(" ,\n"))
+            if name:
+                found[name], at = read(html, at)
+            else:
+                at = html.index(",", at) + 1
+    return found
+
+
+class Replay:
+    """What a player shows: ``replay[t][name]`` is a trace of the frame of slot t."""
+
+    def __init__(self, mission: Mission):
+        self.figure = figure(player(*mission, "replay").data)
+        self.traces = self.figure["data"]
+
+    def __len__(self) -> int:
+        return len(self.figure["frames"])
+
+    def __getitem__(self, time: int) -> dict[str, Any]:
+        frame = self.figure["frames"][time]
+        assert frame["name"] == str(time)
+        changes = zip(frame["traces"], frame["data"], strict=True)
+        return {self.traces[n]["name"]: change for n, change in changes}
+
+
+@pytest.fixture(scope="module")
+def replay(mission: Mission) -> Replay:
+    return Replay(mission)
+
+
+def test_there_is_a_frame_and_a_step_of_the_slider_per_slot(
+    mission: Mission, replay: Replay
+) -> None:
+    (slider,) = replay.figure["layout"]["sliders"]
+    times = [str(t) for t in range(duration(mission.log) + 1)]
+    assert [frame["name"] for frame in replay.figure["frames"]] == times
+    assert [step["args"][0] for step in slider["steps"]] == [[t] for t in times]
+    assert [step["label"] for step in slider["steps"]] == times
+
+
+def holds(trace: dict[str, Any], change: dict[str, Any]) -> bool:
+    """Whether a trace has all values of a frame's change."""
+    return all(
+        holds(trace[key], value) if isinstance(value, dict) else trace[key] == value
+        for key, value in change.items()
+    )
+
+
+def test_the_page_opens_at_the_start(replay: Replay) -> None:
+    traces = {trace["name"]: trace for trace in replay.traces}
+    assert len(traces) == len(replay.traces)
+    assert all(holds(traces[name], change) for name, change in replay[0].items())
+
+
+def test_discs_are_the_residual_data(mission: Mission, replay: Replay) -> None:
+    residual = residual_data(mission.log)
+    for time, row in enumerate(residual.to_numpy()):
+        assert np.allclose(replay[time]["nodes"]["marker"]["size"], row, atol=0.0051, rtol=0)
+    (rings,) = (trace for trace in replay.traces if trace["name"] == "rings")
+    assert np.allclose(rings["marker"]["size"], residual.max(), atol=0.0051, rtol=0)
+    (nodes,) = (trace for trace in replay.traces if trace["name"] == "nodes")
+    assert list(zip(nodes["x"], nodes["y"], strict=True)) == list(mission.scenario.nodes)
+    assert nodes["marker"]["color"] == node_colours(len(mission.scenario.nodes))
+
+
+def test_uavs_are_where_they_are_until_their_mission_ends(mission: Mission, replay: Replay) -> None:
+    slots = uav_slots(mission.log)
+    for row in slots.itertuples():
+        before, after = replay[row.slot]["UAVs"], replay[row.slot + 1]["UAVs"]
+        assert (before["x"][row.uav], before["y"][row.uav]) == (row.from_x, row.from_y)
+        assert (after["x"][row.uav], after["y"][row.uav]) == (row.x, row.y)
+        assert before["marker"]["opacity"][row.uav] == 1
+    for uav, own in slots.groupby("uav"):
+        for time in range(own["slot"].max() + 1, len(replay)):
+            dots = replay[time]["UAVs"]
+            assert dots["marker"]["opacity"][uav] < 1
+            assert (dots["x"][uav], dots["y"][uav]) == (own["x"].iloc[-1], own["y"].iloc[-1])
+
+
+def test_links_lead_from_each_uav_to_the_node_that_it_serves(
+    mission: Mission, replay: Replay
+) -> None:
+    nodes, colours = mission.scenario.nodes, node_colours(len(mission.scenario.nodes))
+    slots = uav_slots(mission.log).set_index(["slot", "uav"])
+    for time in range(len(replay)):
+        for uav in range(mission.scenario.uavs):
+            link, dots = replay[time][f"link {uav + 1}"], replay[time]["UAVs"]
+            start, end = zip(link["x"], link["y"], strict=True)
+            assert start == (dots["x"][uav], dots["y"][uav])
+            node = slots["node"].get((time - 1, uav), -1)
+            assert end == (nodes[node] if node >= 0 else start)
+            assert node < 0 or link["line"]["color"] == colours[node]
+
+
+def test_trails_are_the_last_moves(mission: Mission, replay: Replay) -> None:
+    for uav in range(mission.scenario.uavs):
+        way = [replay[time]["UAVs"] for time in range(len(replay))]
+        for time in range(len(replay)):
+            past = [way[max(time - n, 0)] for n in range(module.TRAIL + 1)]
+            trail = replay[time][f"trail {uav + 1}"]
+            assert trail["x"] == [dots["x"][uav] for dots in past]
+            assert trail["y"] == [dots["y"][uav] for dots in past]
+
+
+def test_batteries_are_told_on_the_curves_and_at_the_uavs(mission: Mission, replay: Replay) -> None:
+    for row in battery_levels(mission.log).itertuples():
+        assert replay[row.time]["batteries"]["y"][row.uav] == row.battery
+        assert replay[row.time]["UAVs"]["customdata"][row.uav] == row.battery
+    for time in range(len(replay)):
+        assert set(replay[time]["batteries"]["x"]) == {time}
+        assert all(replay[time][f"cursor {panel}"]["x"] == [time, time] for panel in (2, 3, 4))
+
+
+def test_squares_and_the_status_tell_who_charges_and_who_waits(
+    mission: Mission, replay: Replay
+) -> None:
+    slots = uav_slots(mission.log)
+    left = residual_data(mission.log).sum(axis=1)
+    for time in range(len(replay)):
+        now = slots[slots["slot"] == time - 1]
+        (status,) = replay[time]["status"]["text"]
+        told = re.fullmatch(
+            r"(\d+) data units left · (\d+) of (\d+) pads? in use(?:, (\d+) waiting)?", status
+        )
+        assert told
+        assert abs(int(told[1]) - left[time]) <= 0.51
+        assert int(told[2]) == now["charging"].sum()
+        assert int(told[3]) == (mission.scenario.pads or mission.scenario.zone_cells)
+        assert int(told[4] or 0) == now["waiting"].sum()
+        for state in ("charging", "waiting"):
+            seen = np.flatnonzero(replay[time][state]["marker"]["opacity"])
+            assert seen.tolist() == now.loc[now[state], "uav"].tolist()
+            assert replay[time][state]["x"] == replay[time]["UAVs"]["x"]
+
+
+def test_bars_are_the_slots_of_charging_and_waiting(mission: Mission, replay: Replay) -> None:
+    slots = uav_slots(mission.log)
+    for state in ("charging", "waiting"):
+        for uav, own in slots.groupby("uav"):
+            (bars,) = (t for t in replay.traces if t["name"] == f"{state} {uav + 1}")
+            edges = zip(bars["x"][0::6], bars["x"][1::6], strict=True)
+            assert [slot for a, b in edges for slot in range(a, b)] == own.loc[
+                own[state], "slot"
+            ].tolist()
+
+
+def test_the_cases_are_what_they_are_meant_to_be(queue: Mission) -> None:
+    slots = uav_slots(queue.log)
+    ends = slots.groupby("uav")["slot"].max()
+    assert slots["waiting"].any() and slots["charging"].any() and ends.nunique() > 1
+    notes = {note["text"] for note in Replay(queue).figure["layout"]["annotations"]}
+    assert {"✓", "✕"} <= notes
+    assert duration(flown(**CASES["short"]).log) < module.TRAIL
+
+
+def test_plotly_knows_every_attribute(mission: Mission, replay: Replay) -> None:
+    parts = {name: replay.figure[name] for name in ("data", "frames", "layout")}
+    assert len(graph_objects.Figure(parts).frames) == len(replay)
+
+
+def test_the_same_log_gives_the_same_bytes(mission: Mission) -> None:
+    columns = {name: mission.log[name].to_numpy() for name in mission.log}
+    again = player(columns, mission.scenario, "one", "title", "caption").data
+    assert player(*mission, "one", "title", "caption").data == again
+    assert library().data == library().data
+
+
+def test_a_long_mission_is_light() -> None:
+    log, scenario = flown(uavs=3, quota=10_000, flight_cost=0, max_slots=150)
+    assert duration(log) == 150 and len(scenario.nodes) == 25
+    assert len(player(log, scenario, "long").data.encode()) < 0.5e6
+
+
+def test_a_player_refers_to_nothing_outside(queue: Mission) -> None:
+    html = player(*queue, "one", "A title", "A caption").data
+    assert not re.search(r"https?:|//\w|\b(src|href)=|url\(|@import|\bimport\b", html)
+
+
+def test_words_are_shown_as_they_are(queue: Mission) -> None:
+    html = player(*queue, "one", "<b>I & U</b>", "1 < 2").data
+    assert "&lt;b&gt;I &amp; U&lt;/b&gt;" in html and "1 &lt; 2" in html
+
+
+def test_a_log_of_another_scenario_is_refused(queue: Mission) -> None:
+    for fields, what in (({"uavs": 2}, "uav"), ({"nodes": ((1, 1),)}, "node")):
+        other = queue.scenario.model_copy(update=fields)
+        with pytest.raises(InputError, match=f"mission_start has .* rows of a {what}; allowed"):
+            player(queue.log, other, "one")
+
+
+def test_a_log_without_an_end_is_refused(queue: Mission) -> None:
+    log = queue.log[queue.log["event"] != "mission_end"]
+    with pytest.raises(InputError, match="events: mission_end has 0 rows of a uav; allowed: one"):
+        player(log, queue.scenario, "one")
+
+
+# In a browser
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[browser.Page]:
+    if browser.CHROMIUM is None:
+        pytest.skip("there is no chromium on this machine to open a page in")
+    with browser.page() as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def document(queue: Mission, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page with two players."""
+    alone = flown(**CASES["alone"])
+    parts = [library(), player(*queue, "first", "I = 3"), player(*alone, "second", "I = 1")]
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    head = (
+        '<!DOCTYPE html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    )
+    path.write_text(head + "".join(part.data for part in parts), "utf-8")
+    return path
+
+
+def button(name: str, label: str) -> str:
+    """The JavaScript that finds a button of a player."""
+    buttons = f"[...document.querySelectorAll('#{name} .updatemenu-button')]"
+    return f"{buttons}.find((button) => button.textContent === '{label}')"
+
+
+def slot(name: str) -> str:
+    """The JavaScript that reads which slot a player says it shows."""
+    return f"Number(document.querySelector('#{name} .slider-label').textContent.split(' ')[1])"
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+def test_a_mission_is_played_and_paused(
+    chromium: browser.Page, document: Path, queue: Mission, width: int
+) -> None:
+    page, end = chromium, duration(queue.log)
+    page.requests.clear()
+    page.complaints.clear()
+    page.open(document, width)
+    page.wait(button("second", "Play"))
+    page.wait("document.getElementById('second').style.height.endsWith('px')")
+    assert page.evaluate(slot("first")) == 0
+
+    page.press(button("first", "Play"))
+    page.wait(f"{slot('first')} >= 3")
+    page.press(button("first", "Pause"))
+    paused = page.evaluate(slot("first"))
+    page.evaluate("new Promise((done) => setTimeout(done, 1000))")  # three slots, were it playing
+    assert 3 <= page.evaluate(slot("first")) == paused < end
+    status = "document.querySelector('#first .x5y5 .textpoint').textContent"
+    assert page.evaluate(status) == Replay(queue)[paused]["status"]["text"][0]
+    assert page.evaluate(slot("second")) == 0
+
+    page.press(button("first", "Play"))
+    page.wait(f"{slot('first')} > {paused}")
+    page.press("document.querySelector('#first .slider-rail-touch-rect')", across=0.999)
+    page.wait(f"{slot('first')} === {end}")
+    page.wait(f"{status} === {json.dumps(Replay(queue)[end]['status']['text'][0])}")
+    page.press(button("first", "Fast"))
+    page.wait(f"0 < {slot('first')} && {slot('first')} < {end}")
+
+    assert page.complaints == []
+    assert set(page.requests) == {document.as_uri()}
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_curves_stand_beside_the_map_where_there_is_room(
+    chromium: browser.Page, document: Path
+) -> None:
+    def left(axes: str) -> str:
+        plot = f"document.querySelector('#first .subplot.{axes} .gridlayer, #first .{axes}')"
+        return f"{plot}.getBoundingClientRect().left"
+
+    beside = f"{left('x2y2')} > 400"
+    chromium.open(document, 390)
+    chromium.wait(button("second", "Play"))
+    assert not chromium.evaluate(beside)
+    chromium.resize(1200)
+    chromium.wait(beside)
+    chromium.resize(390)
+    chromium.wait(f"!({beside})")
