@@ -111,9 +111,9 @@ def _means(
 def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
     """Differences to the first value, which is where they begin: at 0."""
     own = pairs[pairs["first"] == 0].rename(columns={"difference": "mean"}).sort_values("second")
-    arms = np.concatenate([np.zeros((2, 1)), arms(own)], axis=1)
+    bars = np.concatenate([np.zeros((2, 1)), arms(own)], axis=1)
     spots = np.array([0, *own["second"]]) + shift
-    ax.errorbar(spots, [0, *own["mean"]], yerr=arms, **look, linewidth=1)
+    ax.errorbar(spots, [0, *own["mean"]], yerr=bars, **look, linewidth=1)
     ax.axhline(0, color=MUTED, linewidth=0.9, zorder=1)
 
 
