@@ -210,25 +210,18 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     """
     rows = summary[summary["metric"] == metric].reset_index(drop=True)
     with style():
-        figure = Figure(figsize=(5.2, 1.15 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
+        figure = Figure(figsize=(5.2, 1.3 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
         ax = figure.subplots()
         colours = policy_colours(rows["policy"])
         for y, row in rows.iterrows():
             ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
-            ax.annotate(
-                f"{row['mean']:.1%}",
-                (row["high"], y),
-                xytext=(5, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=9,
-                path_effects=[withStroke(linewidth=3, foreground="white")],
-            )
+            ax.annotate(f"{row['mean']:.1%}", (1, y), xycoords=("axes fraction", "data"),
+                        xytext=(4, 0), textcoords="offset points", va="center", fontsize=9)  # fmt: skip
         if printed is not None:
             ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
-            ax.legend(loc="lower right", bbox_to_anchor=(1.02, 0.98))
+            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center")
         ax.set_yticks(range(len(rows)), rows["policy"])
-        ax.set(title=METRICS[metric], xlim=(-0.02, 1.16), ylim=(len(rows) - 0.4, -0.6))
+        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
         ax.set_xticks(np.linspace(0, 1, 6))
         ax.xaxis.set_major_formatter(PercentFormatter(1))
         ax.grid(axis="y", visible=False)

@@ -222,17 +222,20 @@ class Manifest(_Part):
 
     def replay(self, cell: Cell, replication: int) -> str:
         """The command that simulates a mission of a cell again."""
-        name = self.study["scenario"]
-        values = self.study["set"] | self.points[cell.point].values
-        if name not in scenario_names():  # its file may be anywhere: say what it changes
-            name, usual = "paper", load_scenario("paper").model_dump(mode="json")
-            ours = self.scenarios[cell.point].model_dump(mode="json")
-            values = {key: value for key, value in ours.items() if value != usual[key]}
-        settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
-        who = ["--policy", self.policies[cell.team].policy]
-        which = ["--seed", str(self.seed), "--replication", str(replication)]
-        scenario = ["--scenario", name]
-        return shlex.join(["dess", "simulate", *scenario, *settings, *who, *which])
+        return replay_command(
+            self.study["scenario"],
+            self.study["set"] | self.points[cell.point].values,
+            self.scenarios[cell.point],
+            self.policies[cell.team].policy,
+            self.seed,
+            replication,
+        )
+
+    @property
+    def key(self) -> str:
+        """A hash of what all records depend on, and of how many there are."""
+        keys = [cell.key for cells in self.cells for cell in cells]
+        return sha256(_canonical([keys, self.missions, self.selected]).encode()).hexdigest()[:16]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:
@@ -277,6 +280,33 @@ _ALLOWED = "allowed: another --out, or remove the folder"
 
 def _canonical(data: Any) -> str:
     return json.dumps(data, sort_keys=True)
+
+
+def replay_command(
+    name: str,
+    values: dict[str, Any],
+    scenario: ScenarioSpace,
+    policy: str,
+    seed: int,
+    replication: int,
+) -> str:
+    """The command that simulates a mission again.
+
+    Args:
+        name: Of the scenario.
+        values: What is set of it.
+        scenario: What it is with these, told where the name is not that of a shipped one.
+        policy: The team.
+        seed: Of the mission.
+        replication: Its number.
+    """
+    if name not in scenario_names():  # its file may be anywhere: say what it changes
+        name, usual = "paper", load_scenario("paper").model_dump(mode="json")
+        ours = scenario.model_dump(mode="json")
+        values = {key: value for key, value in ours.items() if value != usual[key]}
+    settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
+    which = ["--policy", policy, "--seed", str(seed), "--replication", str(replication)]
+    return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
 
 
 @lru_cache

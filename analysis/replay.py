@@ -1,5 +1,6 @@
 """Missions of a study flown again, to look at them and to check what is kept of them."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import pandas as pd
@@ -11,8 +12,6 @@ from dess.record import MISSION_RECORD, MissionRecord
 from dess.scenario import Scenario
 from dess.state import sample_scenario
 from policies import load_team
-
-FIELDS = MISSION_RECORD.names or ()
 
 
 class Flight(NamedTuple):
@@ -39,23 +38,33 @@ def fly(results: Results, policy: str, point: int, replication: int) -> Flight:
     kept = _kept(results, policy, point, replication)
     space = results.scenario(point)
     record = simulate(space, load_team(policy), manifest.seed, replication, events=True)
-    if changed := [name for name in FIELDS if record.metrics[name] != kept[name]]:
+    if changed := difference(record, kept):
         raise InputError(
-            f"{results.store.folder}: {policy}, point {point}, replication {replication} has "
-            f"another {changed[0]} when flown again; allowed: results of this very code"
+            f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
+            f"{changed}; allowed: results of this very code"
         )
     assert record.events is not None
     scenario = sample_scenario(space, manifest.seed, replication)
     return Flight(scenario, record, pd.DataFrame(record.events.columns()))
 
 
-def _kept(results: Results, policy: str, point: int, replication: int) -> pd.Series:
+def difference(record: MissionRecord, kept: Mapping[str, float]) -> str:
+    """What is not, bit for bit, as it is kept; nothing if all is."""
+    changed = [name for name in MISSION_RECORD.names or () if record.metrics[name] != kept[name]]
+    if not changed:
+        return ""
+    first = changed[0]
+    more = f", and {len(changed) - 1} more" if changed[1:] else ""
+    return f"{first} is {kept[first]} and {record.metrics[first]} when flown again{more}"
+
+
+def _kept(results: Results, policy: str, point: int, replication: int) -> Mapping[str, float]:
     """The record of a mission, or of one that checks a selection."""
     for missions in (results.missions, results.checks):
         of_mission = missions["replication"] == replication
         of_cell = (missions["policy"] == policy) & (missions["point"] == point)
         if (found := missions[of_cell & of_mission]).size:
-            return found.iloc[0]
+            return found.iloc[0].to_dict()
     raise InputError(
         f"{results.store.folder}: no mission of {policy}, point {point}, replication "
         f"{replication}; allowed: a mission of the study"

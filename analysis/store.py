@@ -202,6 +202,11 @@ class Store:
             policy = f"{policy[:LONG]}~{short_hash(policy.encode())}"
         return self.folder / kind / f"policy={policy}"
 
+    @property
+    def damaged(self) -> list[Path]:
+        """The files that are not what their names say."""
+        return [*self._damaged]
+
     def missing(self, chunk: Chunk) -> Chunk | None:
         """What is not there of a chunk, if anything."""
         parts = tuple(

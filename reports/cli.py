@@ -9,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -216,15 +217,77 @@ def report(
         Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
     ] = study.RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = REPORTS,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="What the report what-if changes: a field of the scenario, the value in TOML "
+            "syntax; repeatable.",
+        ),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--parameter",
+            metavar="NAME=VALUE",
+            help="A parameter of the notebooks, such as missions or policies of what-if, the "
+            "value in TOML syntax; repeatable.",
+        ),
+    ] = None,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
+    values = dict(_setting(text, "--parameter", _EXAMPLE) for text in parameters or [])
+    if settings:
+        values["settings"] = dict(_setting(text) for text in settings)
     from reports.render import ReportError, render
 
     try:
         with console.cells_bar() as progress:
-            print(render(names or [], results, out, progress=progress))
+            print(render(names or [], results, out, progress=progress, parameters=values))
     except ReportError as error:
         raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
+
+
+@app.command()
+def verify(
+    path: Annotated[
+        Path, typer.Argument(metavar="PAGE|DIR", help="A page of dess report, or results.")
+    ],
+    missions: Annotated[
+        int, typer.Option(min=1, help="Missions to fly again, at most, of every study.")
+    ] = 20,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of their choice.  [default: another every time]")
+    ] = None,
+    as_json: study.JsonOption = False,
+) -> None:
+    """Check a page or results: fly a random sample of the missions again, and compare."""
+    import secrets
+
+    from reports.verify import verify_page, verify_results
+
+    seed = secrets.randbelow(2**32) if seed is None else seed
+    check = verify_results if path.is_dir() else verify_page
+    with console.compile_notice():
+        verdicts = check(path, missions, seed)
+    differing = [line for verdict in verdicts for line in verdict.differing]
+    if as_json:
+        print(
+            json.dumps(
+                {"seed": seed, "checks": [asdict(verdict) for verdict in verdicts]}, indent=2
+            )
+        )
+    else:
+        rows = [[v.what, str(v.compared), str(len(v.differing))] for v in verdicts]
+        console.print_table([str(path), "compared", "differing"], rows)
+        for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):
+            print(f"note: {note}")
+    if differing:
+        for line in differing:
+            console.fail(f"differs: {line}", 1)
+        found = f"{len(differing)} of {sum(v.compared for v in verdicts)} differ"
+        raise typer.Exit(console.fail(f"dess: error: {path}: {found} (--seed {seed})", 1))
 
 
 @app.command()
@@ -258,7 +321,15 @@ def _scenario(name: str, settings: list[str] | None) -> "ScenarioSpace":
     return load_scenario(name, **dict(_setting(text) for text in settings or []))
 
 
-def _setting(text: str) -> tuple[str, Any]:
+_EXAMPLE = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
+
+
+def _setting(
+    text: str,
+    option: str = "--set",
+    allowed: str = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or "
+    "initial_data=[5, 20]",
+) -> tuple[str, Any]:
     """``KEY=VALUE`` as key and value."""
     key, equals, value = text.partition("=")
     try:
@@ -266,10 +337,7 @@ def _setting(text: str) -> tuple[str, Any]:
     except tomllib.TOMLDecodeError as error:
         parsed = {"error": error}
     if not equals or parsed.keys() != {"value"}:
-        raise InputError(
-            f"--set: {text!r} is not KEY=VALUE; allowed: a field of the scenario and a value in "
-            "TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
-        )
+        raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
 
 

@@ -1,85 +1,51 @@
 """Reports: notebooks run on results, each rendered to one self-contained page, and an index."""
 
-import ast
-import atexit
 import logging
 import os
 import re
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor, wait
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import jupytext
-import matplotlib as mpl
-import nbformat
 from jinja2 import Environment, PackageLoader
-from jupyter_client.kernelspec import NATIVE_KERNEL_NAME, KernelSpecManager
-from jupyter_client.manager import AsyncKernelManager
 from markupsafe import Markup
-from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
+import dess
 from analysis import load_results
+from analysis.evidence import Evidence
 from analysis.store import MANIFEST
 from dess.errors import InputError
-from reports.page import provenance
+from reports import page
+from reports.kernels import Kernels, Progress
+from reports.notebook import NAMES, Report, check_parameters, read
+from reports.verify import sealed
 
 log = logging.getLogger(__name__)
-
-# Called with the report's name, the cells done and the cells in all.
-Progress = Callable[[str, int, int], None]
 
 INDEX = "index.html"
 _IMAGE = re.compile(r"<img [^>]+>")
 
 
 class ReportError(RuntimeError):
-    """A notebook failed; one line that names the report and what its cell raised."""
+    """Notebooks failed: for each its cell, what that raised, and where the partial page is."""
 
 
-@dataclass
-class Report:
-    """A notebook: what the index says of it, and the studies whose results it reads."""
+@dataclass(frozen=True)
+class Card:
+    """What the index shows of a page."""
 
-    name: str
+    page: str
     title: str
     description: str
-    studies: list[str]
-    notebook: NotebookNode
-    body: str = ""
-
-    @property
-    def page(self) -> str:
-        """File name of the page."""
-        return f"{self.name}.html"
-
-    @property
-    def code(self) -> Markup:
-        """The code of all cells, in colour."""
-        cells = (cell.source for cell in self.notebook.cells if cell.cell_type == "code")
-        return Markup(highlight("\n\n\n".join(cells), PythonLexer(), HtmlFormatter()))
-
-    @property
-    def thumbnail(self) -> Markup:
-        """The last image of the page, the fullest one."""
-        images = _IMAGE.findall(self.body)
-        return Markup(images[-1] if images else "")
-
-
-def report_names() -> list[str]:
-    """The names of the shipped reports, in the order of the index."""
-    return ["mission", "performance"]
+    thumbnail: Markup
 
 
 def render(
@@ -89,9 +55,10 @@ def render(
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Run reports on the results of studies and write their pages and an index.
+    """Run reports on the results of studies and write their pages, their notebooks and an index.
 
-    Nothing is written unless every report has run to its end. The same results give the same bytes.
+    The index shows all pages that are there then, those of earlier calls as well. The same results
+    give the same bytes.
 
     Args:
         names: The reports; all shipped ones if empty.
@@ -104,31 +71,40 @@ def render(
         The path of ``index.html``.
 
     Raises:
-        InputError: If a report or a parameter is unknown, results are missing or ``out`` cannot be
-            written.
-        ReportError: If a notebook fails.
+        InputError: If a report or a parameter is unknown, results are missing, a notebook refuses
+            what it was given or ``out`` cannot be written. Nothing is written then.
+        ReportError: If a notebook fails; after all others. Its page is left under a name of its
+            own, as far as it went.
     """
-    results, out = Path(results), Path(out)
-    reports = [_read(name) for name in dict.fromkeys(names) or report_names()]
-    manifests = {s: _manifest(results / s) for r in reports for s in r.studies}
-    _check_parameters(reports, parameters or {})
+    results, out, values = Path(results), Path(out), parameters or {}
+    reports = [read(name) for name in dict.fromkeys(names) or NAMES]
+    for study in dict.fromkeys(study for report in reports for study in report.studies):
+        _check_results(results / study)
+    check_parameters(reports, values)
+    for report in reports:
+        report.set({"results": ".", **values})
     with _writing(out):
         out.mkdir(parents=True, exist_ok=True)
+        if any("results" in report.parameters for report in reports):
+            results.mkdir(parents=True, exist_ok=True)
         staging = TemporaryDirectory(dir=out, prefix=".rendering-")
     with staging as folder:
-        for report in reports:
-            _set_parameters(report, {"results": ".", **(parameters or {})})
-            _execute(report, results, progress)
-            report.body = _body(report.notebook)
-        pages = {report.page: _page("report.html", report=report) for report in reports}
-        pages[INDEX] = _page(
-            INDEX, reports=reports, provenance=Markup(provenance(manifests.values()).data)
-        )
+        Kernels(results, progress).run(reports)
+        files = {report.page: sealed(_page("report.html", **_parts(report))) for report in reports}
+        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in reports}
+        files[INDEX] = _index(_pages(out) | files)
         with _writing(out):
-            for name, html in pages.items():
-                Path(folder, name).write_text(html, "utf-8")
-            for name in pages:
+            for name, text in files.items():
+                Path(folder, name).write_text(text, "utf-8")
+            for name in files:
                 os.replace(Path(folder, name), out / name)
+            for report in reports:
+                if not report.failure:
+                    (out / f"{report.name}.partial.html").unlink(missing_ok=True)
+    if failed := [report for report in reports if report.failure]:
+        raise ReportError(
+            "; ".join(f"{r.failure}; as far as it went: {out / r.page}" for r in failed)
+        )
     return out / INDEX
 
 
@@ -140,148 +116,31 @@ def _writing(out: Path) -> Iterator[None]:
         raise InputError(f"out: {out} cannot be written: {error.strerror}") from error
 
 
-def _read(name: str) -> Report:
-    """A report from its notebook: the heading is its title, the paragraph below describes it."""
-    if name not in report_names():
-        raise InputError(f"report: {name!r} is unknown; allowed: {', '.join(report_names())}")
-    source = resources.files("reports").joinpath(f"notebooks/{name}.py").read_text("utf-8")
-    notebook = jupytext.reads(source, fmt="py:percent")
-    for number, cell in enumerate(notebook.cells):
-        cell.id = f"cell-{number}"
-    title, description = notebook.cells[0].source.removeprefix("# ").split("\n\n", 1)
-    del notebook.cells[0]  # the page has them in its header
-    studies = notebook.metadata["dess"]["studies"]
-    return Report(name, title, " ".join(description.split()), studies, notebook)
-
-
-def _manifest(folder: Path) -> dict[str, Any]:
+def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
         raise InputError(
             f"results: {folder} holds no results of study {folder.name}; "
             f"they are made by: dess study run {folder.name} --out {folder}"
         )
-    manifest = load_results(folder).manifest
-    if manifest["study"]["name"] != folder.name:
-        raise InputError(
-            f"results: {folder} holds study {manifest['study']['name']}; allowed: {folder.name}"
-        )
-    return manifest
+    held = load_results(folder).manifest["study"]["name"]
+    if held != folder.name:
+        raise InputError(f"results: {folder} holds study {held}; allowed: {folder.name}")
 
 
-def _parameter_cell(report: Report) -> int:
-    tagged = ("parameters" in cell.metadata.get("tags", []) for cell in report.notebook.cells)
-    return list(tagged).index(True)
-
-
-def _parameters(report: Report) -> set[str]:
-    """The names that the notebook's tagged cell assigns."""
-    source = report.notebook.cells[_parameter_cell(report)].source
-    targets = (node.targets[0] for node in ast.parse(source).body if isinstance(node, ast.Assign))
-    return {target.id for target in targets if isinstance(target, ast.Name)}
-
-
-def _check_parameters(reports: list[Report], parameters: Mapping[str, Any]) -> None:
-    known = set().union(*map(_parameters, reports)) - {"results"}
-    for name in parameters:
-        if name not in known:
-            raise InputError(
-                f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}; "
-                f"allowed: {', '.join(sorted(known)) or 'none'}"
-            )
-
-
-def _set_parameters(report: Report, parameters: Mapping[str, Any]) -> None:
-    """Insert a cell with the values after the tagged one."""
-    known = _parameters(report)
-    lines = [f"{name} = {value!r}" for name, value in parameters.items() if name in known]
-    cell = nbformat.v4.new_code_cell("\n".join(lines), id="cell-parameters")
-    report.notebook.cells.insert(_parameter_cell(report) + 1, cell)
-
-
-def _execute(report: Report, folder: Path, progress: Progress | None) -> None:
-    """Run a report's notebook in ``folder``; once more if its kernel dies before the first cell."""
-    done = 0
-    total = sum(cell.cell_type == "code" for cell in report.notebook.cells)
-
-    def count(**_: Any) -> None:
-        nonlocal done
-        done += 1
-        if progress:
-            progress(report.name, done, total)
-
-    for attempt in (1, 2):
-        try:
-            with TemporaryDirectory() as home:
-                client = _client(report.notebook, folder, Path(home), count)
-                _run(client, _environment(Path(home)))
-            return
-        except CellExecutionError as error:
-            if error.ename == InputError.__name__:
-                raise InputError(f"report {report.name}: {error.evalue}") from error
-            raise ReportError(f"report {report.name}: {error.ename}: {error.evalue}") from error
-        except RuntimeError as error:  # the kernel did not start, or died
-            if done or attempt == 2:
-                raise ReportError(f"report {report.name}: {error}") from error
-
-
-def _run(client: NotebookClient, environment: dict[str, str]) -> None:
-    """Run a notebook in a thread: in this one, nbclient would take Ctrl-C for itself."""
-    kernel: Any = client.km
-    with ThreadPoolExecutor(1) as pool:
-        running = pool.submit(client.execute, env=environment, cleanup_kc=True)
-        try:
-            running.result()
-        except KeyboardInterrupt:
-            while not running.done():
-                if kernel.has_kernel:
-                    kernel.provisioner.process.kill()
-                wait([running], timeout=0.2)
-            raise
-        finally:  # nbclient leaves its exit handler behind when a kernel dies at its start
-            atexit.unregister(client._cleanup_kernel)
-
-
-def _client(notebook: NotebookNode, folder: Path, home: Path, count: Any) -> NotebookClient:
-    # No kernel specs but the built-in one: an installed "python3" may be another interpreter's.
-    kernel = AsyncKernelManager(
-        kernel_name=NATIVE_KERNEL_NAME,
-        kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),
-        connection_file=str(home / "kernel.json"),
-    )
-    sockets = home / "kernel"
-    if os.name == "posix" and len(str(sockets)) < 90:  # no ports to clash on; paths must be short
-        kernel.transport, kernel.ip = "ipc", str(sockets)
-    return NotebookClient(
-        notebook,
-        km=kernel,
-        resources={"metadata": {"path": str(folder)}},
-        on_cell_complete=count,
-        timeout=None,
-        record_timing=False,
-        coalesce_streams=True,
-    )
-
-
-def _environment(home: Path) -> dict[str, str]:
-    """The kernel imports what this process imports and leaves nothing in the user's home."""
-    own = {name: str(home) for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR")}
-    path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
-    return {
-        **os.environ,
-        **own,
-        "PYTHONPATH": path,
-        "MPLBACKEND": "agg",
-        "MPLCONFIGDIR": mpl.get_cachedir(),
-    }
+def _parts(report: Report) -> dict[str, Any]:
+    """What the template of a page shows."""
+    code = highlight("\n\n\n".join(c.source for c in report.cells), PythonLexer(), HtmlFormatter())
+    return {"report": report, "body": _body(report.notebook), "code": Markup(code)}
 
 
 def _body(notebook: NotebookNode) -> str:
     """The cells as HTML; what they wrote to stderr goes to the log instead."""
     for cell in notebook.cells:
-        streams = [o for o in cell.get("outputs", []) if o.get("name") == "stderr"]
-        for stream in streams:
-            log.warning(stream.text.rstrip())
-            cell.outputs.remove(stream)
+        for output in [*cell.get("outputs", [])]:
+            if output.get("name") == "stderr":
+                log.warning(output.text.rstrip())
+            if output.get("name") == "stderr" or output.output_type == "error":
+                cell.outputs.remove(output)
     exporter = HTMLExporter(
         template_name="basic",
         exclude_input=True,
@@ -291,9 +150,32 @@ def _body(notebook: NotebookNode) -> str:
     return exporter.from_notebook_node(notebook)[0]
 
 
+def _pages(out: Path) -> dict[str, str]:
+    """The pages of earlier calls."""
+    paths = (out / f"{name}.html" for name in NAMES)
+    return {path.name: path.read_text("utf-8") for path in paths if path.exists()}
+
+
+def _index(pages: Mapping[str, str]) -> str:
+    """The page that shows all others, and what their results were made with."""
+    there = [report for report in map(read, NAMES) if report.page in pages]
+    cards = [Card(r.page, r.title, r.description, _thumbnail(pages[r.page])) for r in there]
+    found = [text for r in there for text in page.embedded(page.STUDY, pages[r.page])]
+    evidence = [Evidence.parse(text, INDEX) for text in dict.fromkeys(found)]
+    return sealed(_page(INDEX, cards=cards, origins=Markup(page.carrying(evidence).data)))
+
+
+def _thumbnail(html: str) -> Markup:
+    """The last image of a page, the fullest one."""
+    images = _IMAGE.findall(html)
+    return Markup(images[-1] if images else "")
+
+
 def _page(template: str, **values: Any) -> str:
     environment = Environment(
         loader=PackageLoader("reports", "templates"), autoescape=True, trim_blocks=True
     )
     style = HtmlFormatter().get_style_defs(".highlight")
-    return environment.get_template(template).render(code_style=Markup(style), **values)
+    return environment.get_template(template).render(
+        code_style=Markup(style), version=dess.__version__, **values
+    )

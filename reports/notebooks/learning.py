@@ -54,12 +54,6 @@ def spread(numbers, form):
     return " to ".join(dict.fromkeys(form.format(n) for n in (numbers.min(), numbers.max())))
 
 
-def points(interval):
-    """A difference with its interval, in percentage points."""
-    ends = [page.difference(end, 0) for end in interval]
-    return f"{ends[0]} [{ends[1]}, {ends[2]}]"
-
-
 # %% [markdown]
 # ## With and without transfer learning: the paper's Fig. 3
 
@@ -115,8 +109,8 @@ agreed = len(verdicts) == 1
 
 def told(metric, transfer):
     """Where the curve with transfer learning lies, in words."""
-    scale = points if metric != fig3[0] else lambda ends: "{:+.0f} [{:+.0f}, {:+.0f}]".format(*ends)
-    gap = scale(transfer.last).replace("-", "−")
+    scale = page.points if metric != fig3[0] else "{:+.0f} [{:+.0f}, {:+.0f}]".format
+    gap = scale(*transfer.last).replace("-", "−")
     if transfer.last.low == transfer.last.high:
         gap = f"{gap.split()[0]}, the same in all trainings"
     if transfer.since is None:
@@ -214,7 +208,7 @@ def line(row):
         page.interval(row["mean"], row["low"], row["high"])
         if row["low"] < row["high"]
         else page.percent(row["mean"]),
-        "" if same else points((row["difference"], *ends)),
+        "" if same else page.points(row["difference"], *ends),
         "" if same else f"{row['p_adjusted']:.2g}",
         *map(page.percent, others.mean()),
     ]
@@ -329,3 +323,6 @@ page.table(
         columns=["Policy", "Observation", "Phases", "Seed", "Discount", "Steps of return"],
     ),
 )
+
+# %%
+page.weights(folder)

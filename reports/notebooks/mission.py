@@ -1,7 +1,7 @@
 # ---
 # jupyter:
 #   dess:
-#     studies: [fig4]
+#     studies: [fig1, fig4]
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -11,11 +11,11 @@
 # %% [markdown]
 # # Missions
 #
-# Where one, two and three UAVs fly, which sensor node they serve on the way, when they charge and
-# what they leave behind: the missions of the paper's Fig. 4, flown by one policy.
+# Where UAVs fly, which sensor node they serve on the way, when they charge and what they leave
+# behind: missions like those of the paper's Fig. 1 and Fig. 4, drawn, and played slot by slot.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folder of the study fig4
+results = "../../results"  # folder that holds the results folders of the studies fig1 and fig4
 policy = None  # the policy to show; None for the best by collection ratio and communication
 replication = 0  # the replication to show, one whose event log is kept
 
@@ -28,8 +28,9 @@ from IPython.display import Markdown, display
 from analysis import figures, load_results, paper, summary
 from dess.scenario import SAMPLED
 from reports import page
+from reports.player import READING, library, player
 
-study = load_results(Path(results) / "fig4")
+example, study = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
 means = summary(study.missions, by=["policy"])
 product = means[means["metric"] == "collection_ratio_and_communication"].set_index("policy")
 policy = policy or product["mean"].idxmax()
@@ -46,6 +47,9 @@ scenarios = [
     study.scenario(point).scenario_at(**{key: int(missions.loc[point, key]) for key in SAMPLED})
     for point in points
 ]
+
+# %% [markdown]
+# ## From one to three UAVs: the paper's Fig. 4
 
 # %%
 best = " the best of the study by" if policy == product["mean"].idxmax() else ""
@@ -67,9 +71,9 @@ printed = [paper.FIG_4[uavs]["collection_ratio"] for uavs in missions["uavs"]]
 def captioned(point):
     mission, ratio = missions.loc[point], ratios.loc[point]
     caption = (
-        f"{mission['slots']} mission slots; {mission['collected']:.0f} of "
-        f"{mission['initial'] + mission['arrived']:.0f} data units collected. Mean of this policy "
-        f"over {ratio['n']:,} missions {page.interval(*ratio[['mean', 'low', 'high']])}, "
+        f"n = 1 mission of {mission['slots']} slots; {mission['collected']:.0f} of "
+        f"{mission['initial'] + mission['arrived']:.0f} data units collected. The mean of this "
+        f"policy, n = {ratio['n']:,}, is {page.interval(*ratio[['mean', 'low', 'high']])}, "
         f"the paper's {page.percent(printed[point])}."
     )
     figure = figures.mission_figure(logs[point], scenarios[point])
@@ -89,6 +93,22 @@ page.gallery([captioned(point) for point in points])
 # **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to
 # charge, C<sub>C</sub> the one at which charging ends. A band of residual data is one node, in its
 # colour; bands that stay are nodes that nobody has emptied.
+
+# %% [markdown]
+# ## Slot by slot
+
+# %%
+display(Markdown(f"The same missions, to play, to pause and to leaf through. {READING}"))
+display(library())
+for point in points:
+    mission = missions.loc[point]
+    caption = (
+        f"n = 1 mission of {policy}, replication {replication} of seed {seed}, "
+        f"{mission['slots']} mission slots, {len(logs[point]):,} events. A single mission has no "
+        "interval."
+    )
+    title = f"I = {mission['uavs']}: {page.percent(mission['collection_ratio'])} collected"
+    display(player(logs[point], scenarios[point], f"player-{mission['uavs']}", title, caption))
 
 # %% [markdown]
 # ## What one sees
@@ -149,6 +169,38 @@ page.table(
 )
 
 # %% [markdown]
+# ## One UAV on a small map: the paper's Fig. 1
+
+# %%
+ranked = summary(example.missions, by=["policy"])
+ranked = ranked[ranked["metric"] == "collection_ratio_and_communication"].set_index("policy")
+pilot = ranked["mean"].idxmax()
+flown = example.missions.query("policy == @pilot and replication == @replication").iloc[0]
+log = example.events(pilot, 0, replication)
+small = example.scenario().scenario_at(**{key: int(flown[key]) for key in SAMPLED})
+display(
+    Markdown(
+        f"A map of {small.grid} x {small.grid} cells with {len(small.nodes)} nodes. The paper "
+        "draws this example without numbers, so there is nothing to compare with; the mission "
+        f"here is flown by **{pilot}**, of {page.words(example.policies)} the best by collection "
+        f"ratio and communication: {page.interval(*ranked.loc[pilot, ['mean', 'low', 'high']])}, "
+        f"n = {ranked.loc[pilot, 'n']:,} missions. What is learned is learned on one map, so no "
+        "learned policy can fly it."
+    )
+)
+page.gallery(
+    [
+        (
+            figures.mission_figure(log, small),
+            "Map of the mission; battery, residual data and charging",
+            f"n = 1 mission, replication {replication} of seed {example.manifest['seed']}: "
+            f"{flown['slots']} mission slots, {flown['collected']:.0f} of "
+            f"{flown['initial'] + flown['arrived']:.0f} data units collected.",
+        )
+    ]
+)
+
+# %% [markdown]
 # ## Where the figures come from
 
 # %%
@@ -162,4 +214,4 @@ display(
         + "".join(f"\n- `{command.format(uavs)}`" for uavs in missions["uavs"])
     )
 )
-page.provenance([study.manifest])
+page.provenance([example, study])

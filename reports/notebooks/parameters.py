@@ -58,11 +58,6 @@ pairs = {
 }
 
 
-def points(mean, low, high):
-    ends = [page.difference(end, 0) for end in (mean, low, high)]
-    return f"{ends[0]} [{ends[1]}, {ends[2]}]"
-
-
 def percent(level):
     return f"{100 * level:g} %"
 
@@ -130,7 +125,7 @@ def seen(policy, field):
     found = effects.shape(pairs[policy, field, product])
     first, last = (at(policy, field, n) for n in (0, len(values[field]) - 1))
     change = pairs[policy, field, product].query("first == 0 and second == @last.position").iloc[0]
-    ends = points(change["difference"], change["low"], change["high"])
+    ends = page.points(change["difference"], change["low"], change["high"])
     text = (
         f"{policy} **{found.words}**: {page.percent(first.mean)} at {first.value}, "
         f"{page.percent(last.mean)} at {last.value}, {ends} points"
@@ -410,4 +405,4 @@ page.table(
 # ## Where the figures come from
 
 # %%
-page.provenance([study.manifest for study in (fig5, sweet, sobol)])
+page.provenance([fig5, sweet, sobol])

@@ -62,7 +62,8 @@ page.gallery(
         (
             figures.performance(overall, metric, paper.TABLE_IV[metric]),
             f"{name} of every policy, beside the paper's figure",
-            "",
+            f"n = {overall['n'].min():,} missions per policy, bars are 95 % intervals. Dashed: the "
+            "paper.",
         )
         for metric, name in paper.METRICS.items()
     ]
@@ -118,7 +119,12 @@ display(
 # %%
 page.gallery(
     [
-        (figures.by_fleet(by_fleet, metric), f"{name} against the number of UAVs", "")
+        (
+            figures.by_fleet(by_fleet, metric),
+            f"{name} against the number of UAVs",
+            f"n = {by_fleet['n'].min():,} to {by_fleet['n'].max():,} missions per policy and size, "
+            "bars are 95 % intervals.",
+        )
         for metric, name in paper.METRICS.items()
     ]
 )
@@ -155,7 +161,8 @@ page.gallery(
         (
             figures.by_fleet(in_fig4, metric, {i: p[metric] for i, p in paper.FIG_4.items()}),
             f"{name} against the number of UAVs, beside the paper's figures",
-            "",
+            f"n = {in_fig4['n'].min():,} missions per policy and size, bars are 95 % intervals. "
+            "Diamonds: the paper.",
         )
         for metric, name in printed_metrics.items()
     ]
@@ -185,4 +192,4 @@ page.table(
 # ## Where the figures come from
 
 # %%
-page.provenance([table4.manifest, fig4.manifest])
+page.provenance([table4, fig4])

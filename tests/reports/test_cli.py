@@ -157,7 +157,7 @@ def test_the_event_log_and_the_figure(dess, tmp_path):
 def test_what_there_is(dess):
     for command, names in {
         "policies": ["random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"],
-        "scenarios": ["fig4", "paper"],
+        "scenarios": ["fig1", "fig4", "paper"],
         "studies": ["comparison", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"],
     }.items():
         code, out, err = dess(command)

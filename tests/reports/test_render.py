@@ -1,33 +1,35 @@
 """Reports are whole pages of their own, the same whenever they are made, or a clear line."""
 
+import json
 import os
 import re
+import shutil
 from base64 import b64decode
-from contextlib import nullcontext
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import jupytext
+import nbformat
 import pytest
+from nbclient import NotebookClient
 
-from analysis import load_study, run_study
 from dess.errors import InputError
+from reports import kernels
 from reports import render as module
-from reports.render import ReportError, render, report_names
+from reports.notebook import NAMES, read
+from reports.page import STUDY, embedded
+from reports.player import library
+from reports.render import ReportError, render
+from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
-NAMES = ["mission", "performance"]
 READS = jupytext.reads
-EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
+FIGURES = {"mission": 4, "performance": 8, "learning": 7, "parameters": 9}
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Small results of the two studies."""
-    folder = tmp_path_factory.mktemp("results")
-    run_study(load_study("table4", missions=40, policies=["random", "greedy"]), folder / "table4")
-    run_study(load_study("fig4", missions=8, policies=["random", "greedy"]), folder / "fig4")
-    return folder
+    """Small results of all studies that the reports read."""
+    return run_small_studies(tmp_path_factory.mktemp("results"))
 
 
 @pytest.fixture(scope="module")
@@ -36,11 +38,15 @@ def progress() -> list[tuple[str, int, int]]:
 
 
 @pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("out") / "deep" / "reports"
+
+
+@pytest.fixture(scope="module")
 def pages(
-    results: Path, progress: list[Any], tmp_path_factory: pytest.TempPathFactory
+    results: Path, out: Path, progress: list[Any], tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, str]:
-    """All reports, rendered once, by file name."""
-    out = tmp_path_factory.mktemp("out") / "deep" / "reports"
+    """All files of the reports, rendered once, by name."""
     home = tmp_path_factory.mktemp("home")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(home))
@@ -50,58 +56,52 @@ def pages(
     return {path.name: path.read_text("utf-8") for path in out.iterdir()}
 
 
-class Links(HTMLParser):
-    """Everything that a page refers to or loads."""
-
-    def __init__(self, html: str):
-        super().__init__()
-        self.found: list[str] = []
-        self.tags: set[str] = set()
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.add(tag)
-        self.found += [
-            v or "" for k, v in attrs if k in {"src", "href", "srcset", "data", "action"}
-        ]
-
-
-def test_the_shipped_reports() -> None:
-    assert report_names() == NAMES
-
-
 def test_all_pages_are_there_and_nothing_else(pages: dict[str, str]) -> None:
-    assert sorted(pages) == ["index.html", "mission.html", "performance.html"]
+    files = {f"{name}.{kind}" for name in NAMES for kind in ("html", "ipynb")}
+    assert {*pages} == files | {"index.html"}
+
+
+def html_of(pages: dict[str, str]) -> dict[str, str]:
+    return {name: text for name, text in pages.items() if name.endswith(".html")}
 
 
 def test_pages_load_nothing(pages: dict[str, str]) -> None:
-    for html in pages.values():
+    for html in html_of(pages).values():
         links = Links(html)
-        assert not {"script", "link", "iframe", "object"} & links.tags
+        assert not {"link", "iframe", "object"} & links.tags
         for target in links.found:
             assert target.startswith("data:image/svg+xml;base64,") or target in pages
         drawings = [b64decode(data) for data in EMBEDDED.findall(html)]
         assert drawings
         for drawing in drawings:
             assert set(re.findall(rb'href="(.)', drawing)) == {b"#"}
-        assert not re.search(r"//[a-z]|url\(|@import", EMBEDDED.sub("", html))
+        assert not re.search(r"//[a-z]|url\(|@import", links.outside_scripts)
 
 
 def test_pages_tell_no_places_and_no_times(pages: dict[str, str], results: Path) -> None:
     for html in pages.values():
+        html = html.replace(library().data, "")
         assert str(results) not in html
         assert str(Path(module.__file__).parents[1]) not in html
         assert not re.search(r"\b\d\d:\d\d:\d\d\b|\b20\d\d-\d\d-\d\d\b", html)
 
 
 def test_pages_show_results_and_no_mishaps(pages: dict[str, str]) -> None:
-    assert pages["mission.html"].count("<img ") == 3
-    assert pages["performance.html"].count("<img ") == 8
-    assert pages["index.html"].count("<img ") == len(NAMES)
+    assert pages["index.html"].count('<a class="card"') == len(NAMES)
     for name in NAMES:
-        main = EMBEDDED.sub("", pages[f"{name}.html"].split("<main")[1])
-        assert not re.search(r"Traceback|Warning|stderr|&lt;Figure|NaN|\bnan\b", main)
+        html = pages[f"{name}.html"]
+        assert html.count("<img ") == FIGURES[name]
+        words = words_of(html)
+        assert not re.search(r"Traceback|Warning|stderr|<Figure|Figure\(|NaN|\bnan\b|None", words)
         assert f'href="{name}.html"' in pages["index.html"]
+
+
+def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> None:
+    for name in NAMES:
+        html = pages[f"{name}.html"]
+        captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
+        assert len(captions) == len(re.findall("<figure", html)) > 0
+        assert all(re.search(r"\bn\b", caption) for caption in captions), name
 
 
 def test_the_performance_page_tells_the_means(pages: dict[str, str], results: Path) -> None:
@@ -115,9 +115,10 @@ def test_the_performance_page_tells_the_means(pages: dict[str, str], results: Pa
 
 
 def test_progress_counts_the_cells(pages: dict[str, str], progress: list[Any]) -> None:
-    for name in NAMES:
-        steps = [(done, total) for report, done, total in progress if report == name]
-        assert [done for done, _ in steps] == list(range(1, steps[-1][1] + 1))
+    total = sum(len(read(name).cells) for name in NAMES)  # and those with parameters
+    assert [done for _, done, _ in progress] == list(range(1, len(progress) + 1))
+    assert total < len(progress) == progress[0][2] <= total + len(NAMES)
+    assert {name for name, _, _ in progress} == {*NAMES}
 
 
 def test_the_same_results_give_the_same_bytes(
@@ -125,10 +126,50 @@ def test_the_same_results_give_the_same_bytes(
 ) -> None:
     monkeypatch.setenv("TZ", "Pacific/Auckland")
     monkeypatch.setenv("PYTHONHASHSEED", "7")
-    copy = tmp_path / "elsewhere"
-    copy.symlink_to(results)
-    render(["mission"], copy, tmp_path / "again")
-    assert (tmp_path / "again" / "mission.html").read_text("utf-8") == pages["mission.html"]
+    monkeypatch.setenv("LC_ALL", "C")
+    copy = tmp_path / "elsewhere" / "deep"
+    shutil.copytree(results, copy)
+    monkeypatch.chdir(tmp_path)
+    render([], copy, tmp_path / "again")
+    for name, html in html_of(pages).items():
+        assert (tmp_path / "again" / name).read_text("utf-8") == html
+
+
+def test_the_index_keeps_the_pages_of_earlier_calls(
+    pages: dict[str, str], results: Path, tmp_path: Path
+) -> None:
+    for name, text in pages.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    render(["performance"], results, tmp_path)
+    assert (tmp_path / "index.html").read_text("utf-8") == pages["index.html"]
+
+
+def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results: Path) -> None:
+    from analysis import load_results
+
+    for name in NAMES:
+        carried = [json.loads(text) for text in embedded(STUDY, pages[f"{name}.html"])]
+        studies = read(name).studies
+        assert [e["study"] for e in carried][: len(studies)] == studies
+        for evidence in carried[: len(studies)]:
+            manifest = load_results(results / evidence["study"]).store.manifest
+            assert evidence["key"] == manifest.key
+            for field in ("commit", "version", "libraries", "seed", "scenario"):
+                assert evidence[field] == manifest.data[field]
+            assert evidence["policies"] == manifest.data["policies"]
+            assert manifest.key in words_of(pages[f"{name}.html"])
+
+
+def test_notebooks_open_in_jupyter_and_run_from_a_results_folder(
+    pages: dict[str, str], out: Path
+) -> None:
+    """What is written beside a page runs top to bottom, where it lies."""
+    for name in NAMES:
+        notebook = nbformat.read(out / f"{name}.ipynb", as_version=4)
+        nbformat.validate(notebook)
+        assert notebook.cells[0].source.startswith("# ")
+        NotebookClient(notebook, resources={"metadata": {"path": str(out)}}).execute()
+        assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 
 
 def test_an_unknown_report_is_refused(results: Path, tmp_path: Path) -> None:
@@ -146,9 +187,9 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path: Pa
 
 
 def test_results_of_another_study_are_refused(results: Path, tmp_path: Path) -> None:
-    (tmp_path / "fig4").symlink_to(results / "table4")
-    with pytest.raises(InputError, match="fig4 holds study table4"):
-        render(["mission"], tmp_path, tmp_path / "out")
+    (tmp_path / "table4").symlink_to(results / "fig4")
+    with pytest.raises(InputError, match="table4 holds study fig4; allowed: table4"):
+        render(["performance"], tmp_path, tmp_path / "out")
 
 
 def test_a_folder_that_cannot_be_written_is_refused(results: Path, tmp_path: Path) -> None:
@@ -164,18 +205,17 @@ def test_an_unknown_parameter_is_refused(results: Path, tmp_path: Path, name: st
 
 
 def test_parameters_follow_the_cell_that_they_override() -> None:
-    report = module._read("mission")
-    module._set_parameters(report, {"results": "here", "policy": "tour", "other": 1})
-    tagged = module._parameter_cell(report)
-    assert report.notebook.cells[tagged + 1].source == "results = 'here'\npolicy = 'tour'"
+    report = read("mission")
+    (before,) = [n for n, cell in enumerate(report.notebook.cells) if cell.metadata.get("tags")]
+    report.set({"results": "here", "policy": "tour", "other": 1})
+    assert report.notebook.cells[before + 1].source == "results = 'here'\npolicy = 'tour'"
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_notebooks_have_a_heading_a_description_and_studies(name: str) -> None:
-    report = module._read(name)
+def test_notebooks_have_a_heading_and_a_description(name: str) -> None:
+    report = read(name)
     assert report.title and "#" not in report.title
     assert len(report.description.split()) > 10
-    assert report.studies
 
 
 @pytest.mark.parametrize(("deaths", "runs"), [(1, 2), (2, 2)])
@@ -189,27 +229,22 @@ def test_a_kernel_that_dies_at_its_start_gets_one_more_try(
         if len(tries) <= deaths:
             raise RuntimeError("Kernel died before replying to kernel_info")
 
-    monkeypatch.setattr(module, "_run", die)
-    fails = pytest.raises(ReportError, match="^report mission: Kernel died")
-    with fails if deaths > 1 else nullcontext():
-        module._execute(module._read("mission"), results, None)
+    monkeypatch.setattr(kernels, "_run", die)
+    report = read("mission")
+    kernels.Kernels(results).run([report])
     assert len(tries) == runs
+    assert bool(report.failure) == (deaths > 1)
+    if report.failure:
+        assert re.match(r"report mission: cell 1 of \d+ \(.*\): Kernel died", report.failure)
 
 
 def test_a_kernel_that_dies_in_a_cell_gets_no_other_try(
-    results: Path, monkeypatch: pytest.MonkeyPatch
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tries = []
-
-    def die(client: Any, _: Any) -> None:
-        tries.append(client)
-        client.on_cell_complete(cell=None, cell_index=0)
-        raise RuntimeError("Kernel died")
-
-    monkeypatch.setattr(module, "_run", die)
-    with pytest.raises(ReportError, match="^report mission: Kernel died$"):
-        module._execute(module._read("mission"), results, None)
-    assert len(tries) == 1
+    source = FAILING.replace("raise", "import os; os._exit(1) #")
+    monkeypatch.setattr(jupytext, "reads", lambda *_, **__: READS(source, fmt="py:percent"))
+    with pytest.raises(ReportError, match=r"^report mission: cell 4 of 5 \(import os.*Kernel died"):
+        render(["mission"], results, tmp_path)
 
 
 FAILING = """# ---
@@ -227,16 +262,43 @@ FAILING = """# ---
 results = "."
 
 # %%
+"as far as here"
+
+# %%
 raise ArithmeticError("no such number")
+
+# %%
+"but not so far"
 """
 
 
-def test_a_failing_notebook_is_named_and_leaves_the_pages_as_they_were(
+def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
     results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "mission.html").write_text("before")
-    monkeypatch.setattr(jupytext, "reads", lambda *_, **__: READS(FAILING, fmt="py:percent"))
-    with pytest.raises(ReportError, match="^report mission: ArithmeticError: no such number$"):
-        render(["mission"], results, tmp_path)
-    assert os.listdir(tmp_path) == ["mission.html"]
-    assert (tmp_path / "mission.html").read_text() == "before"
+    other = FAILING.replace("# Failing", "# Fine").replace("raise ArithmeticError", "print")
+    sources = {read("mission").source: FAILING, read("performance").source: other}
+    monkeypatch.setattr(
+        jupytext, "reads", lambda text, **how: READS(sources.get(text, text), **how)
+    )
+    with pytest.raises(ReportError) as caught:
+        render(["mission", "performance"], results, tmp_path)
+    partial = tmp_path / "mission.partial.html"
+    assert str(caught.value) == (
+        'report mission: cell 4 of 5 (raise ArithmeticError("no such number")): '
+        f"ArithmeticError: no such number; as far as it went: {partial}"
+    )
+    words = words_of(partial.read_text("utf-8"))
+    assert "This page is incomplete. report mission: cell 4 of 5" in words
+    assert "as far as here" in words and "but not so far" not in words
+    assert (tmp_path / "mission.html").read_text() == "before"  # nothing whole is lost
+    assert "but not so far" in words_of((tmp_path / "performance.html").read_text("utf-8"))
+    sources[read("mission").source] = other
+    render(["mission"], results, tmp_path)
+    assert not partial.exists() and "but not so far" in (tmp_path / "mission.html").read_text()
+
+
+def test_a_notebook_that_refuses_its_input_leaves_nothing(results: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="^report mission: policy: 'nobody' is not in the study"):
+        render(["mission"], results, tmp_path / "out", parameters={"policy": "nobody"})
+    assert os.listdir(tmp_path / "out") == []

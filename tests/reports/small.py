@@ -1,0 +1,73 @@
+"""Small results of the studies that the reports read, and what is looked for in pages."""
+
+import re
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+from analysis import load_study, run_study
+from reports.player import library
+
+EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
+
+POLICIES = ["random", "greedy", "ddqn"]
+RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 60, "check": 12}
+STUDIES: dict[str, dict[str, Any]] = {
+    "table4": {"policies": POLICIES, "missions": 40},
+    "fig1": {"missions": 8},
+    "fig4": {"policies": POLICIES, "missions": 8},
+    "fig5": {"policies": POLICIES, "missions": 8},
+    "sweet-spot": {
+        "policies": POLICIES,
+        "selection": RULE,
+        "design": {"kind": "grid", "values": {"uavs": [1, 3], "initial_data": [[5, 7.5], 10]}},
+    },
+    "sensitivity": {
+        "policies": ["greedy"],
+        "design": {
+            "kind": "saltelli",
+            "base": 8,
+            "ranges": {"uavs": [1, 3], "charge_start": [10, 50]},
+            "seed": 1,
+        },
+    },
+}
+
+
+def run_small_studies(folder: Path, *names: str) -> Path:
+    """Run the studies, all or some, each into a folder of its name."""
+    for name in names or STUDIES:
+        run_study(load_study(name, **STUDIES[name]), folder / name)
+    return folder
+
+
+class Links(HTMLParser):
+    """Everything that a page refers to or loads.
+
+    Attributes:
+        found: The targets.
+        tags: The kinds of its elements.
+        outside_scripts: The page without its drawings and its scripts.
+    """
+
+    def __init__(self, html: str):
+        super().__init__()
+        self.found: list[str] = []
+        self.tags: set[str] = set()
+        bare = re.sub(
+            r"<script[^>]*>.*?</script>", "", html.replace(library().data, ""), flags=re.S
+        )
+        self.outside_scripts = EMBEDDED.sub("", bare)
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        kinds = {"src", "href", "srcset", "data", "action"}
+        self.found += [value or "" for key, value in attrs if key in kinds]
+
+
+def words_of(html: str) -> str:
+    """The words of a page, without its drawings, its scripts and its code."""
+    main = Links(html).outside_scripts.split("<main")[1].split('<details class="code">')[0]
+    return unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", main)))

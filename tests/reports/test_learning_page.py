@@ -1,0 +1,56 @@
+"""The page on learning tells the shipped curves, and judges by those that it is given."""
+
+import re
+from pathlib import Path
+
+import pandas as pd
+
+from analysis import curves
+from policies.registry import TRAINED
+from reports import page
+from reports.render import render
+from tests.reports.small import words_of
+
+PRODUCT = "collection_ratio_and_communication"
+
+
+def rendered(out: Path, **parameters: str) -> str:
+    """The words of the page."""
+    render(["learning"], out / "results", out, parameters=parameters)
+    return words_of((out / "learning.html").read_text("utf-8"))
+
+
+def test_the_learning_page_tells_the_ablation(tmp_path: Path) -> None:
+    last = curves.finals(pd.read_parquet(TRAINED / "curves.parquet"))
+    table = curves.ablation(last, f"final_{PRODUCT}", "quick")
+    text = rendered(tmp_path)
+    for row in table.itertuples():
+        shown = page.percent(row.mean)
+        if row.low < row.high:
+            shown = page.interval(row.mean, row.low, row.high)
+        assert re.search(rf"{re.escape(row.variant)} {row.n} {re.escape(shown)}", text)
+
+
+def test_the_learning_page_judges_by_the_curves_it_is_given(tmp_path: Path) -> None:
+    """Where transfer learning surely wins, the page says that the claim holds."""
+    same = {"phase": "battery", "uav_slots": 1e6, "final_success": 1, "final_collection_ratio": 1}
+    rows = [
+        {
+            "variant": variant,
+            "seed": seed,
+            "updates": 1000 * step,
+            "evaluation_reward": top * step + seed / 1000,
+            f"evaluation_{PRODUCT}": top * step / 4 + seed / 1000,
+            f"final_{PRODUCT}": top + seed / 1000,
+        }
+        | same
+        for variant, top in (("quick", 0.8), ("no transfer", 0.4))
+        for seed in (1, 2, 3)
+        for step in (1, 2, 3, 4)
+    ]
+    pd.DataFrame(rows).to_parquet(tmp_path / "curves.parquet")
+    (tmp_path / "ddqn").symlink_to(TRAINED / "ddqn")
+    text = rendered(tmp_path / "out", trained=str(tmp_path))
+    assert "By this rule the claim holds , in all 2 comparisons." in text
+    assert text.count("holds : is above in all of phase II") == 2
+    assert "worse : no transfer" in text

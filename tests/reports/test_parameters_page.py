@@ -1,0 +1,55 @@
+"""The page on scenario parameters tells what the studies found."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis import effects, findings, load_results, load_study, run_study
+from analysis.paper import METRICS
+from reports import page
+from reports.render import render
+from tests.reports.small import run_small_studies, words_of
+
+PRODUCT = "collection_ratio_and_communication"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small results; the sensitivity's success is the same everywhere."""
+    names = ("fig5", "sweet-spot", "sensitivity")
+    return run_small_studies(tmp_path_factory.mktemp("results"), *names)
+
+
+def rendered(results: Path, out: Path) -> str:
+    """The words of the page."""
+    render(["parameters"], results, out)
+    return words_of((out / "parameters.html").read_text("utf-8"))
+
+
+def test_the_page_tells_what_the_studies_found(results: Path, tmp_path: Path) -> None:
+    text = rendered(results, tmp_path)
+    fig5 = load_results(results / "fig5")
+    table = effects.effects(fig5)
+    for policy in ("ddqn", "greedy"):  # random is neither learned nor the best heuristic
+        for field in ("uavs", "initial_data"):
+            pairs = effects.changes(fig5, table, policy, field, PRODUCT)
+            assert f"{policy} {effects.shape(pairs).words}" in text
+    sweet = load_results(results / "sweet-spot")
+    for _, row in findings.checks(sweet).iterrows():
+        if row["metric"] in METRICS:
+            assert page.interval(row["mean"], row["low"], row["high"]) in text
+    for row in findings.selections(sweet).itertuples():
+        assert row.guarantee in text
+    for _, row in findings.sensitivities(load_results(results / "sensitivity")).dropna().iterrows():
+        assert page.interval(row["total"], row["total_low"], row["total_high"]) in text
+    assert "random falls" not in text and "random rises" not in text
+
+
+def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    folder.mkdir()
+    for name in ("sweet-spot", "sensitivity"):
+        (folder / name).symlink_to(results / name)
+    run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
+    text = rendered(folder, tmp_path / "out")
+    assert "Shown is greedy ." in text

@@ -1,0 +1,198 @@
+"""Pages and results can be checked by whoever has them; what was altered is found."""
+
+import json
+import re
+import shutil
+from hashlib import sha256
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from analysis import load_study, run_study
+from analysis.evidence import Evidence, learned_files, verify
+from analysis.results import load_results
+from policies.registry import TRAINED
+from reports import page as pieces
+from reports.cli import main
+from reports.page import STUDY, embedded
+from reports.render import render
+from reports.verify import sealed, verify_page, verify_results
+
+ALL = 10**6
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small results of two studies."""
+    folder = tmp_path_factory.mktemp("results")
+    for name in ("table4", "fig4"):
+        study = load_study(name, missions=12, policies=["random", "greedy"])
+        run_study(study, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page on both."""
+    out = tmp_path_factory.mktemp("out")
+    render(["performance"], results, out)
+    return out / "performance.html"
+
+
+def lines_of(path: Path, missions: int = ALL, seed: int = 0) -> list[str]:
+    """What is found to differ."""
+    check = verify_results if path.is_dir() else verify_page
+    return [line for verdict in check(path, missions, seed) for line in verdict.differing]
+
+
+def altered(path: Path, old: str, new: str, out: Path) -> Path:
+    html = path.read_text("utf-8")
+    assert old in html
+    out.write_text(html.replace(old, new, 1), "utf-8")
+    return out
+
+
+def test_pages_and_results_that_nobody_altered_agree(results: Path, page: Path) -> None:
+    for path in (page, page.with_name("index.html"), results, results / "fig4"):
+        assert lines_of(path) == []
+    compared = {verdict.what: verdict.compared for verdict in verify_page(page, ALL, 0)}
+    assert compared == {"page": 1, "table4": 24, "fig4": 32}
+    compared = {verdict.what: verdict.compared for verdict in verify_results(results, ALL, 0)}
+    assert compared == {"table4": 24, "fig4": 72}
+
+
+def test_another_number_on_a_page_is_found(page: Path, tmp_path: Path) -> None:
+    (shown,) = set(re.findall(r"<td>(\d+\.\d %)</td>", page.read_text("utf-8"))[:1])
+    digit = "1" if shown[0] != "1" else "2"
+    forged = altered(page, f"<td>{shown}", f"<td>{digit}{shown[1:]}", tmp_path / "page.html")
+    assert lines_of(forged) == ["the page has been altered"]
+
+
+def test_a_page_whose_missions_were_altered_is_found_by_flying_them(
+    page: Path, tmp_path: Path
+) -> None:
+    """Even where the checksum was made anew."""
+    text = embedded(STUDY, page.read_text("utf-8"))[0]
+    evidence = json.loads(text)
+    mission = evidence["sample"][3]
+    mission["record"]["collected"] += 1e-9
+    forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+    forged.write_text(sealed(forged.read_text("utf-8")), "utf-8")
+    (line,) = lines_of(forged)
+    assert line.startswith(f"collected is {mission['record']['collected']} and ")
+    assert f"--policy {mission['policy']} " in line
+    assert line.endswith(f"--seed 2022 --replication {mission['replication']}")
+
+
+def test_a_file_of_results_that_was_altered_is_found(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results / "fig4", tmp_path / "fig4")
+    for kind in ("missions", "uavs", "events"):
+        path = sorted((folder / kind).rglob("*.parquet"))[0]
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-20] + bytes([whole[-20] ^ 1]) + whole[-19:])
+        assert lines_of(folder) == [f"{path}: is not what was written"]
+        path.write_bytes(whole)
+    assert lines_of(folder) == []
+
+
+def test_a_forged_record_is_found_by_flying_its_mission(results: Path, tmp_path: Path) -> None:
+    """A file that is sound in itself, with the name that belongs to its bytes."""
+    folder = shutil.copytree(results / "table4", tmp_path / "table4")
+    path = sorted((folder / "missions").rglob("*.parquet"))[0]
+    table = pq.read_table(path, partitioning=None)
+    column = table.schema.get_field_index("collection_ratio")
+    better = [min(ratio + 0.01, 1.0) for ratio in table["collection_ratio"].to_pylist()]
+    forged = table.set_column(column, table.schema.field(column), [better])
+    path.unlink()
+    pq.write_table(forged, path)
+    digest = sha256(path.read_bytes()).hexdigest()[:16]
+    path.rename(path.with_name(f"{path.stem.rpartition('-')[0]}-{digest}.parquet"))
+    found = lines_of(folder)
+    assert len(found) == sum(ratio < 1 for ratio in table["collection_ratio"].to_pylist())
+    assert all(line.startswith("collection_ratio is ") for line in found)
+
+
+def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = shutil.copytree(TRAINED, tmp_path / "trained")
+    html = f'<meta name="dess-checksum" content="">{pieces.weights(folder).data}'
+    path = tmp_path / "page.html"
+    path.write_text(sealed(html), "utf-8")
+    assert lines_of(path) == []
+    weights = folder / "ddqn" / "model.safetensors"
+    weights.write_bytes(weights.read_bytes() + b" ")
+    assert learned_files(folder) != learned_files()
+    path.write_text(sealed(html.replace(*_digests(folder))), "utf-8")
+    assert lines_of(path) == ["ddqn/model.safetensors: is another one here"]
+
+
+def _digests(folder: Path) -> tuple[str, str]:
+    """The hash of the shipped weights, and that of those in a folder."""
+    name = "ddqn/model.safetensors"
+    return learned_files()[name], learned_files(folder)[name]
+
+
+def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: Path) -> None:
+    evidence = Evidence.of(load_results(results / "table4"))
+    assert verify(evidence, ALL, 0).notes == []
+    team = evidence.policies[0]
+    member = team.members[0].model_copy(update={"code": "other"})
+    other = team.model_copy(update={"members": [member]})
+    changes = {"code": "other", "policies": [other, *evidence.policies[1:]]}
+    found = verify(evidence.model_copy(update=changes), ALL, 0)
+    assert found.notes == ["made by other code of dess", "made by other code or weights of random"]
+    assert found.differing == []
+    older = evidence.model_copy(update={"version": "0.0.1"})
+    assert verify(older, ALL, 0).notes[0].startswith("made by dess 0.0.1, not ")
+
+
+def test_the_sample_is_drawn_at_random(results: Path) -> None:
+    loaded = load_results(results / "fig4")
+    few = [
+        {(m.policy, str(m.values), m.replication) for m in Evidence.of(loaded, 20, seed).sample}
+        for seed in (1, 1, 2)
+    ]
+    assert few[0] == few[1] != few[2]
+    assert [len(sample) for sample in few] == [20, 20, 20]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_the_command_says_what_it_found(
+    page: Path, tmp_path: Path, as_json: bool, capsys: pytest.CaptureFixture
+) -> None:
+    options = ["--seed", "5", *(["--json"] if as_json else [])]
+    assert main(["verify", str(page), *options]) == 0
+    out = capsys.readouterr().out
+    if as_json:
+        checks = json.loads(out)["checks"]
+        assert [check["what"] for check in checks] == ["page", "table4", "fig4"]
+        assert [check["compared"] for check in checks] == [1, 20, 20]
+    else:
+        assert re.search(r"table4 +20 +0", out)
+    forged = altered(page, "Performance", "Perfection", tmp_path / "page.html")
+    assert main(["verify", str(forged), *options]) == 1
+    captured = capsys.readouterr()
+    assert "the page has been altered" in captured.err.splitlines()[0]
+    assert captured.err.splitlines()[-1].endswith("1 of 41 differ (--seed 5)")
+    if as_json:
+        assert json.loads(captured.out)["checks"][0]["differing"]
+
+
+def test_what_is_neither_a_page_nor_results_is_refused(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "text").write_text("no page")
+    (tmp_path / "empty").mkdir()
+    broken = shutil.copytree(results / "fig4", tmp_path / "broken")
+    for path in (broken / "missions").rglob("*.parquet"):
+        path.unlink()
+    for name, message in {
+        "text": "is no page of dess",
+        "absent": "cannot be read",
+        "empty": "holds no results and is no page",
+        "broken": "incomplete",
+    }.items():
+        assert main(["verify", str(tmp_path / name)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1
+        assert message in captured.err and "allowed: " in captured.err
