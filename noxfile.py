@@ -11,7 +11,8 @@ nox.options.sessions = ["tests"]
 
 # What the reports are about. Where the default budget does not fly all policies of a study, these
 # take its place.
-STUDIES = {
+STUDIES: dict[str, list[str]] = {
+    "fig1": [],
     "table4": [],
     "fig4": [],
     "fig5": ["ddqn", "greedy"],
@@ -59,13 +60,14 @@ def reports(session: nox.Session) -> None:
     if session.posargs not in ([], ["--full"]):
         session.error(f"reports: {' '.join(session.posargs)} is unknown; allowed: --full")
     install(session)
+    results, reports = (folder / "full" if full else folder for folder in (RESULTS, REPORTS))
     for study, few in STUDIES.items():
-        out = str(RESULTS / study)
         policies = [word for policy in few if not full for word in ("--policy", policy)]
-        session.run("dess", "study", "run", study, "--out", out, "--workers", "2", *policies)
-    session.run("dess", "timing", "--out", str(RESULTS / "timing"))
-    session.run("dess", "report", "--results", str(RESULTS), "--out", str(REPORTS))
-    session.log(f"The reports are at {(REPORTS / 'index.html').resolve().as_uri()}")
+        out = ["--out", str(results / study), "--workers", "2"]
+        session.run("dess", "study", "run", study, *out, *policies)
+    session.run("dess", "timing", "--out", str(results / "timing"))
+    session.run("dess", "report", "--results", str(results), "--out", str(reports))
+    session.log(f"The reports are at {(reports / 'index.html').resolve().as_uri()}")
 
 
 @nox.session

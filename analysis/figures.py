@@ -278,6 +278,7 @@ def policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
 
 
 def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
+    """How the means of a policy are drawn."""
     colour, marker = colours[policy]
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
 

@@ -4,6 +4,7 @@ Only what the help needs is imported at once; the rest is imported by the comman
 """
 
 import json
+import os
 import shlex
 import sys
 import tomllib
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from dess.record import EventLog, MissionRecord
 
 REPORTS = Path("build/reports")
+WHAT_IF = "what-if"  # the report that --set is for
 INTERRUPTED = 130  # what typer returns after Ctrl-C
 FIGURES = (".png", ".pdf", ".svg")
 
@@ -237,8 +239,11 @@ def report(
     ] = None,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
-    values = dict(_setting(text, "--parameter", _EXAMPLE) for text in parameters or [])
+    found = (_setting(text, "--parameter", _EXAMPLE) for text in parameters or [])
+    values = {name: _from_here(value) for name, value in found}
     if settings:
+        if names and WHAT_IF not in names:
+            raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
         values["settings"] = dict(_setting(text) for text in settings)
     from reports.render import ReportError, render
 
@@ -339,6 +344,14 @@ def _setting(
     if not equals or parsed.keys() != {"value"}:
         raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
+
+
+def _from_here(value: Any) -> Any:
+    """A value of a parameter; paths from here, for a notebook runs elsewhere."""
+    if isinstance(value, list):
+        return [_from_here(each) for each in value]
+    is_path = isinstance(value, str) and (os.sep in value or value.endswith(".toml"))
+    return os.path.abspath(value) if is_path else value
 
 
 def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:

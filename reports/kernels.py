@@ -134,13 +134,17 @@ def _client(
 
 
 def _environment(home: Path) -> dict[str, str]:
-    """The kernel imports what this process imports and leaves nothing in the user's home."""
+    """The kernel imports what this process imports and leaves nothing in the user's home.
+
+    It computes in one thread: those of two kernels would be in each other's way.
+    """
     own = {name: str(home) for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR")}
     path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
     return {
         **os.environ,
         **own,
         "PYTHONPATH": path,
+        "OMP_NUM_THREADS": "1",
         "MPLBACKEND": "agg",
         "MPLCONFIGDIR": mpl.get_cachedir(),
     }

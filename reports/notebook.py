@@ -19,6 +19,7 @@ NAMES = (
     "performance",
     "learning",
     "parameters",
+    "what-if",
 )
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}

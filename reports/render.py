@@ -4,7 +4,7 @@ import logging
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,17 +78,13 @@ def render(
     """
     results, out, values = Path(results), Path(out), parameters or {}
     reports = [read(name) for name in dict.fromkeys(names) or NAMES]
+    check_parameters(reports, values)
     for study in dict.fromkeys(study for report in reports for study in report.studies):
         _check_results(results / study)
-    check_parameters(reports, values)
     for report in reports:
         report.set({"results": ".", **values})
-    with _writing(out):
-        out.mkdir(parents=True, exist_ok=True)
-        if any("results" in report.parameters for report in reports):
-            results.mkdir(parents=True, exist_ok=True)
-        staging = TemporaryDirectory(dir=out, prefix=".rendering-")
-    with staging as folder:
+    needed = [out] + [results for report in reports if "results" in report.parameters]
+    with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
         Kernels(results, progress).run(reports)
         files = {report.page: sealed(_page("report.html", **_parts(report))) for report in reports}
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in reports}
@@ -106,6 +102,24 @@ def render(
             "; ".join(f"{r.failure}; as far as it went: {out / r.page}" for r in failed)
         )
     return out / INDEX
+
+
+@contextmanager
+def _folders(folders: Iterable[Path]) -> Iterator[None]:
+    """Make folders; if what comes then fails and has left nothing in them, they go again."""
+    made: list[Path] = []
+    try:
+        for folder in folders:
+            new = [path for path in (folder, *folder.parents) if not path.exists()]
+            with _writing(folder):
+                folder.mkdir(parents=True, exist_ok=True)
+            made += new
+        yield
+    except BaseException:
+        for path in made:
+            with suppress(OSError):  # it holds something
+                path.rmdir()
+        raise
 
 
 @contextmanager

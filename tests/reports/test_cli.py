@@ -266,6 +266,16 @@ BAD = {
     "fly": ["No such command 'fly'", "dess --help"],
     "simulate --fly": ["--fly"],
     "report nope": ["'nope' is unknown"],
+    "report mission --set uavs=5": ["--set: mission has nothing to set", "what-if"],
+    "report what-if --set uavs": ["--set: 'uavs' is not KEY=VALUE"],
+    "report what-if --set uavz=5": ["uavz: unknown key", "flying_time"],
+    "report what-if --set uavs=17": ["uavs: 17", "1..16"],
+    "report what-if --parameter speed=2": ["'speed' is unknown to what-if", "baseline, missions"],
+    "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
+    "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
+    "verify nope": ["nope: cannot be read"],
+    "verify small.toml": ["small.toml: is no page of dess"],
+    "verify .": [".: holds no results and is no page"],
 }
 
 

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 from base64 import b64decode
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from reports.notebook import NAMES, read
 from reports.page import STUDY, embedded
 from reports.player import library
 from reports.render import ReportError, render
+from tests.reports import browser
 from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
 READS = jupytext.reads
@@ -172,6 +174,44 @@ def test_notebooks_open_in_jupyter_and_run_from_a_results_folder(
         assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 
 
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[browser.Page]:
+    if browser.CHROMIUM is None:
+        pytest.skip("there is no chromium on this machine to open a page in")
+    with browser.page() as tab:
+        yield tab
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_pages_fit_the_window_and_ask_for_nothing(
+    chromium: browser.Page, pages: dict[str, str], out: Path, width: int
+) -> None:
+    for name in html_of(pages):
+        chromium.requests.clear()
+        chromium.complaints.clear()
+        chromium.open(out / name, width)
+        assert chromium.evaluate("document.documentElement.scrollWidth") <= width
+        assert chromium.requests == [(out / name).as_uri()]
+        assert chromium.complaints == []
+
+
+def test_a_mission_is_played_in_its_page(
+    chromium: browser.Page, pages: dict[str, str], out: Path
+) -> None:
+    chromium.requests.clear()
+    chromium.complaints.clear()
+    chromium.open(out / "mission.html", 1280)
+    buttons = "[...document.querySelectorAll('#player-3 .updatemenu-button')]"
+    play = f"{buttons}.find((button) => button.textContent === 'Play')"
+    label = "document.querySelector('#player-3 .slider-label').textContent"
+    chromium.wait(play)
+    assert chromium.evaluate(label) == "slot 0"
+    chromium.press(play)
+    chromium.wait(f"Number({label}.split(' ')[1]) >= 3")
+    assert chromium.requests == [(out / "mission.html").as_uri()]
+    assert chromium.complaints == []
+
+
 def test_an_unknown_report_is_refused(results: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="report: 'nothing' is unknown; allowed: mission, perf"):
         render(["nothing"], results, tmp_path / "out")
@@ -300,5 +340,5 @@ def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
 
 def test_a_notebook_that_refuses_its_input_leaves_nothing(results: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="^report mission: policy: 'nobody' is not in the study"):
-        render(["mission"], results, tmp_path / "out", parameters={"policy": "nobody"})
-    assert os.listdir(tmp_path / "out") == []
+        render(["mission"], results, tmp_path / "a" / "out", parameters={"policy": "nobody"})
+    assert os.listdir(tmp_path) == []
