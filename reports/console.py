@@ -66,12 +66,11 @@ def rounds_bar() -> "Iterator[tuple[Callable[[int], object], Callable[[Round], o
 
 @contextmanager
 def cells_bar() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress of the reports, cell by cell."""
+    """Progress of the reports in cells, of all of them."""
     with _bar("cell") as bar:
 
         def show(name: str, done: int, total: int) -> None:
-            if done == 1:
-                bar.reset(total)
+            bar.total = total
             bar.set_description(name, refresh=False)
             bar.update(done - bar.n)
 
