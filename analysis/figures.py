@@ -17,7 +17,6 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from analysis.paper import METRICS
@@ -215,8 +214,15 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
         colours = policy_colours(rows["policy"])
         for y, row in rows.iterrows():
             ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
-            ax.annotate(f"{row['mean']:.1%}", (1, y), xycoords=("axes fraction", "data"),
-                        xytext=(4, 0), textcoords="offset points", va="center", fontsize=9)  # fmt: skip
+            ax.annotate(
+                f"{row['mean']:.1%}",
+                (1, y),
+                xycoords=("axes fraction", "data"),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                fontsize=9,
+            )
         if printed is not None:
             ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
             figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center")

@@ -151,7 +151,7 @@ class Manifest(_Part):
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
             code=fingerprint("dess"),
-            commit=_commit(),
+            commit=commit_of_source(),
             libraries={"python": python_version()} | {n: metadata.version(n) for n in LIBRARIES},
             seed=study.seed,
             study=data,
@@ -339,7 +339,7 @@ def members_of(team: str) -> list[Member]:
     return identities
 
 
-def _commit() -> str | None:
+def commit_of_source() -> str | None:
     """The git commit of the source tree; nothing outside one."""
     root = Path(inspect.getfile(dess)).parents[1]
     if not (root / ".git").exists():

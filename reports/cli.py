@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dess import ScenarioSpace
     from dess.record import EventLog, MissionRecord
 
-REPORTS = Path("build/reports")
+REPORTS, TIMING = Path("build/reports"), study.RESULTS / "timing"
 WHAT_IF = "what-if"  # the report that --set is for
 INTERRUPTED = 130  # what typer returns after Ctrl-C
 FIGURES = (".png", ".pdf", ".svg")
@@ -293,6 +293,32 @@ def verify(
             console.fail(f"differs: {line}", 1)
         found = f"{len(differing)} of {sum(v.compared for v in verdicts)} differ"
         raise typer.Exit(console.fail(f"dess: error: {path}: {found} (--seed {seed})", 1))
+
+
+@app.command()
+def timing(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder to keep it in.")] = TIMING,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="P[,P...]", help="Repeatable.  [default: those of the study comparison]"
+        ),
+    ] = None,
+    missions: Annotated[int, typer.Option(min=1, help="Missions of each.")] = 30,
+) -> None:
+    """Measure what a decision costs in time; what was measured here before is kept."""
+    from analysis.study import load_study
+    from analysis.timing import is_current, measure, read, write
+
+    teams = policy or [*load_study("comparison").policies]
+    if not is_current(out, teams, missions):
+        with console.compile_notice(), console.steps_bar() as progress:
+            write(measure(teams, missions=missions, progress=progress), out)
+    rows = [
+        [c.policy, *(f"{1e6 * t:,.1f} µs" for t in (c.median, c.slow, c.batch))]
+        for c in read(out).costs
+    ]
+    console.print_table(["policy", "median", "95 % below", "in a batch, per UAV"], rows)
 
 
 @app.command()

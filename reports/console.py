@@ -78,6 +78,18 @@ def cells_bar() -> Iterator[Callable[[str, int, int], None]]:
 
 
 @contextmanager
+def steps_bar() -> Iterator[Callable[[int, int], None]]:
+    """Progress in steps."""
+    with _bar("step") as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        yield show
+
+
+@contextmanager
 def training_bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
     """Progress of a training, with the metrics of its last evaluation."""
     with _bar("tick", ticks) as bar:

@@ -14,12 +14,16 @@ from nbformat import NotebookNode
 
 from dess.errors import InputError
 
+SCORECARD = "scorecard"  # the index shows all of it
 NAMES = (
     "mission",
     "performance",
     "learning",
     "parameters",
+    "comparison",
     "what-if",
+    "verification",
+    SCORECARD,
 )
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}

@@ -25,13 +25,14 @@ from analysis.store import MANIFEST
 from dess.errors import InputError
 from reports import page
 from reports.kernels import Kernels, Progress
-from reports.notebook import NAMES, Report, check_parameters, read
+from reports.notebook import NAMES, SCORECARD, Report, check_parameters, read
 from reports.verify import sealed
 
 log = logging.getLogger(__name__)
 
 INDEX = "index.html"
 _IMAGE = re.compile(r"<img [^>]+>")
+_SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
 
 
 class ReportError(RuntimeError):
@@ -173,10 +174,22 @@ def _pages(out: Path) -> dict[str, str]:
 def _index(pages: Mapping[str, str]) -> str:
     """The page that shows all others, and what their results were made with."""
     there = [report for report in map(read, NAMES) if report.page in pages]
-    cards = [Card(r.page, r.title, r.description, _thumbnail(pages[r.page])) for r in there]
+    cards = [
+        Card(r.page, r.title, r.description, _thumbnail(pages[r.page]))
+        for r in there
+        if r.name != SCORECARD
+    ]
+    scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
     found = [text for r in there for text in page.embedded(page.STUDY, pages[r.page])]
     evidence = [Evidence.parse(text, INDEX) for text in dict.fromkeys(found)]
-    return sealed(_page(INDEX, cards=cards, origins=Markup(page.carrying(evidence).data)))
+    return sealed(
+        _page(
+            INDEX,
+            cards=cards,
+            scorecard=Markup("".join(scorecard)),
+            origins=Markup(page.carrying(evidence).data),
+        )
+    )
 
 
 def _thumbnail(html: str) -> Markup:

@@ -1,0 +1,532 @@
+"""The claims of the paper's Section V, and how each is judged.
+
+A judge takes the results of a policy and says what they mean for a claim, by a rule of ``claims``.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis import claims, curves, division, effects, paper
+from analysis.case import (
+    Case,
+    Finding,
+    MissingError,
+    Pairs,
+    Quantity,
+    Unit,
+    least,
+    mean_of,
+    mean_points,
+    mean_share,
+    points,
+    share_of,
+)
+from analysis.findings import PRODUCT
+from analysis.replay import Flight
+from analysis.statistics import Interval, mean_interval
+
+Judge = Callable[[Case], Finding]
+
+RATIO, SUCCESS = "collection_ratio", "success"
+
+# What Section V-D calls the best, and V-C an extreme; the values it names of Fig. 5b and 5d, and
+# the training step at which the curves of Fig. 3b cross.
+BEST_UAVS = max(paper.FIG_4)
+LONE, EARLIEST = "1", "10"
+ADVENTUROUS = ("10", "20")
+TURNING, BEYOND = "15–17.5", "17.5–20"
+CROSSING = 800_000
+
+# Times that the nodes are shuffled, to see what chance gives.
+SHUFFLES = 100
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim, as ``scorecard.Row`` has it, with its judge."""
+
+    part: str
+    page: str
+    text: str
+    place: str
+    rule: str
+    judge: Judge
+    printed: tuple[Quantity, ...] = ()
+
+
+def section_v(margin: float) -> list[Claim]:
+    """All claims.
+
+    Args:
+        margin: The difference that does not matter.
+    """
+    parts: list[tuple[str, str, Iterator[tuple]]] = [
+        ("Table IV: random missions", "performance.html", _table_4(margin)),
+        ("Fig. 4: one to three UAVs", "performance.html", _fig_4(margin)),
+        ("Fig. 4: where they fly", "mission.html", _trajectories()),
+        ("Fig. 5: one parameter at a time", "parameters.html", _fig_5(margin)),
+        ("Section V-D: the sweet spot", "parameters.html", _sweet_spot()),
+        ("Fig. 3: transfer learning", "learning.html", _fig_3()),
+    ]
+    return [Claim(part, page, *fields) for part, page, own in parts for fields in own]
+
+
+def _table_4(margin: float) -> Iterator[tuple]:
+    for metric, name in paper.METRICS.items():
+        yield (
+            f"{name} over random missions",
+            "Table IV",
+            claims.REACHED,
+            _reaches(paper.TABLE_IV[metric], metric),
+            (Quantity(paper.TABLE_IV[metric], n=paper.TABLE_IV_MISSIONS),),
+        )
+    product = paper.TABLE_IV[PRODUCT] - paper.TABLE_IV[SUCCESS] * paper.TABLE_IV[RATIO]
+    yield (
+        "The mean of the product per episode is the product of the means",
+        "Section V-A, Table IV",
+        claims.same_words(margin),
+        lambda case: _covariance(case, margin),
+        (Quantity(product, unit="points"),),
+    )
+    yield "Success takes at least one charge", "Section V-C", claims.ALWAYS, _charged
+    yield "The collection ratio stays below 100 %", "Section V-C", claims.NEVER_ALL, _never_all
+
+
+def _fig_4(margin: float) -> Iterator[tuple]:
+    for (uavs, figures), panel in zip(paper.FIG_4.items(), "abc", strict=True):
+        for metric, printed in figures.items():
+            yield (
+                f"{paper.METRICS[metric]} with {uavs} UAV{'s' if uavs > 1 else ''}",
+                f"Fig. 4{panel}",
+                claims.REACHED,
+                _reaches(printed, metric, "fig4", uavs),
+                (Quantity(printed),),
+            )
+    yield (
+        "A second UAV raises the collection ratio dramatically",
+        "Fig. 4b, Section V-C",
+        claims.GAINED,
+        _gain(RATIO, 2, claims.gained),
+        _printed_gain(RATIO, 2),
+    )
+    yield (
+        "A third UAV raises the collection ratio further",
+        "Fig. 4c, Section V-C",
+        claims.HIGHER,
+        _gain(RATIO, 3, lambda gap, _: claims.higher(gap)),
+        _printed_gain(RATIO, 3),
+    )
+    yield (
+        "A second UAV costs no success, though it is harder to return for charging",
+        "Fig. 4b, Section V-C",
+        claims.kept_words(margin),
+        _gain(SUCCESS, 2, lambda gap, _: claims.kept(gap, margin)),
+        _printed_gain(SUCCESS, 2),
+    )
+    yield (
+        "With the third UAV, success decreases slightly",
+        "Fig. 4c, Section V-C",
+        claims.SLIGHTLY_LOWER,
+        _gain(SUCCESS, 3, lambda gap, _: claims.slightly_lower(gap)),
+        _printed_gain(SUCCESS, 3),
+    )
+    yield (
+        "All else given, three UAVs are closest to the sweet spot",
+        "Section V-D",
+        f"By collection ratio and communication. {claims.BEST}",
+        _best_at("fig4", "uavs", str(BEST_UAVS)),
+    )
+
+
+def _trajectories() -> Iterator[tuple]:
+    yield "A lone UAV charges once", "Fig. 4a, Section V-C", claims.MOST, _one_charge
+    yield (
+        "A lone UAV ignores the leftmost column and the bottommost row of nodes",
+        "Fig. 4a, Section V-C",
+        claims.IGNORED,
+        _ignored,
+    )
+    yield (
+        "Two UAVs divide the nodes into two sectors",
+        "Fig. 4b, Section V-C",
+        claims.DIVIDED,
+        _divided,
+    )
+    yield (
+        "Two UAVs reach the nodes far from the charging zone, too",
+        "Fig. 4b, Section V-C",
+        f"Of that column and row, the nodes that are not ignored. {claims.HIGHER}",
+        _reach,
+    )
+
+
+def _fig_5(margin: float) -> Iterator[tuple]:
+    yield (
+        "Performance is best with three UAVs",
+        "Fig. 5a, Section V-D",
+        f"By collection ratio and communication. {claims.BEST}",
+        _best_at("fig5", "uavs", str(BEST_UAVS)),
+    )
+    yield (
+        "The more UAVs, the more of the data is collected",
+        "Fig. 5a, Section V-D",
+        f"By collection ratio. {claims.RISES}",
+        _rises("uavs", RATIO),
+    )
+    yield (
+        "A lone UAV is an extreme, and costs collection ratio",
+        "Section V-C",
+        claims.LOWEST,
+        _lowest_at("uavs", LONE),
+    )
+    yield (
+        f"Charging from {EARLIEST} % on is an extreme, and costs collection ratio",
+        "Section V-C",
+        claims.LOWEST,
+        _lowest_at("charge_start", EARLIEST),
+    )
+    yield (
+        f"Success is no lower at C_S {'–'.join(ADVENTUROUS)} % than above",
+        "Fig. 5b, Section V-D",
+        claims.kept_words(margin),
+        lambda case: _no_lower(case, margin),
+    )
+    yield (
+        "All values of C_C are served well",
+        "Fig. 5c, Section V-D",
+        f"By collection ratio and communication. {claims.alike_words(margin)}",
+        lambda case: _alike(case, margin),
+    )
+    yield (
+        f"More initial data is good up to {TURNING} data units, and bad above",
+        "Fig. 5d, Section V-D",
+        f"By collection ratio and communication. {claims.PEAKS}",
+        _peaks,
+    )
+    yield (
+        f"Above {TURNING} data units per node, the collection ratio decreases",
+        "Fig. 5d, Section V-D",
+        claims.LOWER,
+        _decreases,
+    )
+    yield (
+        "More flying time is better",
+        "Fig. 5e, Section V-D",
+        f"By collection ratio and communication. {claims.RISES}",
+        _rises("flying_time", PRODUCT),
+    )
+
+
+def _sweet_spot() -> Iterator[tuple]:
+    for metric, name in paper.METRICS.items():
+        yield (
+            f"{name} with every parameter at its best",
+            "Section V-D",
+            f"Of missions that had no part in the selection. {claims.REACHED}",
+            _checked(paper.SWEET_SPOT[metric], metric),
+            (Quantity(paper.SWEET_SPOT[metric], n=paper.SWEET_SPOT_MISSIONS),),
+        )
+    yield (
+        "The sweet spot is one of three UAVs",
+        "Section V-D",
+        claims.CHOSEN,
+        _selected,
+        (Quantity(BEST_UAVS, unit="number", name="UAVs"),),
+    )
+
+
+def _fig_3() -> Iterator[tuple]:
+    yield (
+        "With transfer learning, the reward is higher in all training steps",
+        "Fig. 3a, Section V-B",
+        claims.THROUGHOUT,
+        _above("evaluation_reward", "reward", claims.throughout),
+    )
+    yield (
+        "With transfer learning, collection ratio and communication passes that without, and ends "
+        "higher",
+        "Fig. 3b, Section V-B",
+        claims.PASSES,
+        _above(f"evaluation_{PRODUCT}", "points", lambda verdict, _: verdict),
+        (Quantity(CROSSING, unit="steps", name="crossing"),),
+    )
+    yield (
+        "Without transfer learning, training levels off, with low performance",
+        "Fig. 3b, Section V-B",
+        claims.LEVELS_OFF,
+        _levels_off,
+    )
+
+
+# Judges of means.
+
+
+def _reaches(printed: float, metric: str, study: str = "table4", uavs: int | None = None) -> Judge:
+    def judge(case: Case) -> Finding:
+        return _beside(case.policy(study), mean_of(case.missions(study, uavs), metric), printed)
+
+    return judge
+
+
+def _checked(printed: float, metric: str) -> Judge:
+    def judge(case: Case) -> Finding:
+        policy, checks = case.policy("sweet-spot"), case.evidence.study("sweet-spot").checks
+        own = checks[checks["policy"] == policy]
+        if own.empty:
+            raise MissingError("the study sweet-spot flew no check")
+        return _beside(policy, mean_of(own, metric), printed)
+
+    return judge
+
+
+def _beside(policy: str, ours: Quantity, printed: float) -> Finding:
+    verdict = claims.reached(ours.interval, printed)
+    return Finding(verdict, policy, (ours,), _against(ours, printed))
+
+
+def _against(ours: Quantity, printed: float) -> str:
+    return paper.verdict(ours.interval.low, ours.interval.high, printed)
+
+
+def _covariance(case: Case, margin: float) -> Finding:
+    """Of success and collection ratio: by that the mean product is above the product of means."""
+    missions = case.missions("table4")
+    success, ratio = (missions[metric].to_numpy(float) for metric in (SUCCESS, RATIO))
+    ours = mean_points((success - success.mean()) * (ratio - ratio.mean()))
+    verdict = claims.same(ours.interval, margin)
+    return Finding(verdict, case.policy("table4"), (ours,), _against(ours, 0.0))
+
+
+def _charged(case: Case) -> Finding:
+    missions = case.missions("table4")
+    won = missions.loc[missions[SUCCESS] == 1, ["policy", "point", "replication"]]
+    if won.empty:
+        raise MissingError("no mission succeeded")
+    uavs = case.evidence.study("table4").uavs.merge(won)
+    charged = uavs.groupby(["point", "replication"])["slots_charging"].min() > 0
+    ours = share_of(charged.to_numpy(), "successes in which every UAV charged")
+    return Finding(claims.always(ours.value), case.policy("table4"), (ours,))
+
+
+def _never_all(case: Case) -> Finding:
+    missions = case.missions("table4")
+    ratio = mean_of(missions, RATIO)
+    whole = share_of(missions[RATIO].to_numpy() >= 1, "missions that collected everything")
+    verdict = claims.never_all(whole.value, ratio.interval)
+    return Finding(verdict, case.policy("table4"), (ratio, whole))
+
+
+# Judges of what one more UAV changes in Fig. 4.
+
+
+def _gain(metric: str, uavs: int, rule: Callable[[Interval, float], str]) -> Judge:
+    ((printed, *_),) = _printed_gain(metric, uavs)
+
+    def judge(case: Case) -> Finding:
+        ours = case.pairs("fig4", "uavs", metric).change(str(uavs - 1), str(uavs))
+        verdict = rule(ours.interval, printed)
+        return Finding(verdict, case.policy("fig4"), (ours,), _against(ours, printed))
+
+    return judge
+
+
+def _printed_gain(metric: str, uavs: int) -> tuple[Quantity]:
+    gain = paper.FIG_4[uavs][metric] - paper.FIG_4[uavs - 1][metric]
+    return (Quantity(gain, unit="points"),)
+
+
+# Judges of missions of Fig. 4, flown again.
+
+
+def _one_charge(case: Case) -> Finding:
+    charges = [(flight.events["event"] == "charge_start").sum() for flight in case.flights(1)]
+    ours = share_of(np.array(charges) == 1, "missions with one charge")
+    return Finding(claims.most(ours.interval), case.policy("fig4"), (ours,))
+
+
+def _ignored(case: Case) -> Finding:
+    there, others = np.transpose([_left_behind(flight) for flight in case.flights(1)])
+    found = mean_share(there, "ignored of these nodes"), mean_share(others, "of the others")
+    verdict = claims.ignored(found[0].interval, mean_interval(there - others))
+    return Finding(verdict, case.policy("fig4"), found)
+
+
+def _reach(case: Case) -> Finding:
+    alone, two = (np.array([_left_behind(f)[0] for f in case.flights(uavs)]) for uavs in (1, 2))
+    n = min(len(alone), len(two))  # of the same replications
+    more = mean_points(alone[:n] - two[:n], "more of these nodes than by a lone UAV")
+    found = more, mean_share(1 - two, "of these nodes not ignored")
+    return Finding(claims.higher(more.interval), case.policy("fig4"), found)
+
+
+def _left_behind(flight: Flight) -> tuple[float, float]:
+    """The shares left behind, of the nodes of the far edges and of the others."""
+    nodes = np.array(flight.scenario.nodes)
+    left = division.left_behind(flight.events, flight.scenario.uavs, len(nodes))
+    far = division.far_edges(nodes)
+    if far.all():
+        raise MissingError("all nodes are on the edges")
+    return float(left[far].mean()), float(left[~far].mean())
+
+
+def _divided(case: Case) -> Finding:
+    generator = np.random.default_rng(case.evidence.study("fig4").store.manifest.seed)
+    rows = [row for flight in case.flights(2) if (row := _division(flight, generator))]
+    if not rows:
+        raise MissingError("no data was collected")
+    own, chance, most = np.transpose(rows)
+    sides = mean_share(own, "data collected on the own side")
+    whole = mean_share(most, "data by the UAV that serves the node most")
+    drawn = Quantity(float(np.mean(chance)), name="by chance")
+    verdict = claims.divided(mean_interval(own - chance), whole.interval)
+    return Finding(verdict, case.policy("fig4"), (sides, drawn, whole))
+
+
+def _division(flight: Flight, generator: np.random.Generator) -> tuple[float, ...]:
+    """The share on the own side, the same by chance, and by the UAV that serves a node most."""
+    nodes = np.array(flight.scenario.nodes)
+    data = division.collected(flight.events, flight.scenario.uavs, len(nodes))
+    if not data.any():
+        return ()
+    shuffled = (generator.permutation(data, axis=1) for _ in range(SHUFFLES))
+    chance = np.mean([division.sectors(each, nodes) for each in shuffled])
+    return division.sectors(data, nodes), float(chance), division.division(data)
+
+
+# Judges of a parameter's values.
+
+
+def _best_at(study: str, field: str, value: str) -> Judge:
+    def judge(case: Case) -> Finding:
+        pairs = case.pairs(study, field, PRODUCT)
+        verdict = effects.best_at(pairs.table, pairs.place(value))
+        lead = least(pairs.leads(value), f"{_at(field, value)} above the next best")
+        return _by_effects(verdict, case.policy(study), lead)
+
+    return judge
+
+
+def _lowest_at(field: str, value: str) -> Judge:
+    def judge(case: Case) -> Finding:
+        pairs = case.pairs("fig5", field, RATIO).reversed()
+        verdict = effects.best_at(pairs.table, pairs.place(value))
+        lead = least(pairs.leads(value), "the next lowest is higher by")
+        return _by_effects(verdict, case.policy("fig5"), lead)
+
+    return judge
+
+
+def _no_lower(case: Case, margin: float) -> Finding:
+    pairs = case.pairs("fig5", "charge_start", SUCCESS)
+    low = [pairs.place(value) for value in ADVENTUROUS]
+    leads = pd.concat([pairs.leads(value) for value in ADVENTUROUS])
+    ours = least(leads[~leads["other"].isin(low)], "least difference")
+    verdict = effects.no_lower(pairs.table, low, margin)
+    return _by_effects(verdict, case.policy("fig5"), ours)
+
+
+def _alike(case: Case, margin: float) -> Finding:
+    table = case.pairs("fig5", "charge_complete", PRODUCT).table
+    ours = points(table.loc[table["difference"].abs().idxmax()], "largest difference")
+    return _by_effects(effects.alike(table, margin), case.policy("fig5"), ours)
+
+
+def _peaks(case: Case) -> Finding:
+    pairs = case.pairs("fig5", "initial_data", PRODUCT)
+    verdict = effects.peaks_at(pairs.table, pairs.place(TURNING))
+    lead = least(pairs.leads(TURNING), f"{_at('initial_data', TURNING)} above the best other")
+    return _by_effects(verdict, case.policy("fig5"), lead, _course(pairs))
+
+
+def _decreases(case: Case) -> Finding:
+    ours = case.pairs("fig5", "initial_data", RATIO).change(TURNING, BEYOND)
+    return Finding(claims.lower(ours.interval), case.policy("fig5"), (ours,))
+
+
+def _rises(field: str, metric: str) -> Judge:
+    def judge(case: Case) -> Finding:
+        pairs = case.pairs("fig5", field, metric)
+        first, *_, last = pairs.places
+        ours = pairs.change(first, last)._replace(name=f"from {first} to {last}")
+        verdict = effects.rises(pairs.table)
+        return _by_effects(verdict, case.policy("fig5"), ours, _course(pairs))
+
+    return judge
+
+
+def _at(field: str, value: object) -> str:
+    """``C_S 30``."""
+    text = value if isinstance(value, str) else effects.words(value)
+    return f"{effects.parameter(field).short} {text}"
+
+
+def _course(pairs: Pairs) -> str:
+    """How the metric goes along the values, in words."""
+    found = effects.shape(pairs.table)
+    tops = [value for value, position in pairs.places.items() if position in found.peaks]
+    peak = f", highest at {' or '.join(tops)}" if found.words == effects.PEAK else ""
+    return f"it {found.words}{peak}"
+
+
+def _by_effects(verdict: str, policy: str, ours: Quantity, note: str = "") -> Finding:
+    return Finding(claims.OF_EFFECTS[verdict], policy, (ours,), note=note)
+
+
+def _selected(case: Case) -> Finding:
+    results, policy = case.evidence.study("sweet-spot"), case.policy("sweet-spot")
+    choice, points = results.choice(policy), results.store.manifest.points
+    if choice is None or "uavs" not in points[choice.best].values:
+        raise MissingError("the study sweet-spot selects no number of UAVs")
+    wanted = [n for n, point in enumerate(points) if point.values.get("uavs") == BEST_UAVS]
+    best = points[choice.best].values
+    ours = Quantity(best["uavs"], n=choice.missions, unit="number", name="UAVs")
+    note = ", ".join(_at(field, value) for field, value in best.items())
+    return Finding(claims.chosen(choice, wanted), policy, (ours,), note=note)
+
+
+# Judges of learning curves.
+
+
+def _above(metric: str, unit: Unit, rule: Callable[[str, bool], str]) -> Judge:
+    def judge(case: Case) -> Finding:
+        found = _transfer(case, metric)
+        where = (
+            f"above from step {found.since:,} on"
+            if found.since is not None
+            else "ends below, or level"
+        )
+        note = "above at every step" if found.throughout else where
+        verdict = rule(found.verdict, found.throughout)
+        return Finding(verdict, case.variants[0], _last(case, found, unit), note=note)
+
+    return judge
+
+
+def _levels_off(case: Case) -> Finding:
+    metric, variant = f"evaluation_{PRODUCT}", case.variants[1]
+    found = _transfer(case, metric)
+    mean = curves.bands(case.evidence.curves(metric)).query("variant == @variant")
+    mean = mean[mean["phase"] == mean["phase"].iloc[-1]]
+    far = np.flatnonzero((mean["mean"] - mean["mean"].iloc[-1]).abs() > claims.MARGIN)
+    since = mean["updates"].iloc[far[-1] + 1 if len(far) else 0]
+    settled = Quantity(int(since), unit="steps", name="level from")
+    verdict = claims.levels_off(since / mean["updates"].iloc[-1], found.last)
+    return Finding(verdict, variant, (settled, *_last(case, found, "points")))
+
+
+def _transfer(case: Case, metric: str) -> curves.Transfer:
+    there = case.evidence.trainings
+    if there.empty or not {*case.variants} <= {*there["variant"]}:
+        raise MissingError(f"no trainings {' and '.join(case.variants)}")
+    return curves.transfer(case.evidence.curves(metric), *case.variants)
+
+
+def _last(case: Case, found: curves.Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
+    """The last difference, and how long the trainings are."""
+    trainings = case.evidence.trainings
+    steps = trainings.loc[trainings["variant"].isin(case.variants), "updates"].max()
+    last = Quantity(*found.last, min(found.trainings), unit, "with transfer, at the end")
+    return last, Quantity(int(steps), unit="steps", name="length of the trainings")

@@ -1,0 +1,613 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [comparison]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Learned against heuristic
+#
+# The best learned policy and the best heuristic in the same missions: how far apart they are, where
+# in the space of parameters, in which missions the learned one loses, and what a decision costs.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder that holds the results folders comparison and timing
+learned = None  # the learned policy to show; None for the best of the study
+heuristic = None  # the policy to set beside it; None for the best that has not learned
+
+# %%
+from functools import cache
+from pathlib import Path
+
+import pandas as pd
+from IPython.display import Markdown, display
+
+from analysis import comparison_figures as drawings
+from analysis import figures, findings, fly, load_results, paper, regions, summary, timing
+from analysis.comparison import CHECKPOINT
+from analysis.effects import parameter
+from analysis.statistics import LEVEL
+from reports import page
+
+study = load_results(Path(results) / "comparison")
+times = timing.read(Path(results) / "timing")
+product = "collection_ratio_and_communication"
+
+pair = regions.pair_of(study, learned, heuristic)
+policy, baseline = pair.policy, pair.baseline
+missions = regions.duels(study, pair)
+seed = study.manifest["seed"]
+means = summary(study.missions, by=["policy"])
+ranked = means[means["metric"] == product].sort_values("mean", ascending=False, kind="stable")[
+    "policy"
+]
+taught = {name for names in findings.learners(study).values() for name in names}
+
+
+def percent(level):
+    return f"{100 * level:g} %"
+
+
+def p_value(p):
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def points(row, mean="mean"):
+    return page.points(row[mean], row["low"], row["high"])
+
+
+def within(field):
+    """The name of a parameter inside a sentence."""
+    name = parameter(field).name
+    return name[0].lower() + name[1:]
+
+
+def plural(n, one, many):
+    return f"{n:,} {one if n == 1 else many}"
+
+
+def span(numbers):
+    """``300``, or ``20 to 1,200``."""
+    return " to ".join(f"{n:,}" for n in sorted({numbers.min(), numbers.max()}))
+
+
+def role(name):
+    """What a policy is in the study."""
+    kind = taught if name in taught else set(ranked) - taught
+    first = next(other for other in ranked if other in kind) == name
+    kind = ("learned policy", "") if name in taught else ("policy", " that has not learned")
+    return f"{'the best' if first else 'a'} {kind[0]} of the study{kind[1]}"
+
+
+def metric_name(metric):
+    return paper.METRICS[metric].lower()
+
+
+# %% [markdown]
+# ## On the same missions
+
+# %%
+chosen = (
+    f" Of {pair.candidates} pairs of policies, these data chose this one, and all p-values of the "
+    "pair are corrected for that (Bonferroni)."
+    if pair.candidates > 1
+    else ""
+)
+display(
+    Markdown(
+        f"**{policy}** is {role(policy)}, **{baseline}** {role(baseline)}; unless another is "
+        "named, the metric is collection ratio and communication, the product of success and "
+        f"collection ratio. Both fly the same {len(missions):,} missions, each "
+        "with parameters of its own (Table II): the same sea, initial data, arrivals and "
+        "shadowing. So they are compared mission by mission, and what follows are differences, "
+        f"{policy} minus {baseline}, in percentage points: above 0, {policy} is ahead." + chosen
+    )
+)
+
+# %%
+versus = findings.learned_against_heuristic(study)
+members = findings.learners(study)
+shown = (
+    [
+        (row["learner"], row["baseline"], row["about"])
+        for _, row in versus.drop_duplicates("learner").iterrows()
+    ]
+    if len(versus)
+    else []
+)
+covered = any(members[name] == [policy] and base == baseline for name, base, _ in shown)
+
+
+def told(rows, name, base):
+    """How a policy compares in every metric, in words."""
+    groups = {"ahead of": [], "behind": [], "not told apart from": []}
+    for _, row in rows.iterrows():
+        sure = row["p_adjusted"] <= 1 - LEVEL
+        verdict = ("ahead of" if row["difference"] > 0 else "behind") if sure else [*groups][2]
+        groups[verdict].append(f"{metric_name(row['metric'])} ({points(row, 'difference')} points)")
+    parts = [
+        f"{verdict} {base} in {page.words(those)}" for verdict, those in groups.items() if those
+    ]
+    return f"- **{name}** is {'; '.join(parts)}."
+
+
+own = regions.overall(missions, pair)
+lines = [told(versus[versus["learner"] == name], name, base) for name, base, _ in shown]
+if not covered:
+    lines.append(told(own, policy, baseline))
+one = [name for name, _, about in shown if about == CHECKPOINT]
+more = [name for name, *_ in shown if name not in one]
+caveats = [
+    f"Of {page.words(one)} there is one training each: the claim is about "
+    f"{'this checkpoint' if len(one) == 1 else 'these checkpoints'}, and another training of the "
+    "same learner may turn out better or worse."
+    if one
+    else "",
+    f"Of {page.words(more)} there are several trainings: the claim is about the learner, trainings "
+    "to come included."
+    if more
+    else "",
+]
+gain = own.set_index("metric").loc[product, "variance_reduction"]
+worth = (
+    f"The common missions are worth much: with missions of its own for each policy, it would "
+    f"take {1 / (1 - gain):.0f} times as many for intervals as narrow."
+    if 0.5 < gain < 1
+    else ""
+)
+display(
+    Markdown(
+        f"By the p-values at {percent(LEVEL)}, after Holm's correction for the number of "
+        "comparisons:\n\n"
+        + "\n\n".join(text for text in ("\n".join(lines), *caveats, worth) if text)
+    )
+)
+
+
+# %%
+def by_metric(rows, name):
+    """A row per policy, with its differences and p-values in all metrics."""
+    head = [("", "Difference")]
+    head += [(m, what) for m in paper.METRICS.values() for what in ("points", "p, adjusted")]
+    lines = []
+    for who, own in rows.groupby(name, sort=False):
+        own = own.set_index("metric").loc[[*paper.METRICS]]
+        cells = [
+            (points(row, "difference"), p_value(row["p_adjusted"])) for _, row in own.iterrows()
+        ]
+        base = own["baseline"].iloc[0]
+        lines.append([f"{who} − {base}", *(text for cell in cells for text in cell)])
+    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(head))
+
+
+how = (
+    f"mean differences in points, with {percent(LEVEL)} intervals of one difference each; p by "
+    "Holm over the whole table, and by Bonferroni for the choice of the"
+)
+if len(versus):
+    display(
+        page.table(
+            by_metric(versus, "learner"),
+            f"Every learner against the best heuristic, n = {versus['n'].min():,} missions: {how} "
+            "best heuristic",
+        )
+    )
+best = findings.comparisons(study)
+if len(best):
+    display(
+        page.table(
+            by_metric(best, "policy"),
+            f"Every policy against the best one, n = {best['n'].min():,} missions: {how} best",
+        )
+    )
+
+# %% [markdown]
+# ### Mission by mission
+
+# %%
+counts = regions.outcomes(missions).set_index("outcome")
+only = {
+    who: int(((missions["success" + a] == 0) & (missions["success" + b] == 1)).sum())
+    for who, a, b in ((policy, "", "_baseline"), (baseline, "_baseline", ""))
+}
+
+
+def share(outcome):
+    return page.interval(*counts.loc[outcome, ["share", "low", "high"]])
+
+
+display(
+    Markdown(
+        f"In collection ratio and communication, {policy} is ahead in {share('ahead')} of the "
+        f"missions, level in {share('level')} and behind in {share('behind')}. A mission that "
+        f"fails counts 0, so a single failure weighs as much as many small leads: in "
+        f"{plural(only[policy], 'mission', 'missions')} {policy} fails and {baseline} does not, in "
+        f"{plural(only[baseline], 'mission', 'missions')} it is the other way round."
+    )
+)
+page.figure(
+    drawings.distribution(missions, pair),
+    f"Distribution of the difference between {policy} and {baseline} over the missions",
+    f"Share of the missions (n = {len(missions):,}) in which the difference in collection ratio "
+    f"and communication is at most the value below. The {percent(LEVEL)} band holds the whole "
+    "curve. Where the curve crosses 0 is the share of missions that are lost. Up to "
+    f"{percent(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
+    f"{page.difference(missions['difference'].min(), 0)}, the highest "
+    f"{page.difference(missions['difference'].max(), 0)}.",
+)
+
+# %% [markdown]
+# ## Over the space of parameters
+
+# %%
+lead = regions.along(missions, pair.candidates)
+depends = regions.dependence(missions)
+fields = regions.varied(missions)
+overall = missions["difference"].mean()
+order = lead.sort_values("mean", kind="stable")
+verdicts = {v: int((lead["verdict"] == v).sum()) for v in ("ahead", "behind", regions.OPEN)}
+
+
+def place(row):
+    return f"{within(row['field'])} {row['value']}, {points(row)} points"
+
+
+def spread(field):
+    """Between which bins of a parameter the difference goes."""
+    rows = lead[lead["field"] == field]
+    low, high = rows.loc[rows["mean"].idxmin()], rows.loc[rows["mean"].idxmax()]
+    return (
+        f"{within(field)} ({page.difference(low['mean'], 0)} at {low['value']}, "
+        f"{page.difference(high['mean'], 0)} at {high['value']})"
+    )
+
+
+matters = depends["p_adjusted"] <= 1 - LEVEL
+named = [spread(field) for field in depends.loc[matters, "field"]]
+unnamed = [within(field) for field in depends.loc[~matters, "field"]]
+if len(lead):
+    display(
+        Markdown(
+            f"Every parameter is cut into at most {regions.BINS} bins with about as many missions; "
+            "the initial data are the mean of a mission's nodes. "
+            f"Of these {len(lead)} bins, {policy} is ahead in {verdicts['ahead']} and behind in "
+            f"{verdicts['behind']}; of {verdicts[regions.OPEN]} it cannot be told (at "
+            f"{percent(LEVEL)}, after Holm's correction for all of them). The difference is lowest "
+            f"at {place(order.iloc[0])}, highest at {place(order.iloc[-1])}."
+            + (f"\n\nIt depends on {page.words(named)}." if named else "")
+            + (f" That it depends on {page.words(unnamed)} is not shown." if unnamed else "")
+            + " (Alexander and Govern's test of equal means, Holm's correction for the number of "
+            "parameters.) In the figures, blue is ahead, orange behind; what cannot be told is "
+            "hollow and grey."
+        )
+    )
+
+# %%
+page.gallery(
+    [
+        (
+            drawings.lead(lead, field, overall),
+            f"Mean difference between {policy} and {baseline} against the {within(field)}",
+            f"{policy} − {baseline}, collection ratio and communication, n = "
+            f"{span(lead.loc[lead['field'] == field, 'n'])} missions per dot. Bars are "
+            f"{percent(LEVEL)} intervals. Dashed: all missions.",
+        )
+        for field in fields
+    ]
+)
+
+# %%
+if len(depends) > 1:
+    first, second = depends["field"][:2]
+    cells = regions.across(missions, first, second, pair.candidates)
+    low = cells.loc[cells["mean"].idxmin()]
+    sure = {v: int((cells["verdict"] == v).sum()) for v in verdicts}
+    display(
+        Markdown(
+            f"The two parameters that explain most of the difference are the {within(first)} "
+            f"({page.percent(depends['explained'][0])} of its variance) and the {within(second)} "
+            f"({page.percent(depends['explained'][1])}). Both at once, "
+            f"{policy} is ahead in {sure['ahead']} of {len(cells)} cells, behind in "
+            f"{sure['behind']}. The lowest mean is {points(low)} points, with "
+            f"{parameter(first).short} {low['value']} and {parameter(second).short} "
+            f"{low['value_2']} ({plural(low['n'], 'mission', 'missions')}): {low['verdict']}."
+        )
+    )
+    display(
+        page.figure(
+            drawings.heat(cells, first, second),
+            f"Mean difference over {within(first)} and {within(second)}",
+            f"{policy} − {baseline}, mean difference in points of collection ratio and "
+            f"communication; blue is ahead, orange behind. In brackets: cannot be told at "
+            f"{percent(LEVEL)} (p of the paired t test, Holm's correction for {len(cells)} cells). "
+            f"n = {span(cells['n'])} missions per cell.",
+        )
+    )
+
+# %% [markdown]
+# ## Where it loses
+#
+# A regression tree cuts the space into regions in which the difference differs most. It is grown on
+# one half of the missions, those of even replications, and judged on the other half, which had no
+# part in it: else the regions that chance favours would look real.
+
+# %%
+found = regions.rules(missions, pair.candidates)
+behind = found[found["verdict"] == "behind"]
+unsure = found[found["verdict"] == regions.OPEN]
+
+
+def region(row):
+    return f"{row['rule']} ({points(row)} points, n = {row['n']:,})"
+
+
+if not len(found):
+    text = "There are too few missions for two halves."
+elif len(behind):
+    text = (
+        f"Of {plural(len(found), 'region', 'regions')}, {policy} is **behind** in {len(behind)}: "
+        + "; ".join(region(row) for _, row in behind.iterrows())
+    )
+else:
+    text = (
+        f"{policy} is **behind in none** of the {plural(len(found), 'region', 'regions')}, at "
+        f"{percent(LEVEL)} after Holm's correction. The difference is lowest in "
+        f"{region(found.iloc[0])}"
+    )
+if len(unsure):
+    text += ". Which of the two is ahead cannot be told in: " + "; ".join(unsure["rule"])
+display(Markdown(f"{text}."))
+page.table(
+    pd.DataFrame(
+        [
+            [
+                row["rule"],
+                points(row),
+                p_value(row["p_adjusted"]),
+                row["verdict"],
+                page.interval(row["behind"], row["behind_low"], row["behind_high"]),
+                f"{row['n']:,}",
+            ]
+            for _, row in found.iterrows()
+        ],
+        columns=["Region", "Points", "p, adjusted", f"{policy} is", "Missions lost", "n"],
+    ),
+    f"The regions, on missions that did not find them: mean difference in collection ratio and "
+    f"communication and share of the missions in which {policy} is behind, with "
+    f"{percent(LEVEL)} intervals. A parameter that is not named may have any value",
+)
+
+# %% [markdown]
+# ## The worst missions
+
+# %%
+COUNT, DRAWN = 5, 2
+lowest = regions.worst(missions, COUNT)
+lost = regions.most_lost(missions.drop(lowest.index), COUNT)
+
+
+def side(row, name, end):
+    return [
+        "yes" if row[f"success{end}"] else "no",
+        regions.quotas(study, name, int(row["replication"])),
+        page.percent(row[f"collection_ratio{end}"]),
+    ]
+
+
+def listed(rows):
+    """Missions with their parameters and what both policies made of them."""
+    shorts = [parameter(field).short for field in regions.PARAMETERS]
+    outcome = ("Success", "Quotas", "Collected")
+    head = [("", name) for name in ("Mission", *shorts, "Points")]
+    head += [(name, what) for name in (policy, baseline) for what in outcome]
+    lines = [
+        [
+            f"{row['replication']:.0f}",
+            *(f"{row[field]:.3g}" for field in regions.PARAMETERS),
+            page.difference(row["difference"], 0),
+            *side(row, policy, ""),
+            *side(row, baseline, "_baseline"),
+        ]
+        for _, row in rows.iterrows()
+    ]
+    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(head))
+
+
+@cache
+def flown(name, number):
+    return fly(study, name, 0, number)
+
+
+failed = lowest.loc[lowest["success"] == 0, "replication"].tolist()
+dry = [
+    regions.stranded(flight.events, flight.scenario)
+    for flight in (flown(policy, number) for number in failed)
+]
+away = pd.concat(dry)["moves"] if dry else pd.Series(dtype=int)
+display(
+    Markdown(
+        f"The {plural(len(lowest), 'mission', 'missions')} in which {policy} has the lowest "
+        "collection ratio and communication (the product), of those alike the ones with less "
+        f"collected. It fails in {len(failed)} of them, {baseline} in "
+        f"{int((lowest['success_baseline'] == 0).sum())}."
+        + (
+            f" In its failures {plural(len(away), 'UAV runs', 'UAVs run')} dry, "
+            f"{span(away)} {'move' if away.max() == 1 else 'moves'} from the charging zone."
+            if len(away)
+            else ""
+        )
+    )
+)
+page.table(
+    listed(lowest),
+    f"The worst missions of {policy}, seed {seed}; points are the difference in the product",
+)
+
+# %%
+if len(lost):
+    display(
+        Markdown(
+            f"Of all other missions, the {len(lost)} in which {policy} is furthest behind "
+            f"{baseline}, by {-100 * lost['difference'].max():.1f} to "
+            f"{-100 * lost['difference'].min():.1f} points:"
+        )
+    )
+    display(
+        page.table(
+            listed(lost),
+            f"The greatest losses to {baseline} otherwise, seed {seed}",
+        )
+    )
+
+# %%
+numbers = pd.concat([lowest, lost])["replication"].tolist()
+display(
+    Markdown(
+        "Each can be flown again:\n\n"
+        + "\n".join(f"- `{study.replay(policy, 0, number)}`" for number in numbers)
+        + f"\n\nWith `--policy {baseline}` instead, it is the other policy in the same mission."
+    )
+)
+
+# %% [markdown]
+# ### What they look like
+
+
+# %%
+def fate(flight):
+    """Who runs dry, where and when, in words."""
+    dry = regions.stranded(flight.events, flight.scenario)
+    told = [
+        f"UAV {row.uav + 1} runs dry in slot {row.time:.0f} at ({row.x}, {row.y}), "
+        + (f"{plural(row.moves, 'move', 'moves')} from" if row.moves else "in")
+        + " the charging zone"
+        for row in dry.itertuples()
+    ]
+    return "; ".join(told) or "no UAV runs dry"
+
+
+def pictured(name, number):
+    flight = flown(name, number)
+    caption = (
+        f"{name} in mission {number}, a single one (n = 1): {fate(flight)}. "
+        f"{flight.record.collected:.0f} of {flight.record.initial + flight.record.arrived:.0f} "
+        f"data units collected in {flight.record.slots} mission slots."
+    )
+    alt = f"Map of mission {number} flown by {name}; battery, residual data and charging"
+    return figures.mission_figure(flight.events, flight.scenario), alt, caption
+
+
+for number in numbers[: min(DRAWN, len(lowest))]:
+    display(Markdown(f"**Mission {number}**: {policy}, and {baseline} in the same mission."))
+    display(page.gallery([pictured(name, number) for name in (policy, baseline)]))
+
+# %% [markdown]
+# An arrow is the move of one mission slot, in the colour of the node that is served; a cross is a
+# slot of hovering, a star one of charging. A numbered diamond is where a UAV starts, a dot where
+# its mission ends.
+
+# %% [markdown]
+# ## What a decision costs
+
+# %%
+costs = {cost.policy: cost for cost in times.costs}
+shown = [costs[name] for name in study.policies if name in costs]
+untimed = [name for name in study.policies if name not in costs]
+changed = timing.unlike(times, study.store.manifest)
+remarks = [
+    f"Not timed: {page.words(untimed)}." if untimed else "",
+    f"Timed with other code or weights than those of the study: {page.words(changed)}."
+    if changed
+    else "",
+]
+ratio = (
+    f" {policy} takes {costs[policy].median / costs[baseline].median:,.3g} times as long as "
+    f"{baseline} for one mission, by the medians."
+    if policy in costs and baseline in costs
+    else ""
+)
+display(
+    Markdown(
+        "A policy is asked once in a mission slot for all UAVs of a mission that must act. Timed "
+        "is this call alone, with all that the policy works out from what it sees, over "
+        f"{plural(times.missions, 'mission', 'missions')} of the scenario {times.scenario}; and "
+        "the same missions all at once in the batch engine, where a call decides for many. Times "
+        f"are of one machine ({times.processor}, {plural(times.threads, 'thread', 'threads')}) and "
+        "will differ on another." + ratio + "".join(f" {remark}" for remark in remarks if remark)
+    )
+)
+page.figure(
+    drawings.decision_time(shown or times.costs, study.policies),
+    "Time of a decision of every policy, for one mission and in the batch",
+    f"n = {min(cost.calls for cost in shown or times.costs):,} calls or more per policy, on a "
+    f"logarithmic axis. A line goes from the median to what {percent(timing.SLOW)} of the calls "
+    "keep below: the spread of the calls, not an interval of their mean.",
+)
+
+# %%
+page.table(
+    pd.DataFrame(
+        [
+            [
+                cost.policy,
+                drawings.duration(cost.median),
+                drawings.duration(cost.slow),
+                f"{cost.rows / cost.calls:.2f}",
+                f"{cost.calls:,}",
+                drawings.duration(cost.batch),
+                f"{cost.batch_rows:,}",
+            ]
+            for cost in shown or times.costs
+        ],
+        columns=pd.MultiIndex.from_tuples(
+            [
+                ("", "Policy"),
+                *(("One mission, a call", c) for c in ("median", "95 % below", "UAVs", "calls")),
+                *(("Many missions", c) for c in ("per UAV", "UAVs")),
+            ]
+        ),
+    ),
+    f"Times of decisions; in the batch the middle one of {timing.ROUNDS} rounds",
+)
+
+# %%
+slowest = max(shown or times.costs, key=lambda cost: cost.slow)
+cell = times.space.cell_size
+display(
+    Markdown(
+        "Is that fast enough? A decision must be ready within a mission slot. The model gives a "
+        f"slot no length in seconds; but in one, a UAV flies a cell of {cell:g} m, so a UAV of v "
+        f"m/s gives {cell:g}/v seconds to decide. The slowest policy here, {slowest.policy}, needs "
+        f"no more than {drawings.duration(slowest.slow)} in {percent(timing.SLOW)} of its calls: "
+        f"enough up to about {float(f'{cell / slowest.slow:.2g}'):,.0f} m/s, on this processor."
+    )
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+page.provenance([study])
+
+# %%
+page.table(
+    pd.DataFrame(
+        {
+            "Scenario": times.scenario,
+            "Missions": f"{times.missions:,}",
+            "Seed": times.seed,
+            "Processor": f"{times.processor}, {plural(times.cores, 'core', 'cores')}",
+            "Threads": times.threads,
+            "dess": times.version,
+            "Code": times.code[:12],
+            "Commit": (times.commit or "unknown")[:12],
+            "Libraries": ", ".join(f"{name} {v}" for name, v in times.libraries.items()),
+        }.items(),
+        columns=["Timing", "of decisions"],
+    ),
+    wrap=True,
+)

@@ -1,0 +1,44 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [table4, fig4, fig5, sweet-spot]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Replication scorecard
+#
+# Every claim of the paper's Section V beside what the simulations here found, with a verdict that a
+# stated rule computes.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder with the results folders of table4, fig4, fig5 and sweet-spot
+trained = None  # folder with the learning curves; None for those shipped
+
+# %%
+from importlib.resources import files
+from pathlib import Path
+
+import pandas as pd
+
+from analysis import load_results
+from analysis.scorecard import scorecard
+from reports import page
+from reports import scorecard as layout
+
+folder = Path(trained or str(files("policies") / "trained"))
+names = ("table4", "fig4", "fig5", "sweet-spot")
+studies = {name: load_results(Path(results) / name) for name in names}
+layout.scorecard(scorecard(studies, pd.read_parquet(folder / "curves.parquet")))
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+page.weights(folder)
+
+# %%
+page.provenance(studies.values())

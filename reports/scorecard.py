@@ -1,0 +1,141 @@
+"""The replication scorecard as HTML: a table, and on a phone a card per claim."""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Sequence
+from itertools import groupby
+from typing import Any
+
+from IPython.display import HTML
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup, escape
+
+from analysis import paper
+from analysis.case import Finding, Quantity
+from analysis.claims import FAILS, HOLDS, IN_PART, NO_RESULTS, VERDICTS
+from analysis.scorecard import Row
+from reports import page
+
+COLUMNS = {"learned": "The best learned policy", "paper_means": "The paper's own means"}
+
+# Verdict -> class and sign: never told by colour alone.
+_LOOK = {
+    HOLDS: ("holds", "✓"),
+    IN_PART: ("in-part", "◐"),
+    FAILS: ("fails", "✗"),
+    NO_RESULTS: ("none", "–"),
+}
+_AGAINST = {
+    paper.ABOVE: "wholly above the paper's figure",
+    paper.LEVEL: "around the paper's figure",
+    paper.BELOW: "wholly below the paper's figure",
+}
+
+
+def scorecard(rows: Sequence[Row], pages: Collection[str] | None = None) -> HTML:
+    """The scorecard.
+
+    Args:
+        rows: As of ``analysis.scorecard.scorecard``.
+        pages: File names of the pages that there are, to link to; None for all.
+    """
+    environment = Environment(
+        loader=PackageLoader("reports", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        finalize=_with_subscripts,
+    )
+    usual = {column: _usual(getattr(row, column) for row in rows) for column in COLUMNS}
+    titles = {
+        column: f"{name} ({usual[column]})" if usual[column] else name
+        for column, name in COLUMNS.items()
+    }
+    parts = [
+        (part, [_claim(row, pages, usual) for row in own])
+        for part, own in groupby(rows, key=lambda row: row.part)
+    ]
+    html = environment.get_template("scorecard.html").render(
+        explanation=_EXPLANATION,
+        counts=[_count(rows, column, title) for column, title in titles.items()],
+        titles=[*titles.values()],
+        parts=parts,
+        badge=_badge,
+    )
+    return HTML(html)
+
+
+_EXPLANATION = (
+    "What Section V of the paper claims, and whether it is so here. Every verdict is computed from "
+    "results by the rule that stands with the claim; intervals are of 95 % unless it says "
+    "otherwise. A figure of the paper holds if it is reached; better ones hold, too."
+)
+
+
+def _claim(row: Row, pages: Collection[str] | None, usual: dict[str, str]) -> dict[str, Any]:
+    return {
+        "text": row.claim,
+        "place": row.place,
+        "page": row.page if pages is None or row.page in pages else "",
+        "rule": row.rule,
+        "printed": [*map(_shown, row.printed)],
+        "findings": [_finding(getattr(row, column), usual[column]) for column in COLUMNS],
+    }
+
+
+def _finding(finding: Finding, usual: str) -> dict[str, Any]:
+    whose = f"of {finding.policy}" if finding.policy not in ("", usual) else ""
+    notes = (_AGAINST.get(finding.against, ""), finding.note, whose)
+    return {
+        "verdict": finding.verdict,
+        "figures": [*map(_shown, finding.quantities)],
+        "notes": [note for note in notes if note],
+    }
+
+
+def _shown(quantity: Quantity) -> Markup:
+    """``name: 97.3 % [96.1, 98.1] (n = 300)``, numbers on one line each."""
+    name = f"{quantity.name}: " if quantity.name else ""
+    number = f"(n = {quantity.n:,})" if quantity.n else ""
+    return Markup("{}<span>{}</span> <span>{}</span>").format(name, _figure(quantity), number)
+
+
+def _figure(quantity: Quantity) -> str:
+    value, low, high = quantity.interval
+    spread = low < high
+    match quantity.unit:
+        case "share":
+            return page.interval(value, low, high) if spread else page.percent(value)
+        case "points":
+            text = page.points(value, low, high) if spread else page.difference(value, 0)
+            return f"{text} points"
+        case "reward":
+            ends = [f"{end:+,.0f}".replace("-", "−") for end in (value, low, high)]
+            return f"{ends[0]} [{ends[1]}, {ends[2]}]" if spread else ends[0]
+        case "steps":
+            return f"{value:,.0f} steps"
+    return f"{value:g}"
+
+
+def _usual(findings: Iterable[Finding]) -> str:
+    """The policy of most findings."""
+    named = Counter(finding.policy for finding in findings if finding.policy)
+    return named.most_common(1)[0][0] if named else ""
+
+
+def _count(rows: Sequence[Row], column: str, title: str) -> dict[str, Any]:
+    """How often every verdict is given."""
+    given = Counter(getattr(row, column).verdict for row in rows)
+    verdicts = [{"verdict": v, "number": given[v]} for v in VERDICTS if given[v]]
+    return {"title": title, "total": len(rows), "verdicts": verdicts}
+
+
+def _badge(verdict: str) -> Markup:
+    look, sign = _LOOK[verdict]
+    return Markup('<span class="verdict {}">{} {}</span>').format(look, sign, verdict)
+
+
+def _with_subscripts(value: Any) -> Any:
+    """Text with ``C_S`` as a C with an index."""
+    if isinstance(value, str) and re.search(r"\bC_[SC]\b", value):
+        return Markup(re.sub(r"\bC_([SC])\b", r"C<sub>\1</sub>", str(escape(value))))
+    return value

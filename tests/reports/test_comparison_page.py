@@ -1,0 +1,166 @@
+"""The page of the comparison says what its missions say, and takes no times of its own."""
+
+import ast
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import IPython.display
+import pytest
+
+import reports.render
+from analysis import findings, load_results, load_study, regions, run_study, timing
+from analysis.comparison_figures import duration
+from dess import InputError
+from reports import notebook, page
+from reports.render import render
+from tests.reports.small import EMBEDDED, Links, words_of
+
+NAME = "comparison"
+POLICIES = ["random", "greedy", "nearest", "ddqn"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _known() -> Any:
+    """Only this report is known."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (notebook, reports.render):
+            patch.setattr(module, "NAMES", (NAME,))
+        yield
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results")
+    run_study(load_study(NAME, policies=POLICIES, missions=120), folder / NAME)
+    timing.write(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
+    return folder
+
+
+def said(results: Path, **parameters: str) -> str:
+    """What the notebook says, run here and not drawn, which saves many seconds."""
+    report, shown, scope = notebook.read(NAME), [], {}
+    report.set({"results": str(results), **parameters})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(IPython.display, "display", shown.append)
+        patch.setattr(page, "svg", lambda drawing: b"")
+        for cell in report.cells:
+            tree = ast.parse(cell.source)
+            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+            exec(compile(tree, NAME, "exec"), scope)
+            if last:
+                shown.append(eval(compile(ast.Expression(last.value), NAME, "eval"), scope))
+    text = " ".join(EMBEDDED.sub("", piece.data) for piece in shown if piece is not None)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)).replace("**", "")
+
+
+@pytest.fixture(scope="module")
+def html(results: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    out = tmp_path_factory.mktemp("out")
+    render([NAME], results, out)
+    return (out / f"{NAME}.html").read_text("utf-8")
+
+
+def with_studies_of(results: Path, folder: Path, **changes: Any) -> Path:
+    """Results of other missions, with the same times."""
+    folder.mkdir()
+    (folder / "timing").symlink_to(results / "timing")
+    run_study(load_study(NAME, **changes), folder / NAME)
+    return folder
+
+
+def test_the_page_is_whole_and_loads_nothing(html: str, results: Path) -> None:
+    links = Links(html)
+    assert not {"link", "iframe", "object"} & links.tags
+    for target in links.found:
+        assert target.startswith("data:image/svg+xml;base64,") or target in (
+            "index.html",
+            f"{NAME}.ipynb",
+        )
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
+    assert len(captions) == html.count("<figure>") == html.count("<img ") == 1 + 5 + 1 + 4 + 1
+    assert all(re.search(r"\bn = [\d,]+\b", caption) for caption in captions)
+    assert not re.search(r"Traceback|Warning|stderr|Figure\(|\bnan\b|NaN|None", words_of(html))
+    assert str(results) not in html and str(Path(page.__file__).parents[1]) not in html
+
+
+def test_the_page_says_what_the_missions_say(html: str, results: Path) -> None:
+    text, study = words_of(html), load_results(results / NAME)
+    pair = regions.pair_of(study)
+    assert (pair.policy, pair.candidates) == ("ddqn", 3)
+    best = "the best policy of the study that has not learned"
+    assert f"ddqn is the best learned policy of the study, {pair.baseline} {best};" in text
+    for table in (findings.learned_against_heuristic(study), findings.comparisons(study)):
+        for _, row in table.iterrows():
+            assert page.points(row["difference"], row["low"], row["high"]) in text
+    missions = regions.duels(study, pair)
+    for row in regions.outcomes(missions).itertuples():
+        assert f"{row.outcome} in {page.interval(row.share, row.low, row.high)}" in text
+    for row in regions.rules(missions, pair.candidates).itertuples():
+        assert f"{row.rule} {page.points(row.mean, row.low, row.high)}" in text
+    lead = regions.along(missions, pair.candidates)
+    verdicts = lead["verdict"].value_counts()
+    assert f"Of these {len(lead)} bins, ddqn is ahead in {verdicts.get('ahead', 0)}" in text
+
+
+def test_the_worst_missions_can_be_flown_again(html: str, results: Path) -> None:
+    text, study = words_of(html), load_results(results / NAME)
+    pair = regions.pair_of(study)
+    missions = regions.duels(study, pair)
+    worst = regions.worst(missions, 5)
+    for number in worst["replication"]:
+        assert study.replay("ddqn", 0, number) in text
+    for number in worst["replication"][:2]:
+        assert f"Mission {number} : ddqn, and {pair.baseline} in the same mission." in text
+
+
+def test_the_times_are_those_that_were_kept(html: str, results: Path) -> None:
+    text, times = words_of(html), timing.read(results / "timing")
+    for cost in times.costs:
+        shown = f"{cost.policy} {duration(cost.median)} {duration(cost.slow)}"
+        assert f"{shown} {cost.rows / cost.calls:.2f} {cost.calls:,}" in text
+    assert "Not timed: random and nearest." in text
+    assert times.processor in text
+    assert "with other code or weights" not in text
+
+
+def test_times_of_other_code_are_told(results: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "results"
+    (folder / "timing").mkdir(parents=True)
+    (folder / NAME).symlink_to(results / NAME)
+    data = json.loads((results / "timing" / "timing.json").read_text("utf-8"))
+    (folder / "timing" / "timing.json").write_text(json.dumps(data | {"code": "other"}))
+    text = said(folder)
+    assert "with other code or weights than those of the study: greedy and ddqn." in text
+
+
+def test_without_times_it_says_how_to_take_them(results: Path, tmp_path: Path) -> None:
+    (tmp_path / NAME).symlink_to(results / NAME)
+    with pytest.raises(InputError, match=r"timing.json: no such file; .*: dess timing --out /"):
+        said(tmp_path)
+
+
+def test_policies_can_be_chosen(results: Path) -> None:
+    text = said(results, learned="random", heuristic="nearest")
+    assert "random is a policy of the study that has not learned, nearest a policy" in text
+    assert "random minus nearest" in text
+    assert re.search(r"random is behind nearest in [^.]*collection ratio", text)
+    with pytest.raises(InputError, match="learned: 'none' is not in the study; allowed: "):
+        said(results, learned="none")
+
+
+def test_few_missions_and_no_learned_policy_make_a_page(results: Path, tmp_path: Path) -> None:
+    folder = with_studies_of(
+        results, tmp_path / "results", policies=["random", "greedy"], missions=3
+    )
+    text = said(folder)
+    assert "greedy minus random" in text
+    assert "one training" not in text
+    assert not re.search(r"Traceback|Warning|\bnan\b|NaN|None|\binf\b", text)
+
+
+def test_a_single_policy_is_refused_in_a_line(results: Path, tmp_path: Path) -> None:
+    folder = with_studies_of(results, tmp_path / "results", policies=["greedy"], missions=3)
+    with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
+        said(folder)

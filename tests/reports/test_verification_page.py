@@ -1,0 +1,159 @@
+"""The page of the verification says what the checks found, and says so when something is wrong."""
+
+import ast
+import re
+from pathlib import Path
+from typing import Any
+
+import IPython.display
+import pytest
+
+import reports.render
+from analysis import jobs, load_results, load_study, run_study
+from analysis.effects import HOLDS, REFUTED
+from dess import simulate, simulate_batch
+from dess.scenario import ScenarioSpace
+from reports import notebook, stress
+from reports.render import render
+from tests.reports.small import EMBEDDED
+
+NAME = "verification"
+SMALL: dict[str, Any] = {"missions": 300, "logged": 6}
+QUICK = {"again": 2, "block": 20}
+# How many cells to run: parameters, those set here, the checks, and what came of them; or all.
+SUMMARY, ALL = 4, 99
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _known() -> Any:
+    """Only this report is known."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (notebook, reports.render):
+            patch.setattr(module, "NAMES", (NAME,))
+        yield
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results")
+    run_study(load_study(NAME, **SMALL), folder / NAME)
+    run_study(load_study("fig4", policies=["random"], missions=2), folder / "fig4")
+    return folder
+
+
+def shown(results: Path, cells: int, **parameters: Any) -> str:
+    """What the first cells of the notebook show, run here: a kernel of its own takes seconds."""
+    report, pieces, scope = notebook.read(NAME), [], {}
+    report.set({"results": str(results), **QUICK, **parameters})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(IPython.display, "display", pieces.append)
+        for cell in report.cells[:cells]:
+            tree = ast.parse(cell.source)
+            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+            exec(compile(tree, NAME, "exec"), scope)
+            if last:
+                pieces.append(eval(compile(ast.Expression(last.value), NAME, "eval"), scope))
+    return "\n".join(EMBEDDED.sub("", piece.data) for piece in pieces if piece is not None)
+
+
+def words(html: str) -> str:
+    bare = re.sub(r"<script.*?</script>|<[^>]+>", " ", html, flags=re.S)
+    return re.sub(r"\s+", " ", bare).replace("**", "")
+
+
+def said(results: Path, cells: int) -> str:
+    return words(shown(results, cells))
+
+
+@pytest.fixture(scope="module")
+def html(results: Path) -> str:
+    return shown(results, ALL)
+
+
+def test_every_figure_has_a_caption_with_its_number(html: str) -> None:
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
+    assert len(captions) == html.count("<figure>") == html.count("<img ")
+    assert len(captions) == 3 + 1 + 4 + 1 + 3 + 1
+    assert all(re.search(r"\bn\b", caption) for caption in captions)
+
+
+def test_sound_results_hold(html: str) -> None:
+    text = words(html)
+    found = re.search(r"(\d+) of (\d+) checks hold", text)
+    assert found and int(found[2]) > 25
+    assert REFUTED not in text
+    assert text.count(f" {HOLDS} ") >= int(found[1])
+    assert "4 of 4 missions" in text  # two policies, flown again
+    assert "Every mission of 2 studies" in text and "fig4" in text
+    assert not re.search(r"Figure\(|\bnan\b|NaN|None\b", text)
+
+
+def test_the_checklist_is_on_the_page(html: str, results: Path) -> None:
+    for item in stress.report(load_results(results / NAME).manifest):
+        assert f"**{item.number} {item.name}.**" in html
+
+
+@pytest.mark.slow
+def test_the_same_results_give_the_same_bytes(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    render([NAME], results, tmp_path / "once", parameters=QUICK)
+    monkeypatch.setenv("TZ", "Pacific/Auckland")
+    monkeypatch.setenv("PYTHONHASHSEED", "7")
+    (tmp_path / "elsewhere").symlink_to(results)
+    render([NAME], tmp_path / "elsewhere", tmp_path / "again", parameters=QUICK)
+    once, again = ((tmp_path / out / f"{NAME}.html").read_text() for out in ("once", "again"))
+    assert once == again and str(tmp_path) not in once
+
+
+def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Path:
+    """Results of the study, of a simulator whose scenario is another one than it says."""
+
+    def other(space: Any) -> Any:
+        return (
+            [*map(other, space)] if isinstance(space, list) else ScenarioSpace.of(space, **changes)
+        )
+
+    with monkeypatch.context() as patch:
+        patch.setattr(jobs, "simulate_batch", lambda s, *a, **k: simulate_batch(other(s), *a, **k))
+        patch.setattr(jobs, "simulate", lambda s, *a, **k: simulate(other(s), *a, **k))
+        run_study(load_study(NAME, **SMALL | {"policies": ["greedy"]}), folder / NAME)
+    return folder
+
+
+def test_another_simulator_is_found_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    changes = {"arrival_rate": 0.03, "edge_snr": -24.0, "charge_rate": 11, "uavs": [1, 2]}
+    text = said(run_with(tmp_path, monkeypatch, **changes), SUMMARY)
+    counted = re.search(r"(\d+) of \d+ checks do not hold: ([^.]*)\.", text)
+    tests = (
+        "Arrivals of all missions: rate per node and slot",
+        "Data of a communication",
+        "Battery of every UAV in every slot",
+        "Number of UAVs: chi-square",
+        "Record of the batch engine, flown again with SimPy",
+    )
+    assert counted and int(counted[1]) >= len(tests)
+    for test in tests:
+        assert test in counted[2]
+        assert f"{test} {REFUTED}" in text
+    for test in ("Flying time: chi-square", "Every node of every log"):  # all else is as it was
+        assert f"{test} {HOLDS}" in text
+
+
+def test_too_few_missions_are_not_taken_for_a_proof(tmp_path: Path) -> None:
+    run_study(load_study(NAME, policies=["random"], missions=3, logged=1), tmp_path / NAME)
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "manifest.json").write_text("{}")
+    text = said(tmp_path, ALL)
+    assert "the others cannot be told" in text
+    assert "Too few observations for" in text
+    assert "not read, incomplete or of other code: broken" in text
+    assert REFUTED not in text and "Policies meet the same sea" not in text
+
+
+def test_without_logs_the_missions_are_still_checked(tmp_path: Path) -> None:
+    run_study(load_study(NAME, policies=["random"], missions=100, logged=0), tmp_path / NAME)
+    text = said(tmp_path, SUMMARY)
+    assert REFUTED not in text
+    assert f"Arrivals of all missions: rate per node and slot {HOLDS}" in text
+    assert "Battery of every UAV in every slot cannot be told" in text
