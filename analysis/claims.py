@@ -66,13 +66,13 @@ def lower(difference: Interval) -> str:
 
 SLIGHTLY_LOWER = (
     "Holds if the whole interval of the difference is below 0 and above "
-    f"−{100 * NEAR:g} points; in part if only the mean difference is below 0."
+    f"−{100 * NEAR:g} points; does not hold if all of it is elsewhere; else in part."
 )
 
 
 def slightly_lower(difference: Interval) -> str:
     """Whether something falls, but not by much."""
-    if difference.mean >= 0:
+    if difference.low >= 0 or difference.high <= -NEAR:
         return FAILS
     return HOLDS if -NEAR < difference.low <= difference.high < 0 else IN_PART
 

@@ -126,8 +126,8 @@ def _classes(fit: Fit) -> str:
     rows = fit.table.head(3)
     if not fit.n:
         return ""
-    parts = [f"{row.label}: {100 * row.observed / fit.n:.3g} %" for row in rows.itertuples()]
-    expected = " / ".join(f"{100 * each / fit.n:.3g}" for each in rows["expected"])
+    parts = [f"{row.label}: {100 * row.observed / fit.n:.2f} %" for row in rows.itertuples()]
+    expected = " / ".join(f"{100 * each / fit.n:.2f}" for each in rows["expected"])
     return f"{', '.join(parts)}; expected {expected} %"
 
 

@@ -49,6 +49,49 @@ scenarios = [
 ]
 
 # %% [markdown]
+# ## One UAV on a small map: the paper's Fig. 1
+
+# %%
+ranked = summary(example.missions, by=["policy"])
+ranked = ranked[ranked["metric"] == "collection_ratio_and_communication"].set_index("policy")
+pilot = ranked["mean"].idxmax()
+flown = example.missions.query("policy == @pilot and replication == @replication").iloc[0]
+log = example.events(pilot, 0, replication)
+small = example.scenario().scenario_at(**{key: int(flown[key]) for key in SAMPLED})
+display(
+    Markdown(
+        f"A map of {small.grid} x {small.grid} cells with {len(small.nodes)} nodes. The paper "
+        "draws this example without numbers, so there is nothing to compare with; the mission "
+        f"here is flown by **{pilot}**, of {page.words(example.policies)} the best by collection "
+        f"ratio and communication: {page.interval(*ranked.loc[pilot, ['mean', 'low', 'high']])}, "
+        f"n = {ranked.loc[pilot, 'n']:,} missions. What is learned is learned on one map, so no "
+        "learned policy can fly it."
+    )
+)
+page.gallery(
+    [
+        (
+            figures.mission_figure(log, small),
+            "Map of the mission; battery, residual data and charging",
+            f"n = 1 mission, replication {replication} of seed {example.manifest['seed']}: "
+            f"{flown['slots']} mission slots, {flown['collected']:.0f} of "
+            f"{flown['initial'] + flown['arrived']:.0f} data units collected.",
+        )
+    ]
+)
+
+# %% [markdown]
+# **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
+# in the colour of the node that was served in most of the slot's communication slots (the last of
+# them on a tie); grey where none was. A cross is a slot of hovering, in the same colours, a star a
+# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs
+# that share a path are drawn side by side. y grows south.
+#
+# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to
+# charge, C<sub>C</sub> the one at which charging ends. A band of residual data is one node, in its
+# colour; bands that stay are nodes that nobody has emptied.
+
+# %% [markdown]
 # ## From one to three UAVs: the paper's Fig. 4
 
 # %%
@@ -82,17 +125,6 @@ def captioned(point):
 
 
 page.gallery([captioned(point) for point in points])
-
-# %% [markdown]
-# **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
-# in the colour of the node that was served in most of the slot's communication slots (the last of
-# them on a tie); grey where none was. A cross is a slot of hovering, in the same colours, a star a
-# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs
-# that share a path are drawn side by side. y grows south.
-#
-# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to
-# charge, C<sub>C</sub> the one at which charging ends. A band of residual data is one node, in its
-# colour; bands that stay are nodes that nobody has emptied.
 
 # %% [markdown]
 # ## Slot by slot
@@ -166,38 +198,6 @@ page.table(
         }
     ),
     "Communications are the communication slots that count toward the quota",
-)
-
-# %% [markdown]
-# ## One UAV on a small map: the paper's Fig. 1
-
-# %%
-ranked = summary(example.missions, by=["policy"])
-ranked = ranked[ranked["metric"] == "collection_ratio_and_communication"].set_index("policy")
-pilot = ranked["mean"].idxmax()
-flown = example.missions.query("policy == @pilot and replication == @replication").iloc[0]
-log = example.events(pilot, 0, replication)
-small = example.scenario().scenario_at(**{key: int(flown[key]) for key in SAMPLED})
-display(
-    Markdown(
-        f"A map of {small.grid} x {small.grid} cells with {len(small.nodes)} nodes. The paper "
-        "draws this example without numbers, so there is nothing to compare with; the mission "
-        f"here is flown by **{pilot}**, of {page.words(example.policies)} the best by collection "
-        f"ratio and communication: {page.interval(*ranked.loc[pilot, ['mean', 'low', 'high']])}, "
-        f"n = {ranked.loc[pilot, 'n']:,} missions. What is learned is learned on one map, so no "
-        "learned policy can fly it."
-    )
-)
-page.gallery(
-    [
-        (
-            figures.mission_figure(log, small),
-            "Map of the mission; battery, residual data and charging",
-            f"n = 1 mission, replication {replication} of seed {example.manifest['seed']}: "
-            f"{flown['slots']} mission slots, {flown['collected']:.0f} of "
-            f"{flown['initial'] + flown['arrived']:.0f} data units collected.",
-        )
-    ]
 )
 
 # %% [markdown]

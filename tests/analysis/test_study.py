@@ -8,7 +8,8 @@ from tests.analysis.small import grid, small_study, write_scenario
 
 
 def test_the_shipped_studies():
-    names = ["comparison", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"]
+    names = ["comparison", "fig1", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"]
+    names.append("verification")
     assert study_names() == names
     assert [load_study(name).name for name in names] == names
     table4, fig4 = load_study("table4"), load_study("fig4")

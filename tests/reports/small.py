@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-from analysis import load_study, run_study
+from analysis import load_study, run_study, timing
 from reports.player import library
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
@@ -16,6 +16,8 @@ RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 6
 STUDIES: dict[str, dict[str, Any]] = {
     "table4": {"policies": POLICIES, "missions": 40},
     "fig1": {"missions": 8},
+    "comparison": {"policies": POLICIES, "missions": 40},
+    "verification": {"missions": 200, "logged": 8},
     "fig4": {"policies": POLICIES, "missions": 8},
     "fig5": {"policies": POLICIES, "missions": 8},
     "sweet-spot": {
@@ -36,9 +38,11 @@ STUDIES: dict[str, dict[str, Any]] = {
 
 
 def run_small_studies(folder: Path, *names: str) -> Path:
-    """Run the studies, all or some, each into a folder of its name."""
+    """Run the studies, all or some, each into a folder of its name; with all, a timing."""
     for name in names or STUDIES:
         run_study(load_study(name, **STUDIES[name]), folder / name)
+    if not names:
+        timing.write(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
     return folder
 
 

@@ -158,7 +158,10 @@ def test_what_there_is(dess):
     for command, names in {
         "policies": ["random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"],
         "scenarios": ["fig1", "fig4", "paper"],
-        "studies": ["comparison", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"],
+        "studies": [
+            *("comparison", "fig1", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"),
+            "verification",
+        ],
     }.items():
         code, out, err = dess(command)
         assert (code, err) == (0, "")

@@ -9,7 +9,6 @@ from typing import Any
 import IPython.display
 import pytest
 
-import reports.render
 from analysis import findings, load_results, load_study, regions, run_study, timing
 from analysis.comparison_figures import duration
 from dess import InputError
@@ -19,15 +18,6 @@ from tests.reports.small import EMBEDDED, Links, words_of
 
 NAME = "comparison"
 POLICIES = ["random", "greedy", "nearest", "ddqn"]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _known() -> Any:
-    """Only this report is known."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (notebook, reports.render):
-            patch.setattr(module, "NAMES", (NAME,))
-        yield
 
 
 @pytest.fixture(scope="module")
