@@ -1,12 +1,18 @@
 """Small results of the studies that the reports read, and what is looked for in pages."""
 
+import ast
 import re
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
+import IPython.display
+import pytest
+
 from analysis import load_study, run_study, timing
+from reports import page
+from reports.notebook import read
 from reports.player import library
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
@@ -73,5 +79,35 @@ class Links(HTMLParser):
 
 def words_of(html: str) -> str:
     """The words of a page, without its drawings, its scripts and its code."""
-    main = Links(html).outside_scripts.split("<main")[1].split('<details class="code">')[0]
-    return unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", main)))
+    main = html.split("<main")[1].split('<details class="code">')[0]
+    return words(Links(main).outside_scripts)
+
+
+def words(html: str) -> str:
+    """The words of a piece of a page, be it of HTML or Markdown."""
+    bare = re.sub(r"<script.*?</script>|<[^>]+>", " ", html, flags=re.S)
+    return unescape(re.sub(r"\s+", " ", bare)).replace("**", "")
+
+
+def shown_by(name: str, cells: int | None = None, **parameters: Any) -> str:
+    """What the first cells of a notebook show, or all; run here, and nothing drawn.
+
+    A kernel of its own and the drawings take most of the time that a page takes.
+    """
+    report, shown, scope = read(name), [], {}
+    report.set(parameters)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(IPython.display, "display", shown.append)
+        patch.setattr(page, "svg", lambda drawing: b"")
+        for cell in report.cells[:cells]:
+            tree = ast.parse(cell.source)
+            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+            exec(compile(tree, name, "exec"), scope)
+            if last:
+                shown.append(eval(compile(ast.Expression(last.value), name, "eval"), scope))
+    return "\n".join(piece.data for piece in shown if piece is not None)
+
+
+def said_by(name: str, cells: int | None = None, **parameters: Any) -> str:
+    """The words of what a notebook shows."""
+    return words(shown_by(name, cells, **parameters))

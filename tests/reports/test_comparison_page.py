@@ -1,20 +1,17 @@
 """The page of the comparison says what its missions say, and takes no times of its own."""
 
-import ast
 import json
 import re
 from pathlib import Path
 from typing import Any
 
-import IPython.display
 import pytest
 
 from analysis import findings, load_results, load_study, regions, run_study, timing
 from analysis.comparison_figures import duration
 from dess import InputError
-from reports import notebook, page
-from reports.render import render
-from tests.reports.small import EMBEDDED, Links, words_of
+from reports import page
+from tests.reports.small import said_by
 
 NAME = "comparison"
 POLICIES = ["random", "greedy", "nearest", "ddqn"]
@@ -29,27 +26,12 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def said(results: Path, **parameters: str) -> str:
-    """What the notebook says, run here and not drawn, which saves many seconds."""
-    report, shown, scope = notebook.read(NAME), [], {}
-    report.set({"results": str(results), **parameters})
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(IPython.display, "display", shown.append)
-        patch.setattr(page, "svg", lambda drawing: b"")
-        for cell in report.cells:
-            tree = ast.parse(cell.source)
-            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-            exec(compile(tree, NAME, "exec"), scope)
-            if last:
-                shown.append(eval(compile(ast.Expression(last.value), NAME, "eval"), scope))
-    text = " ".join(EMBEDDED.sub("", piece.data) for piece in shown if piece is not None)
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)).replace("**", "")
+    return said_by(NAME, results=str(results), **parameters)
 
 
 @pytest.fixture(scope="module")
-def html(results: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
-    out = tmp_path_factory.mktemp("out")
-    render([NAME], results, out)
-    return (out / f"{NAME}.html").read_text("utf-8")
+def text(results: Path) -> str:
+    return said(results)
 
 
 def with_studies_of(results: Path, folder: Path, **changes: Any) -> Path:
@@ -60,23 +42,8 @@ def with_studies_of(results: Path, folder: Path, **changes: Any) -> Path:
     return folder
 
 
-def test_the_page_is_whole_and_loads_nothing(html: str, results: Path) -> None:
-    links = Links(html)
-    assert not {"link", "iframe", "object"} & links.tags
-    for target in links.found:
-        assert target.startswith("data:image/svg+xml;base64,") or target in (
-            "index.html",
-            f"{NAME}.ipynb",
-        )
-    captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
-    assert len(captions) == html.count("<figure>") == html.count("<img ") == 1 + 5 + 1 + 4 + 1
-    assert all(re.search(r"\bn = [\d,]+\b", caption) for caption in captions)
-    assert not re.search(r"Traceback|Warning|stderr|Figure\(|\bnan\b|NaN|None", words_of(html))
-    assert str(results) not in html and str(Path(page.__file__).parents[1]) not in html
-
-
-def test_the_page_says_what_the_missions_say(html: str, results: Path) -> None:
-    text, study = words_of(html), load_results(results / NAME)
+def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
+    study = load_results(results / NAME)
     pair = regions.pair_of(study)
     assert (pair.policy, pair.candidates) == ("ddqn", 3)
     best = "the best policy of the study that has not learned"
@@ -94,19 +61,19 @@ def test_the_page_says_what_the_missions_say(html: str, results: Path) -> None:
     assert f"Of these {len(lead)} bins, ddqn is ahead in {verdicts.get('ahead', 0)}" in text
 
 
-def test_the_worst_missions_can_be_flown_again(html: str, results: Path) -> None:
-    text, study = words_of(html), load_results(results / NAME)
+def test_the_worst_missions_can_be_flown_again(text: str, results: Path) -> None:
+    study = load_results(results / NAME)
     pair = regions.pair_of(study)
     missions = regions.duels(study, pair)
     worst = regions.worst(missions, 5)
     for number in worst["replication"]:
         assert study.replay("ddqn", 0, number) in text
     for number in worst["replication"][:2]:
-        assert f"Mission {number} : ddqn, and {pair.baseline} in the same mission." in text
+        assert f"Mission {number}: ddqn, and {pair.baseline} in the same mission." in text
 
 
-def test_the_times_are_those_that_were_kept(html: str, results: Path) -> None:
-    text, times = words_of(html), timing.read(results / "timing")
+def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:
+    times = timing.read(results / "timing")
     for cost in times.costs:
         shown = f"{cost.policy} {duration(cost.median)} {duration(cost.slow)}"
         assert f"{shown} {cost.rows / cost.calls:.2f} {cost.calls:,}" in text

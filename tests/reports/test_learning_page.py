@@ -8,22 +8,15 @@ import pandas as pd
 from analysis import curves
 from policies.registry import TRAINED
 from reports import page
-from reports.render import render
-from tests.reports.small import words_of
+from tests.reports.small import said_by
 
 PRODUCT = "collection_ratio_and_communication"
 
 
-def rendered(out: Path, **parameters: str) -> str:
-    """The words of the page."""
-    render(["learning"], out / "results", out, parameters=parameters)
-    return words_of((out / "learning.html").read_text("utf-8"))
-
-
-def test_the_learning_page_tells_the_ablation(tmp_path: Path) -> None:
+def test_the_learning_page_tells_the_ablation() -> None:
     last = curves.finals(pd.read_parquet(TRAINED / "curves.parquet"))
     table = curves.ablation(last, f"final_{PRODUCT}", "quick")
-    text = rendered(tmp_path)
+    text = said_by("learning")
     for row in table.itertuples():
         shown = page.percent(row.mean)
         if row.low < row.high:
@@ -50,7 +43,7 @@ def test_the_learning_page_judges_by_the_curves_it_is_given(tmp_path: Path) -> N
     ]
     pd.DataFrame(rows).to_parquet(tmp_path / "curves.parquet")
     (tmp_path / "ddqn").symlink_to(TRAINED / "ddqn")
-    text = rendered(tmp_path / "out", trained=str(tmp_path))
-    assert "By this rule the claim holds , in all 2 comparisons." in text
-    assert text.count("holds : is above in all of phase II") == 2
-    assert "worse : no transfer" in text
+    text = said_by("learning", trained=str(tmp_path))
+    assert "By this rule the claim holds, in all 2 comparisons." in text
+    assert text.count("holds: is above in all of phase II") == 2
+    assert "worse: no transfer" in text

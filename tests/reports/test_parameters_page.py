@@ -7,8 +7,7 @@ import pytest
 from analysis import effects, findings, load_results, load_study, run_study
 from analysis.paper import METRICS
 from reports import page
-from reports.render import render
-from tests.reports.small import run_small_studies, words_of
+from tests.reports.small import run_small_studies, said_by
 
 PRODUCT = "collection_ratio_and_communication"
 
@@ -20,14 +19,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_small_studies(tmp_path_factory.mktemp("results"), *names)
 
 
-def rendered(results: Path, out: Path) -> str:
-    """The words of the page."""
-    render(["parameters"], results, out)
-    return words_of((out / "parameters.html").read_text("utf-8"))
-
-
-def test_the_page_tells_what_the_studies_found(results: Path, tmp_path: Path) -> None:
-    text = rendered(results, tmp_path)
+def test_the_page_tells_what_the_studies_found(results: Path) -> None:
+    text = said_by("parameters", results=str(results))
     fig5 = load_results(results / "fig5")
     table = effects.effects(fig5)
     for policy in ("ddqn", "greedy"):  # random is neither learned nor the best heuristic
@@ -51,5 +44,5 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
     for name in ("sweet-spot", "sensitivity"):
         (folder / name).symlink_to(results / name)
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
-    text = rendered(folder, tmp_path / "out")
-    assert "Shown is greedy ." in text
+    text = said_by("parameters", results=str(folder))
+    assert "Shown is greedy." in text

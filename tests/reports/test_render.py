@@ -6,6 +6,7 @@ import re
 import shutil
 from base64 import b64decode
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from tests.reports import browser
 from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
 READS = jupytext.reads
+# Parameters of what would take long: missions of what-if, flights of verification.
+QUICK = {"missions": 40, "again": 4}
 # The drawings of every page, by the small results.
 FIGURES = {
     "mission": 4,
@@ -33,7 +36,7 @@ FIGURES = {
     "parameters": 9,
     "comparison": 12,
     "what-if": 9,
-    "verification": 9,
+    "verification": 13,
     "scorecard": 0,
 }
 
@@ -62,7 +65,7 @@ def pages(
     home = tmp_path_factory.mktemp("home")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(home))
-        index = render([], results, out, progress=lambda *step: progress.append(step))
+        index = render([], results, out, lambda *step: progress.append(step), QUICK)
     assert index == out / "index.html"
     assert not list(home.glob(".ipython")) + list(home.glob(".jupyter")) + list(home.glob(".local"))
     return {path.name: path.read_text("utf-8") for path in out.iterdir()}
@@ -134,27 +137,66 @@ def test_progress_counts_the_cells(pages: dict[str, str], progress: list[Any]) -
     assert {name for name, _, _ in progress} == {*NAMES}
 
 
+def elsewhere(results: Path, out: Path, folder: Path, patch: pytest.MonkeyPatch) -> Path:
+    """Copies of results and pages, as they lie to each other, in another world."""
+    for name, value in {"TZ": "Pacific/Auckland", "PYTHONHASHSEED": "7", "LC_ALL": "C"}.items():
+        patch.setenv(name, value)
+    patch.chdir(folder)
+    shutil.copytree(results, folder / results.name)
+    return shutil.copytree(out, folder / out.relative_to(results.parent))
+
+
 def test_the_same_results_give_the_same_bytes(
-    pages: dict[str, str], results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    pages: dict[str, str],
+    results: Path,
+    out: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv("TZ", "Pacific/Auckland")
-    monkeypatch.setenv("PYTHONHASHSEED", "7")
-    monkeypatch.setenv("LC_ALL", "C")
-    copy = tmp_path / "elsewhere" / "deep"
-    shutil.copytree(results, copy)
-    monkeypatch.chdir(tmp_path)
-    render([], copy, tmp_path / "again")
+    """A page that is made again, and the index with those of earlier calls."""
+    again = elsewhere(results, out, tmp_path, monkeypatch)
+    (again / "performance.html").unlink()
+    render(["performance"], tmp_path / results.name, again, parameters={})
+    for name in ("performance.html", "index.html"):
+        assert (again / name).read_text("utf-8") == pages[name]
+
+
+@pytest.mark.slow
+def test_all_pages_are_the_same_bytes_elsewhere(
+    pages: dict[str, str],
+    results: Path,
+    out: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    elsewhere(results, out, tmp_path, monkeypatch)
+    shutil.rmtree(tmp_path / results.name / "what-if")  # its missions are flown anew
+    render([], tmp_path / results.name, tmp_path / "new", parameters=QUICK)
     for name, html in html_of(pages).items():
-        assert (tmp_path / "again" / name).read_text("utf-8") == html
+        assert (tmp_path / "new" / name).read_text("utf-8") == html
 
 
-def test_the_index_keeps_the_pages_of_earlier_calls(
-    pages: dict[str, str], results: Path, tmp_path: Path
+def test_notebooks_run_in_jupyter_and_show_what_the_pages_show(
+    pages: dict[str, str],
+    results: Path,
+    out: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for name, text in pages.items():
-        (tmp_path / name).write_text(text, "utf-8")
-    render(["performance"], results, tmp_path)
-    assert (tmp_path / "index.html").read_text("utf-8") == pages["index.html"]
+    """From top to bottom, from a results folder, where they lie beside the pages."""
+    again = elsewhere(results, out, tmp_path, monkeypatch)
+
+    def run(name: str) -> str:
+        notebook = nbformat.read(again / f"{name}.ipynb", as_version=4)
+        nbformat.validate(notebook)
+        assert notebook.cells.pop(0).source.startswith("# ")
+        NotebookClient(notebook, resources={"metadata": {"path": str(again)}}).execute()
+        assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+        return module._body(notebook)
+
+    with ThreadPoolExecutor(2) as pool:
+        for name, body in zip(NAMES, pool.map(run, NAMES), strict=True):
+            assert body in pages[f"{name}.html"], name
 
 
 def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results: Path) -> None:
@@ -171,18 +213,6 @@ def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results
                 assert evidence[field] == manifest.data[field]
             assert evidence["policies"] == manifest.data["policies"]
             assert manifest.key in words_of(pages[f"{name}.html"])
-
-
-def test_notebooks_open_in_jupyter_and_run_from_a_results_folder(
-    pages: dict[str, str], out: Path
-) -> None:
-    """What is written beside a page runs top to bottom, where it lies."""
-    for name in NAMES:
-        notebook = nbformat.read(out / f"{name}.ipynb", as_version=4)
-        nbformat.validate(notebook)
-        assert notebook.cells[0].source.startswith("# ")
-        NotebookClient(notebook, resources={"metadata": {"path": str(out)}}).execute()
-        assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
 
 
 @pytest.fixture(scope="module")

@@ -1,36 +1,23 @@
 """The page of the verification says what the checks found, and says so when something is wrong."""
 
-import ast
 import re
 from pathlib import Path
 from typing import Any
 
-import IPython.display
 import pytest
 
-import reports.render
 from analysis import jobs, load_results, load_study, run_study
 from analysis.effects import HOLDS, REFUTED
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports import notebook, stress
-from reports.render import render
-from tests.reports.small import EMBEDDED
+from reports import stress
+from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"
 SMALL: dict[str, Any] = {"missions": 300, "logged": 6}
 QUICK = {"again": 2, "block": 20}
 # How many cells to run: parameters, those set here, the checks, and what came of them; or all.
 SUMMARY, ALL = 4, 99
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _known() -> Any:
-    """Only this report is known."""
-    with pytest.MonkeyPatch.context() as patch:
-        for module in (notebook, reports.render):
-            patch.setattr(module, "NAMES", (NAME,))
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -41,33 +28,13 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def shown(results: Path, cells: int, **parameters: Any) -> str:
-    """What the first cells of the notebook show, run here: a kernel of its own takes seconds."""
-    report, pieces, scope = notebook.read(NAME), [], {}
-    report.set({"results": str(results), **QUICK, **parameters})
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(IPython.display, "display", pieces.append)
-        for cell in report.cells[:cells]:
-            tree = ast.parse(cell.source)
-            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-            exec(compile(tree, NAME, "exec"), scope)
-            if last:
-                pieces.append(eval(compile(ast.Expression(last.value), NAME, "eval"), scope))
-    return "\n".join(EMBEDDED.sub("", piece.data) for piece in pieces if piece is not None)
-
-
-def words(html: str) -> str:
-    bare = re.sub(r"<script.*?</script>|<[^>]+>", " ", html, flags=re.S)
-    return re.sub(r"\s+", " ", bare).replace("**", "")
-
-
 def said(results: Path, cells: int) -> str:
-    return words(shown(results, cells))
+    return said_by(NAME, cells, results=str(results), **QUICK)
 
 
 @pytest.fixture(scope="module")
 def html(results: Path) -> str:
-    return shown(results, ALL)
+    return shown_by(NAME, results=str(results), **QUICK)
 
 
 def test_every_figure_has_a_caption_with_its_number(html: str) -> None:
@@ -91,19 +58,6 @@ def test_sound_results_hold(html: str) -> None:
 def test_the_checklist_is_on_the_page(html: str, results: Path) -> None:
     for item in stress.report(load_results(results / NAME).manifest):
         assert f"**{item.number} {item.name}.**" in html
-
-
-@pytest.mark.slow
-def test_the_same_results_give_the_same_bytes(
-    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    render([NAME], results, tmp_path / "once", parameters=QUICK)
-    monkeypatch.setenv("TZ", "Pacific/Auckland")
-    monkeypatch.setenv("PYTHONHASHSEED", "7")
-    (tmp_path / "elsewhere").symlink_to(results)
-    render([NAME], tmp_path / "elsewhere", tmp_path / "again", parameters=QUICK)
-    once, again = ((tmp_path / out / f"{NAME}.html").read_text() for out in ("once", "again"))
-    assert once == again and str(tmp_path) not in once
 
 
 def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Path:

@@ -38,7 +38,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"steps": 60}, "prefill: 60 is not above steps 60"),
     ({"replay": 4, "steps": 3}, "replay: 4 is not above steps 3 + 1"),
-    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: fig4, paper"),
+    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: fig1, fig4, paper"),
 ]
 
 
