@@ -49,6 +49,16 @@ def _minus(number: str) -> str:
     return number.replace("-", "−") if float(number) else number.replace("-", "")
 
 
+def level(share: float) -> str:
+    """A confidence level, as ``95 %``."""
+    return f"{100 * share:g} %"
+
+
+def p_value(p: float) -> str:
+    """A p-value, as ``0.094``, or ``< 0.001``."""
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
 def words(names: Sequence[str]) -> str:
     """``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

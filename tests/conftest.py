@@ -1,11 +1,17 @@
-"""Set-up of the whole test session: the hypothesis profiles.
+"""Set-up of the whole test session: one thread for torch, and the hypothesis profiles.
+
+Tests run side by side, where the threads of one would be in the way of the other.
 
 By default properties draw few examples, always the same. With ``--hypothesis-profile=verify`` they
 draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs them too.
 """
 
+import os
+
 import pytest
 from hypothesis import is_hypothesis_test, settings
+
+os.environ["OMP_NUM_THREADS"] = "1"
 
 settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
