@@ -21,6 +21,8 @@ STUDIES: dict[str, list[str]] = {
     "comparison": [],
     "verification": [],
 }
+# Two test files at a time, in the order of their collection.
+SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 
 
@@ -34,7 +36,7 @@ def install(session: nox.Session, extras: str = "") -> None:
 def tests(session: nox.Session) -> None:
     """Run the tests."""
     install(session, "[test]")
-    session.run("pytest", "-q", "-n", "2", "--dist", "loadfile", *session.posargs)
+    session.run("pytest", "-q", *SIDE_BY_SIDE, *session.posargs)
 
 
 @nox.session

@@ -9,16 +9,24 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 import dess
-from analysis.manifest import Team, fingerprint, members_of, replay_command
-from analysis.replay import difference
+from analysis.manifest import Team, fingerprint, library_versions, members_of, replay_command
+from analysis.replay import difference, kept
 from analysis.results import Results
+from analysis.store import Store
 from analysis.study import load_study, study_names
 from dess import simulate
 from dess.errors import InputError
@@ -35,12 +43,22 @@ class _Part(BaseModel):
 
 
 class Mission(_Part):
-    """A mission of a study: who flew it, what its design point sets, and its record."""
+    """A mission of a study: who flew it, what its design point sets, and its record.
+
+    The record has the fields of ``MISSION_RECORD``, and those of the UAVs as ``uav 1 quota``.
+    """
 
     policy: str
     values: dict[str, Any]
     replication: int
-    record: dict[str, int | float]
+    record: dict[str, int | float | str]
+
+    @field_validator("record")
+    @classmethod
+    def _is_whole(cls, record: dict[str, int | float | str]) -> dict[str, int | float | str]:
+        if missing := [name for name in MISSION_RECORD.names or () if name not in record]:
+            raise ValueError(f"has no {missing[0]}")
+        return record
 
 
 class Evidence(_Part):
@@ -68,16 +86,24 @@ class Evidence(_Part):
     points: int
     missions: tuple[int, int]
     budget: str
-    sample: list[Mission]
+    sample: list[Mission] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _sample_is_of_the_study(self) -> Self:
+        strange = {mission.policy for mission in self.sample} - {t.policy for t in self.policies}
+        if strange:
+            raise ValueError(f"sample: {min(strange)} is no policy of the study")
+        return self
 
     @classmethod
-    def of(cls, results: Results, sample: int = SAMPLE, seed: int = 0) -> "Evidence":
+    def of(cls, results: Results, sample: int = SAMPLE, seed: int | None = None) -> "Evidence":
         """The evidence of results.
 
         Args:
             results: The results.
             sample: How many missions to draw, those that check a selection among them.
-            seed: Of the draw.
+            seed: Of the draw. By default a hash of all records: who alters one of them draws
+                others.
         """
         manifest = results.store.manifest
         counts = [n for of_team in manifest.missions for n in of_team]
@@ -97,7 +123,7 @@ class Evidence(_Part):
             points=len(manifest.points),
             missions=(min(counts), max(counts)),
             budget=_budget(results),
-            sample=_sample(results, sample, seed),
+            sample=_sample(results, sample, _hash(results) if seed is None else seed),
         )
 
     @classmethod
@@ -178,6 +204,29 @@ def verify(evidence: Evidence, missions: int, seed: int) -> Verdict:
     return Verdict(evidence.study, len(chosen), differing, notes)
 
 
+def verify_logs(store: Store, missions: int, seed: int) -> Verdict:
+    """Fly some of the missions again whose event logs are kept, and compare the logs.
+
+    Args:
+        store: The results folder.
+        missions: How many, at most.
+        seed: Of the choice.
+    """
+    manifest, logged = store.manifest, store.logged
+    differing = []
+    for cell, replication in (logged[n] for n in _chosen(len(logged), missions, seed)):
+        team = load_team(manifest.policies[cell.team].policy)
+        space = manifest.scenarios[cell.point]
+        log = simulate(space, team, manifest.seed, replication, events=True).events
+        held = store.load_log(cell, replication)
+        assert log is not None and held is not None
+        if not held.to_pandas().equals(pd.DataFrame(log.columns())):
+            line = "the event log is another one when flown again"
+            differing.append(f"{line}; replay: {manifest.replay(cell, replication)}")
+    name = f"{manifest.study['name']}, event logs"
+    return Verdict(name, min(len(logged), missions), differing, [])
+
+
 def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     """The files of learned policies and their curves, with the hashes of their bytes."""
     kinds = ("*.safetensors", "*.json", "*.parquet")
@@ -197,6 +246,10 @@ def _notes(evidence: Evidence) -> list[str]:
     changed = [team.policy for team in evidence.policies if team.members != members_of(team.policy)]
     if changed:
         notes.append(f"made by other code or weights of {', '.join(changed)}")
+    ours = library_versions()
+    others = [name for name in ours if evidence.libraries.get(name) != ours[name]]
+    if others:
+        notes.append(f"made with other versions of {', '.join(others)}")
     return notes
 
 
@@ -210,7 +263,7 @@ def _sample(results: Results, sample: int, seed: int) -> list[Mission]:
             policy=row["policy"],
             values=points[row["point"]].values,
             replication=row["replication"],
-            record={name: row[name] for name in MISSION_RECORD.names or ()},
+            record=kept(results, row["policy"], row["point"], row["replication"]),
         )
         for row in rows.to_dict("records")
     ]
@@ -221,18 +274,27 @@ def _chosen(count: int, most: int, seed: int) -> Sequence[int]:
     return sorted(numbers.tolist())
 
 
+def _hash(results: Results) -> int:
+    """A number that every record has a part in."""
+    tables = (results.missions, results.checks, results.uavs)
+    hashes = [pd.util.hash_pandas_object(table, index=False).to_numpy() for table in tables]
+    return int(sha256(np.concatenate(hashes).tobytes()).hexdigest()[:16], 16)
+
+
 def _budget(results: Results) -> str:
     """What part this is of the shipped study of the same name."""
-    manifest = results.store.manifest
-    name = manifest.study["name"]
+    ours = dict(results.store.manifest.study)
+    name = ours["name"]
     if name not in study_names():
         return "as asked"
-    whole = load_study(name)
-    teams, of = len(manifest.policies), len(whole.policies)
-    parts = [] if teams == of else [f"{teams} of {of} policies"]
-    if manifest.study["missions"] != whole.missions:
-        parts.append(f"{manifest.study['missions']:,} of {whole.missions:,} missions")
-    data = whole.model_dump(mode="json")
-    rules = ("set", "design", "precision", "selection")
-    parts += [f"another {rule}" for rule in rules if manifest.study[rule] != data[rule]]
+    whole = load_study(name).model_dump(mode="json")
+    parts = []
+    if {*ours["policies"]} < {*whole["policies"]}:
+        parts.append(f"{len(ours['policies'])} of {len(whole['policies'])} policies")
+    elif {*ours["policies"]} != {*whole["policies"]}:
+        parts.append("other policies")
+    if ours["missions"] != whole["missions"]:
+        parts.append(f"{ours['missions']:,} instead of {whole['missions']:,} missions")
+    told = ("policies", "missions", "description")
+    parts += [f"another {key}" for key in whole if key not in told and ours[key] != whole[key]]
     return ", ".join(parts) or "full"

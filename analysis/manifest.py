@@ -39,7 +39,7 @@ _PARTS: dict[str, TypeAdapter] = {
     "precision": TypeAdapter(Precision | None),
     "selection": TypeAdapter(Selection | None),
 }
-LIBRARIES = ("numpy", "numba", "simpy", "scipy", "pandas", "pyarrow")
+LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 
 
 class Cell(NamedTuple):
@@ -152,7 +152,7 @@ class Manifest(_Part):
             version=dess.__version__,
             code=fingerprint("dess"),
             commit=commit_of_source(),
-            libraries={"python": python_version()} | {n: metadata.version(n) for n in LIBRARIES},
+            libraries=library_versions(),
             seed=study.seed,
             study=data,
             scenario=base.model_dump(mode="json"),
@@ -337,6 +337,11 @@ def members_of(team: str) -> list[Member]:
         }
         identities.append(Member.model_validate(identity))
     return identities
+
+
+def library_versions() -> dict[str, str]:
+    """What records may depend on besides the code: Python, and the libraries that compute."""
+    return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
 
 
 def commit_of_source() -> str | None:

@@ -167,16 +167,30 @@ class Store:
     def _scan(self) -> None:
         """Learn which missions are there, and which files are damaged."""
         for team in range(len(self.manifest.policies)):
-            uavs = {_id(path): self._whole(path, UAVS) for path in self._files("uavs", team)}
-            for path in self._files("missions", team):
-                missions, of_uavs = self._whole(path, MISSIONS), uavs.get(_id(path))
-                if missions is not None and of_uavs is not None:
-                    self._enter(team, _id(path), _Tables(missions, of_uavs))
+            uavs = self._by_id("uavs", team, UAVS)
+            for name, missions in self._by_id("missions", team, MISSIONS).items():
+                if name in uavs:
+                    self._enter(team, name, _Tables(missions, uavs[name]))
             for path in self._files("events", team):
                 if _read(path) is None:
                     self._damaged.append(path)
                 else:
                     self._logs[team, _id(path)] = path
+
+    def _by_id(self, kind: str, team: int, schema: pa.Schema) -> dict[str, pa.Table]:
+        """The tables of a kind, by what they hold.
+
+        What two files tell in two ways is damaged: nobody knows which is right.
+        """
+        tables: dict[str, pa.Table] = {}
+        paths, contested = defaultdict(list), set()
+        for path in self._files(kind, team):
+            if (table := self._whole(path, schema)) is not None:
+                paths[_id(path)].append(path)
+                if not tables.setdefault(_id(path), table).equals(table):
+                    contested.add(_id(path))
+        self._damaged += [path for name in sorted(contested) for path in paths[name]]
+        return {name: table for name, table in tables.items() if name not in contested}
 
     def _whole(self, path: Path, schema: pa.Schema) -> pa.Table | None:
         """What a file holds; if that is not what its name says, it is damaged."""
@@ -335,6 +349,17 @@ class Store:
             line += f" ({len(failed)} chunks failed, see {failed[0]})"
         return f"{line}; allowed: run the study again to complete it"
 
+    @property
+    def logged(self) -> list[tuple[Cell, int]]:
+        """The missions whose event logs are there."""
+        cells = {(cell.team, cell.key): cell for cells in self.manifest.cells for cell in cells}
+        found = []
+        for team, name in self._logs:
+            key, _, replication = name.rpartition("-")
+            if (team, key) in cells:
+                found.append((cells[team, key], int(replication)))
+        return found
+
     def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
         """The event log of a replication of a cell, if it is there."""
         path = self._logs.get((cell.team, f"{cell.key}-{replication:06}"))
@@ -357,7 +382,13 @@ def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of all tables."""
     frame = pa.concat_tables(tables).unify_dictionaries().to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
-    return frame.drop_duplicates(one)  # somebody may have put folders together
+    if frame.duplicated(one).any():  # somebody may have put folders together
+        frame = frame.drop_duplicates()
+        if frame.duplicated(one).any():
+            raise InputError(
+                "results: two files have different records of a mission; allowed: one of them"
+            )
+    return frame
 
 
 def _taken(table: pd.DataFrame, wanted: pd.DataFrame) -> pd.DataFrame:

@@ -7,9 +7,8 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from importlib import metadata
+from contextlib import contextmanager
 from pathlib import Path, PurePath
-from platform import python_version
 from time import perf_counter
 from typing import Any, Self
 
@@ -19,11 +18,11 @@ from threadpoolctl import threadpool_limits
 
 import dess
 from analysis.manifest import (
-    LIBRARIES,
     Manifest,
     Member,
     commit_of_source,
     fingerprint,
+    library_versions,
     members_of,
 )
 from analysis.store import replacing
@@ -113,6 +112,11 @@ class Timing(_Part):
         return self
 
     @property
+    def text(self) -> str:
+        """The timing as JSON."""
+        return json.dumps(self.model_dump(mode="json", by_alias=True), indent=1) + "\n"
+
+    @property
     def space(self) -> ScenarioSpace:
         """The scenario of the missions."""
         return ScenarioSpace.of(**self.constants)
@@ -160,8 +164,7 @@ def measure(
         version=dess.__version__,
         code=fingerprint("dess"),
         commit=commit_of_source(),
-        libraries={"python": python_version()}
-        | {name: metadata.version(name) for name in (*LIBRARIES, "torch")},
+        libraries=library_versions(),
         processor=_processor(),
         cores=_cores(),
         threads=THREADS,
@@ -173,11 +176,12 @@ def measure(
     )
 
 
-def write(timing: Timing, folder: str | Path) -> Path:
-    """Write a timing into a folder, over the one that is there; returns its file.
+@contextmanager
+def writing(folder: str | Path) -> Iterator[Path]:
+    """Where to write a timing: a file that takes its place in the folder in the end.
 
     Raises:
-        InputError: If it cannot be written.
+        InputError: At once, if none can be written there.
     """
     path = Path(folder) / FILE
     try:
@@ -185,9 +189,18 @@ def write(timing: Timing, folder: str | Path) -> Path:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     with replacing(path) as temporary:
-        text = json.dumps(timing.model_dump(mode="json", by_alias=True), indent=1)
-        temporary.write_text(text + "\n", "utf-8")
-    return path
+        yield temporary
+
+
+def write(timing: Timing, folder: str | Path) -> Path:
+    """Write a timing into a folder, over the one that is there; returns its file.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    with writing(folder) as path:
+        path.write_text(timing.text, "utf-8")
+    return Path(folder) / FILE
 
 
 def read(folder: str | Path) -> Timing:
@@ -231,8 +244,8 @@ def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bo
         return False
     timed = {cost.policy: cost.members for cost in kept.costs}
     wanted = {policy: members_of(policy) for policy in policies}
-    here = (fingerprint("dess"), _processor(), missions)
-    return timed == wanted and (kept.code, kept.processor, kept.missions) == here
+    here = (fingerprint("dess"), _processor(), library_versions(), missions)
+    return timed == wanted and (kept.code, kept.processor, kept.libraries, kept.missions) == here
 
 
 def unlike(timing: Timing, manifest: Manifest) -> list[str]:

@@ -85,6 +85,9 @@ def question(
     Raises:
         InputError: If a field, a value or a policy is unknown or not allowed, or a setting is none.
     """
+    for name, values in (("settings", settings), ("baseline", baseline or {})):
+        if not isinstance(values, Mapping):
+            raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
     fixed, rows = dict(baseline or {}), dict(settings)
     before = load_scenario(scenario, **fixed)
     after = load_scenario(scenario, **fixed | rows)
@@ -99,7 +102,7 @@ def question(
             )
     if isinstance(missions, int) and missions < 2:
         raise InputError(f"missions: {missions} is too few; allowed: 2 or more")
-    values = {
+    data = {
         "name": NAME,
         "description": "a variation beside its baseline, on the same missions",
         "scenario": str(scenario),
@@ -110,7 +113,7 @@ def question(
         "seed": seed,
     }
     try:
-        return Study.model_validate(values)
+        return Study.model_validate(data)
     except ValidationError as error:
         raise InputError(validation_line(error, "question", Study)) from None
 

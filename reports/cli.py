@@ -4,6 +4,7 @@ Only what the help needs is imported at once; the rest is imported by the comman
 """
 
 import json
+import math
 import os
 import shlex
 import sys
@@ -239,12 +240,13 @@ def report(
     ] = None,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
-    found = (_setting(text, "--parameter", _EXAMPLE) for text in parameters or [])
+    found = (_setting(text, "--parameter", _PARAMETER) for text in parameters or [])
     values = {name: _from_here(value) for name, value in found}
     if settings:
         if names and WHAT_IF not in names:
             raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
         values["settings"] = dict(_setting(text) for text in settings)
+        values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     from reports.render import ReportError, render
 
     try:
@@ -308,12 +310,13 @@ def timing(
 ) -> None:
     """Measure what a decision costs in time; what was measured here before is kept."""
     from analysis.study import load_study
-    from analysis.timing import is_current, measure, read, write
+    from analysis.timing import is_current, measure, read, writing
 
     teams = policy or [*load_study("comparison").policies]
     if not is_current(out, teams, missions):
-        with console.compile_notice(), console.steps_bar() as progress:
-            write(measure(teams, missions=missions, progress=progress), out)
+        with writing(out) as path, console.compile_notice(), console.steps_bar() as progress:
+            measured = measure(teams, missions=missions, progress=progress)
+            path.write_text(measured.text, "utf-8")
     rows = [
         [c.policy, *(f"{1e6 * t:,.1f} µs" for t in (c.median, c.slow, c.batch))]
         for c in read(out).costs
@@ -352,32 +355,39 @@ def _scenario(name: str, settings: list[str] | None) -> "ScenarioSpace":
     return load_scenario(name, **dict(_setting(text) for text in settings or []))
 
 
-_EXAMPLE = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
+_FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
+_PARAMETER = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
 
 
-def _setting(
-    text: str,
-    option: str = "--set",
-    allowed: str = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or "
-    "initial_data=[5, 20]",
-) -> tuple[str, Any]:
+def _setting(text: str, option: str = "--set", allowed: str = _FIELD) -> tuple[str, Any]:
     """``KEY=VALUE`` as key and value."""
     key, equals, value = text.partition("=")
     try:
         parsed = tomllib.loads(f"value = {value}")
     except tomllib.TOMLDecodeError as error:
         parsed = {"error": error}
-    if not equals or parsed.keys() != {"value"}:
+    if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
         raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
 
 
 def _from_here(value: Any) -> Any:
-    """A value of a parameter; paths from here, for a notebook runs elsewhere."""
+    """A value of a parameter; paths, also those in a team, from here: a notebook runs elsewhere."""
     if isinstance(value, list):
         return [_from_here(each) for each in value]
-    is_path = isinstance(value, str) and (os.sep in value or value.endswith(".toml"))
-    return os.path.abspath(value) if is_path else value
+    if not isinstance(value, str):
+        return value
+    parts = value.split(",")
+    is_path = [os.sep in part or part.endswith(".toml") for part in parts]
+    found = zip(parts, is_path, strict=True)
+    return ",".join(os.path.abspath(part) if path else part for part, path in found)
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether a value is of those that fields and parameters have: no date, and no nan."""
+    if isinstance(value, list | dict):
+        return all(map(_is_plain, value.values() if isinstance(value, dict) else value))
+    return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
 
 
 def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:

@@ -14,6 +14,7 @@ from nbformat import NotebookNode
 
 from dess.errors import InputError
 
+GIVEN = "cell-parameters"  # the cell with the values that a report was asked with
 SCORECARD = "scorecard"  # the index shows all of it
 NAMES = (
     "mission",
@@ -139,5 +140,5 @@ def _set(notebook: NotebookNode, values: Mapping[str, Any]) -> None:
     """Insert a cell with the values after the tagged one."""
     if values:
         source = "\n".join(f"{name} = {value!r}" for name, value in values.items())
-        cell = nbformat.v4.new_code_cell(source, id="cell-parameters")
+        cell = nbformat.v4.new_code_cell(source, id=GIVEN)
         notebook.cells.insert(_tagged(notebook) + 1, cell)

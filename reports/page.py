@@ -69,15 +69,22 @@ def provenance(studies: Iterable[Results]) -> HTML:
     return carrying([Evidence.of(results) for results in studies])
 
 
-def carrying(evidence: Sequence[Evidence]) -> HTML:
-    """What studies were made with, a column per study, and the evidence itself, out of sight."""
-    hidden = "".join(_embedded(STUDY, each.text) for each in evidence)
-    return HTML(_origins(evidence).data + hidden) if evidence else HTML("")
+def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
+    """What studies were made with, a column per study, and the evidence itself, out of sight.
+
+    Args:
+        evidence: Of the studies.
+        files: The lists of files that pages carry, as of ``embedded``.
+    """
+    hidden = [_embedded(STUDY, each.text) for each in evidence]
+    hidden += [_embedded(FILES, text) for text in files]
+    return HTML((_origins(evidence).data if evidence else "") + "".join(hidden))
 
 
-def _origins(evidence: Iterable[Evidence]) -> HTML:
+def _origins(evidence: Sequence[Evidence]) -> HTML:
+    names = [each.study for each in evidence]
     columns = {
-        e.study: {
+        e.study if names.count(e.study) == 1 else f"{e.study} {e.key}": {
             "Scenario": e.scenario_name,
             "Policies": ", ".join(team.policy for team in e.policies),
             "Weights": ", ".join(_weights(e)) or "none",

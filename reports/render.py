@@ -19,14 +19,14 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
 import dess
-from analysis import load_results
 from analysis.evidence import Evidence
+from analysis.manifest import Manifest
 from analysis.store import MANIFEST
 from dess.errors import InputError
 from reports import page
 from reports.kernels import Kernels, Progress
-from reports.notebook import NAMES, SCORECARD, Report, check_parameters, read
-from reports.verify import sealed
+from reports.notebook import GIVEN, NAMES, SCORECARD, Report, check_parameters, read
+from reports.verify import is_sealed, sealed
 
 log = logging.getLogger(__name__)
 
@@ -88,16 +88,16 @@ def render(
     with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
         Kernels(results, progress).run(reports)
         files = {report.page: sealed(_page("report.html", **_parts(report))) for report in reports}
-        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in reports}
+        whole = [report for report in reports if not report.failure]
+        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in whole}
         files[INDEX] = _index(_pages(out) | files)
         with _writing(out):
             for name, text in files.items():
-                Path(folder, name).write_text(text, "utf-8")
+                Path(folder, name).write_bytes(text.encode())
             for name in files:
                 os.replace(Path(folder, name), out / name)
-            for report in reports:
-                if not report.failure:
-                    (out / f"{report.name}.partial.html").unlink(missing_ok=True)
+            for report in whole:
+                (out / f"{report.name}.partial.html").unlink(missing_ok=True)
     if failed := [report for report in reports if report.failure]:
         raise ReportError(
             "; ".join(f"{r.failure}; as far as it went: {out / r.page}" for r in failed)
@@ -137,14 +137,19 @@ def _check_results(folder: Path) -> None:
             f"results: {folder} holds no results of study {folder.name}; "
             f"they are made by: dess study run {folder.name} --out {folder}"
         )
-    held = load_results(folder).manifest["study"]["name"]
+    manifest = Manifest.read(folder / MANIFEST)
+    held = manifest.study["name"]
     if held != folder.name:
         raise InputError(f"results: {folder} holds study {held}; allowed: {folder.name}")
+    if not manifest.complete:
+        raise InputError(f"results: {folder}: incomplete; allowed: run the study again")
 
 
 def _parts(report: Report) -> dict[str, Any]:
     """What the template of a page shows."""
-    code = highlight("\n\n\n".join(c.source for c in report.cells), PythonLexer(), HtmlFormatter())
+    # Without what was given: it may be a path of this machine. The notebook beside has it.
+    cells = [cell.source for cell in report.cells if cell.id != GIVEN]
+    code = highlight("\n\n\n".join(cells), PythonLexer(), HtmlFormatter())
     return {"report": report, "body": _body(report.notebook), "code": Markup(code)}
 
 
@@ -166,9 +171,27 @@ def _body(notebook: NotebookNode) -> str:
 
 
 def _pages(out: Path) -> dict[str, str]:
-    """The pages of earlier calls."""
-    paths = (out / f"{name}.html" for name in NAMES)
-    return {path.name: path.read_text("utf-8") for path in paths if path.exists()}
+    """The pages of earlier calls; the index leaves out what is not as it was written."""
+    pages = {}
+    for path in (out / f"{name}.html" for name in NAMES):
+        try:
+            html = path.read_bytes().decode()
+            if not is_sealed(html):
+                raise InputError("altered")
+            _evidence([html])
+        except FileNotFoundError:
+            continue
+        except (OSError, UnicodeDecodeError, InputError):
+            log.warning("%s: altered, or of another version; the index leaves it out", path)
+        else:
+            pages[path.name] = html
+    return pages
+
+
+def _evidence(pages: Iterable[str]) -> list[Evidence]:
+    """What pages carry of their studies, each once."""
+    texts = [text for html in pages for text in page.embedded(page.STUDY, html)]
+    return [Evidence.parse(text, "page") for text in dict.fromkeys(texts)]
 
 
 def _index(pages: Mapping[str, str]) -> str:
@@ -180,16 +203,11 @@ def _index(pages: Mapping[str, str]) -> str:
         if r.name != SCORECARD
     ]
     scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
-    found = [text for r in there for text in page.embedded(page.STUDY, pages[r.page])]
-    evidence = [Evidence.parse(text, INDEX) for text in dict.fromkeys(found)]
-    return sealed(
-        _page(
-            INDEX,
-            cards=cards,
-            scorecard=Markup("".join(scorecard)),
-            origins=Markup(page.carrying(evidence).data),
-        )
-    )
+    shown = [pages[report.page] for report in there]
+    files = dict.fromkeys(text for html in shown for text in page.embedded(page.FILES, html))
+    origins = page.carrying(_evidence(shown), files)
+    parts = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
+    return sealed(_page(INDEX, cards=cards, **parts))
 
 
 def _thumbnail(html: str) -> Markup:

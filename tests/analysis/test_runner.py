@@ -274,7 +274,10 @@ def test_rounds_are_announced_before_their_missions(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [precise, selecting])
-@pytest.mark.parametrize("after", [11, 47, 71])
+@pytest.mark.parametrize(
+    "after",
+    [pytest.param(11, marks=pytest.mark.slow), 47, pytest.param(71, marks=pytest.mark.slow)],
+)
 def test_an_interrupted_run_of_rounds_is_completed(kind, after, tmp_path):
     check_that_an_interrupted_run_is_completed(kind(tmp_path), tmp_path, after, workers=2)
 

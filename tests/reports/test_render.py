@@ -6,7 +6,6 @@ import re
 import shutil
 from base64 import b64decode
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -176,27 +175,30 @@ def test_all_pages_are_the_same_bytes_elsewhere(
         assert (tmp_path / "new" / name).read_text("utf-8") == html
 
 
+# By default those that are run quickly.
+IN_JUPYTER = [
+    name if name in {"performance", "what-if"} else pytest.param(name, marks=pytest.mark.slow)
+    for name in NAMES
+]
+
+
+@pytest.mark.parametrize("name", IN_JUPYTER)
 def test_notebooks_run_in_jupyter_and_show_what_the_pages_show(
     pages: dict[str, str],
     results: Path,
     out: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    name: str,
 ) -> None:
     """From top to bottom, from a results folder, where they lie beside the pages."""
     again = elsewhere(results, out, tmp_path, monkeypatch)
-
-    def run(name: str) -> str:
-        notebook = nbformat.read(again / f"{name}.ipynb", as_version=4)
-        nbformat.validate(notebook)
-        assert notebook.cells.pop(0).source.startswith("# ")
-        NotebookClient(notebook, resources={"metadata": {"path": str(again)}}).execute()
-        assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
-        return module._body(notebook)
-
-    with ThreadPoolExecutor(2) as pool:
-        for name, body in zip(NAMES, pool.map(run, NAMES), strict=True):
-            assert body in pages[f"{name}.html"], name
+    notebook = nbformat.read(again / f"{name}.ipynb", as_version=4)
+    nbformat.validate(notebook)
+    assert notebook.cells.pop(0).source.startswith("# ")
+    NotebookClient(notebook, resources={"metadata": {"path": str(again)}}).execute()
+    assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+    assert module._body(notebook) in pages[f"{name}.html"]
 
 
 def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results: Path) -> None:

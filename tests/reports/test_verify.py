@@ -12,6 +12,7 @@ import pytest
 from analysis import load_study, run_study
 from analysis.evidence import Evidence, learned_files, verify
 from analysis.results import load_results
+from dess.errors import InputError
 from policies.registry import TRAINED
 from reports import page as pieces
 from reports.cli import main
@@ -59,7 +60,7 @@ def test_pages_and_results_that_nobody_altered_agree(results: Path, page: Path) 
     compared = {verdict.what: verdict.compared for verdict in verify_page(page, ALL, 0)}
     assert compared == {"page": 1, "table4": 24, "fig4": 32}
     compared = {verdict.what: verdict.compared for verdict in verify_results(results, ALL, 0)}
-    assert compared == {"table4": 24, "fig4": 72}
+    assert compared == {"table4": 24, "fig4": 72, "fig4, event logs": 6}
 
 
 def test_another_number_on_a_page_is_found(page: Path, tmp_path: Path) -> None:
@@ -106,11 +107,96 @@ def test_a_forged_record_is_found_by_flying_its_mission(results: Path, tmp_path:
     forged = table.set_column(column, table.schema.field(column), [better])
     path.unlink()
     pq.write_table(forged, path)
-    digest = sha256(path.read_bytes()).hexdigest()[:16]
-    path.rename(path.with_name(f"{path.stem.rpartition('-')[0]}-{digest}.parquet"))
+    resealed(path, path.stem)
     found = lines_of(folder)
     assert len(found) == sum(ratio < 1 for ratio in table["collection_ratio"].to_pylist())
     assert all(line.startswith("collection_ratio is ") for line in found)
+
+
+def resealed(path: Path, name: str) -> None:
+    """A parquet file with the name that belongs to its bytes."""
+    digest = sha256(path.read_bytes()).hexdigest()[:16]
+    path.rename(path.with_name(f"{name.rpartition('-')[0]}-{digest}.parquet"))
+
+
+def test_a_forged_uav_and_a_forged_log_are_found(results: Path, tmp_path: Path) -> None:
+    for kind, column, found in (("uavs", "slots_charging", 36), ("events", "value", 1)):
+        folder = shutil.copytree(results / "fig4", tmp_path / kind)
+        path = sorted((folder / kind).rglob("*.parquet"))[0]
+        table = pq.read_table(path, partitioning=None)
+        number = table.schema.get_field_index(column)
+        other = [value + 1 for value in table[column].to_pylist()]
+        path.unlink()
+        pq.write_table(table.set_column(number, table.schema.field(number), [other]), path)
+        resealed(path, path.stem)
+        lines = lines_of(folder)
+        assert len(lines) == found
+        assert all((f"uav 1 {column}" in line) == (kind == "uavs") for line in lines)
+
+
+def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results / "table4", tmp_path / "table4")
+    path = sorted((folder / "missions").rglob("*.parquet"))[0]
+    table = pq.read_table(path, partitioning=None)
+    number = table.schema.get_field_index("reward")
+    other = [value + 1 for value in table["reward"].to_pylist()]
+    second = path.with_name("second.parquet")
+    pq.write_table(table.set_column(number, table.schema.field(number), [other]), second)
+    resealed(second, path.stem)
+    lines = lines_of(folder)
+    assert len(lines) == 2 and f"{path}: is not what was written" in lines
+    with pytest.raises(InputError, match="incomplete"):
+        load_results(folder)
+
+
+def test_a_page_without_missions_or_with_few_fields_says_so(page: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.html"
+    bare.write_text(sealed('<meta name="dess-checksum" content="">'))
+    (verdict,) = verify_page(bare, ALL, 0)
+    assert verdict.notes == ["carries no missions to fly again"]
+    text = embedded(STUDY, page.read_text("utf-8"))[0]
+    for field, value in (("sample", []), ("policies", json.loads(text)["policies"][1:])):
+        evidence = json.loads(text) | {field: value}
+        forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+        with pytest.raises(InputError, match="sample"):
+            verify_page(forged, ALL, 0)
+    evidence = json.loads(text)
+    del evidence["sample"][0]["record"]["slots"]
+    forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+    with pytest.raises(InputError, match="has no slots"):
+        verify_page(forged, ALL, 0)
+
+
+def test_an_altered_page_does_not_get_into_the_index(
+    results: Path, page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = shutil.copytree(page.parent, tmp_path / "out")
+    altered(page, "Performance", "Perfection", folder / "performance.html")
+    (folder / "comparison.html").write_bytes(b"\xff")
+    render(["mission"], _with_fig1(results, tmp_path), folder)
+    index = (folder / "index.html").read_text("utf-8")
+    assert "mission.html" in index
+    assert "performance.html" not in index and "comparison.html" not in index
+    assert sorted(record.args[0].name for record in caplog.records) == [
+        "comparison.html",
+        "performance.html",
+    ]
+
+
+def _with_fig1(results: Path, tmp_path: Path) -> Path:
+    folder = shutil.copytree(results, tmp_path / "results")
+    run_study(load_study("fig1", missions=1), folder / "fig1")
+    return folder
+
+
+def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results, tmp_path / "results")
+    manifest = folder / "fig4" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"complete": true', '"complete": false'))
+    fig4, table4 = verify_results(folder, ALL, 0)
+    assert fig4.notes == ["incomplete, so not checked"] and table4.compared == 24
+    manifest.write_text("{}")
+    assert len(verify_results(folder, ALL, 0)[0].differing) == 1
 
 
 def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
