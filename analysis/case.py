@@ -50,7 +50,7 @@ class Finding:
 
     Attributes:
         verdict: One of ``claims.VERDICTS``.
-        policy: The policy, or the variant of trainings.
+        policy: The policy; empty where it is about trainings of another.
         quantities: The figures that it rests on; the first is the one to set beside the paper's.
         against: How its interval lies to the printed figure, as by ``paper.verdict``; empty if
             none is printed.
@@ -68,11 +68,11 @@ class MissingError(Exception):
     """Results that a claim needs are not there."""
 
 
-class Evidence:
+class Studies:
     """All results, and what is computed from them once for all policies."""
 
-    def __init__(self, studies: Mapping[str, Results], trainings: pd.DataFrame, flights: int):
-        self.studies = studies
+    def __init__(self, results: Mapping[str, Results], trainings: pd.DataFrame, flights: int):
+        self.results = results
         self.trainings = trainings
         self.flights = flights
         self.effects = cache(lambda study: effects.effects(self.study(study)))
@@ -80,9 +80,9 @@ class Evidence:
 
     def study(self, name: str) -> Results:
         """The results of a study."""
-        if name not in self.studies:
+        if name not in self.results:
             raise MissingError(f"the study {name} has not run")
-        return self.studies[name]
+        return self.results[name]
 
 
 class Pairs(NamedTuple):
@@ -125,31 +125,41 @@ class Case:
     """The results of one policy per study, and of trainings with and without transfer learning.
 
     Args:
-        evidence: All results.
+        studies: All results.
         learners: Names of learners, the preferred one first; empty for the best one of the study.
-        variants: The trainings with transfer learning, and those without.
+        variants: The trainings with transfer learning, and those without; none if there are none.
+        named: A policy to take instead, whatever it is.
     """
 
-    def __init__(self, evidence: Evidence, learners: tuple[str, ...], variants: tuple[str, str]):
-        self.evidence = evidence
+    def __init__(
+        self,
+        studies: Studies,
+        learners: tuple[str, ...] = (),
+        variants: tuple[str, str] | None = None,
+        named: str = "",
+    ):
+        self.studies = studies
         self.learners = learners
         self.variants = variants
+        self.named = named
         self.pairs = cache(self._pairs)
         self.flights = cache(self._flights)
 
     def policy(self, study: str) -> str:
         """The policy of a study: the best of the learners in question."""
-        taught = findings.learners(self.evidence.study(study))
+        if self.named:
+            return self.named
+        taught = findings.learners(self.studies.study(study))
         wanted = [name for name in self.learners if name in taught][:1] if self.learners else taught
         among = [policy for name in wanted for policy in taught[name]]
         if not among:
             which = f"policy {' or '.join(self.learners)}" if self.learners else "learned policy"
             raise MissingError(f"the study {study} has no {which}")
-        return _best(self.evidence.study(study), among)
+        return _best(self.studies.study(study), among)
 
     def missions(self, study: str, uavs: int | None = None) -> pd.DataFrame:
         """The missions of the policy; those of a number of UAVs, if asked."""
-        missions = self.evidence.study(study).missions
+        missions = self.studies.study(study).missions
         own = missions[missions["policy"] == self.policy(study)]
         own = own if uavs is None else own[own["uavs"] == uavs]
         if own.empty:
@@ -158,17 +168,17 @@ class Case:
 
     def _pairs(self, study: str, field: str, metric: str) -> Pairs:
         """The values of a parameter, compared mission by mission."""
-        policy, table = self.policy(study), self.evidence.effects(study)
+        policy, table = self.policy(study), self.studies.effects(study)
         own = table[table["field"] == field].drop_duplicates("position")
         if len(own) < 2:
             raise MissingError(f"the study {study} does not vary {field}")
-        compared = effects.changes(self.evidence.study(study), table, policy, field, metric)
+        compared = effects.changes(self.studies.study(study), table, policy, field, metric)
         return Pairs(compared, dict(zip(own["value"], own["position"], strict=True)))
 
     def _flights(self, uavs: int) -> list[Flight]:
         """Missions of Fig. 4 with a number of UAVs, flown again; the first replications."""
-        missions = self.missions("fig4", uavs).head(self.evidence.flights)
-        results, policy = self.evidence.study("fig4"), self.policy("fig4")
+        missions = self.missions("fig4", uavs).head(self.studies.flights)
+        results, policy = self.studies.study("fig4"), self.policy("fig4")
         keys = zip(missions["point"], missions["replication"], strict=True)
         return [fly(results, policy, int(point), int(number)) for point, number in keys]
 
@@ -208,7 +218,13 @@ def least(leads: pd.DataFrame, name: str) -> Quantity:
 
 def upside_down(pairs: pd.DataFrame) -> pd.DataFrame:
     """Differences the other way round."""
-    return pairs.assign(difference=-pairs["difference"], low=-pairs["high"], high=-pairs["low"])
+    return pairs.assign(
+        difference=-pairs["difference"],
+        low=-pairs["high"],
+        high=-pairs["low"],
+        wide_low=-pairs["wide_high"],
+        wide_high=-pairs["wide_low"],
+    )
 
 
 def _best(results: Results, among: list[str]) -> str:

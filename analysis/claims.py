@@ -1,80 +1,106 @@
 """Claims of the paper, and the rules by which figures of ours judge them.
 
-A rule is a function from figures to a verdict, beside its words. Intervals are of 95 %, differences
-are taken mission by mission, unless a rule says otherwise.
+A rule is a function from figures to a verdict, beside its words. A claim holds, or does not, where
+whole intervals say so, and in part where a part of it is shown; else it cannot be told. Intervals
+are of 95 %, differences are taken mission by mission, unless a rule says otherwise.
 """
 
 from collections.abc import Collection
+from math import hypot
 
-from analysis import effects
-from analysis.curves import FAILS, HOLDS, IN_PART
+from analysis.curves import BAND
+from analysis.paper import CROSSING
 from analysis.selection import Choice
 from analysis.statistics import Interval
+from analysis.verdicts import HOLDS, IN_PART, OPEN, REFUTED, Part, above, judged
 
 NO_RESULTS = "no results"
-VERDICTS = (HOLDS, IN_PART, FAILS, NO_RESULTS)
+VERDICTS = (HOLDS, IN_PART, OPEN, REFUTED, NO_RESULTS)
 
-# A mean that is less than this below a printed figure is near it; a small change is less than it.
+# A figure that is surely less than this below a printed one is near it; a small change is less.
 NEAR = 0.05
 # A difference below this does not matter: the indifference of the study of the sweet spot.
 MARGIN = 0.01
 
+_NEAR = f"{100 * NEAR:g} points"
+_ELSE = "else it cannot be told."
+
+
+def gap(ours: Interval, printed: Interval) -> Interval:
+    """By how much ours is above a printed figure, which may have an interval of its own.
+
+    The interval of a difference from those of the two (Newcombe 1998, method 10).
+    """
+    mean = ours.mean - printed.mean
+    low = hypot(ours.mean - ours.low, printed.high - printed.mean)
+    return Interval(
+        mean, mean - low, mean + hypot(ours.high - ours.mean, printed.mean - printed.low)
+    )
+
+
 REACHED = (
-    "Holds if the interval reaches the paper's figure or lies above it, and the mean is less than "
-    f"{100 * NEAR:g} points below it; in part if only one of the two is so. So holding means "
-    "reaching, not equalling."
+    "By our mean minus the paper's. Holds if the interval reaches 0 or lies above it, and all of "
+    f"it is above −{_NEAR}: holding means reaching, not equalling. If all of it is below 0, it "
+    f"holds in part if all of it is above −{_NEAR}, and does not hold otherwise; {_ELSE}"
 )
 
 
-def reached(ours: Interval, printed: float) -> str:
-    """Whether a printed figure is reached."""
-    return _both(ours.high >= printed, ours.mean > printed - NEAR)
+def reached(difference: Interval) -> str:
+    """Whether a printed figure is reached, by our difference to it."""
+    near = difference.low > -NEAR
+    if difference.high < 0:
+        return IN_PART if near else REFUTED
+    return HOLDS if near else OPEN
 
 
 GAINED = (
-    "Holds if the whole interval of the difference is above 0 and it reaches the paper's "
-    "difference; in part if only the former."
+    "Holds if the whole interval of the difference is above 0, and it reaches the paper's "
+    f"difference with all of it above that − {_NEAR}; in part if only the former is shown; does "
+    f"not hold if neither is, and one is surely not so; {_ELSE}"
 )
 
 
 def gained(difference: Interval, printed: float) -> str:
     """Whether something rises, by as much as is printed."""
-    if difference.low <= 0:
-        return FAILS
-    return HOLDS if difference.high >= printed else IN_PART
+    near = difference.low > printed - NEAR or None
+    return judged(above(difference), near if difference.high >= printed else False)
 
 
 HIGHER = (
-    "Holds if the whole interval of the difference is above 0; in part if only the mean difference."
+    "Holds if the whole interval of the difference is above 0; does not hold if all of it is "
+    f"below; {_ELSE}"
 )
 
 
 def higher(difference: Interval) -> str:
-    """Whether something is higher, surely or on the face of it."""
-    if difference.low > 0:
-        return HOLDS
-    return IN_PART if difference.mean > 0 else FAILS
+    """Whether something is higher."""
+    return judged(above(difference))
 
 
-LOWER = HIGHER.replace("above", "below")
+LOWER = (
+    "Holds if the whole interval of the difference is below 0; does not hold if all of it is "
+    f"above; {_ELSE}"
+)
 
 
 def lower(difference: Interval) -> str:
-    """Whether something is lower, surely or on the face of it."""
+    """Whether something is lower."""
     return higher(Interval(-difference.mean, -difference.high, -difference.low))
 
 
 SLIGHTLY_LOWER = (
-    "Holds if the whole interval of the difference is below 0 and above "
-    f"−{100 * NEAR:g} points; does not hold if all of it is elsewhere; else in part."
+    f"Holds if the whole interval of the difference is below 0 and above −{_NEAR}; in part if it "
+    f"is below 0, but may be more; does not hold if all of it is elsewhere; {_ELSE}"
 )
 
 
 def slightly_lower(difference: Interval) -> str:
     """Whether something falls, but not by much."""
-    if difference.low >= 0 or difference.high <= -NEAR:
-        return FAILS
-    return HOLDS if -NEAR < difference.low <= difference.high < 0 else IN_PART
+    if difference.low > 0 or difference.high <= -NEAR:
+        return REFUTED
+    if difference.high >= 0:
+        return OPEN
+    return HOLDS if difference.low > -NEAR else IN_PART
 
 
 def margin_in_words(margin: float) -> str:
@@ -84,115 +110,118 @@ def margin_in_words(margin: float) -> str:
 
 def kept_words(margin: float) -> str:
     """The words of ``kept``."""
+    points = margin_in_words(margin)
     return (
-        f"Holds if no interval of a difference reaches {margin_in_words(margin)} down; does not "
-        "hold if a difference is surely below 0; else in part."
+        f"Holds if the whole interval of the difference is above −{points}; does not hold if all "
+        f"of it is below; {_ELSE}"
     )
 
 
 def kept(difference: Interval, margin: float) -> str:
     """Whether something is no lower, up to a margin."""
-    if difference.high < 0:
-        return FAILS
-    return HOLDS if difference.low > -margin else IN_PART
+    return judged(above(difference, -margin))
 
 
-def same_words(margin: float) -> str:
-    """The words of ``same``."""
-    return (
-        "Both would be equal if failed missions collected as much as the others. Holds if the "
-        f"whole interval of the difference is within {margin_in_words(margin)}; in part if only "
-        "the mean is."
-    )
-
-
-def same(difference: Interval, margin: float) -> str:
-    """Whether a difference does not matter."""
-    if abs(difference.mean) > margin:
-        return FAILS
-    return HOLDS if max(-difference.low, difference.high) <= margin else IN_PART
-
-
-MOST = "Holds if the whole interval of the share is above one half; in part if only the mean."
+MOST = (
+    "Holds if the whole interval of the share is above one half; does not hold if all of it is "
+    f"below; {_ELSE}"
+)
 
 
 def most(share: Interval) -> str:
     """Whether something is so in most cases."""
-    if share.low > 0.5:
-        return HOLDS
-    return IN_PART if share.mean > 0.5 else FAILS
-
-
-ALWAYS = (
-    "Holds if that is so in every mission that succeeded; in part if in more than half of them."
-)
-
-
-def always(share: float) -> str:
-    """Whether something is so without exception."""
-    if share == 1:
-        return HOLDS
-    return IN_PART if share > 0.5 else FAILS
+    return judged(above(share, 0.5))
 
 
 NEVER_ALL = (
-    "Holds if no mission collected everything; in part if some did, and the whole interval of the "
-    "mean ratio is below 100 %."
+    "Holds if no mission collected everything, and by the whole interval less than "
+    f"{100 * NEAR:g} % of missions do; in part if only the mean ratio is surely below 100 %; does "
+    f"not hold if every mission collected everything; {_ELSE}"
 )
 
 
-def never_all(share_of_all: float, ratio: Interval) -> str:
-    """Whether the collection ratio stays below 100 %."""
-    if share_of_all == 0:
-        return HOLDS
-    return IN_PART if ratio.high < 1 else FAILS
+def never_all(whole: Interval, ratio: Interval) -> str:
+    """Whether the collection ratio stays below 100 %.
+
+    Args:
+        whole: Share of the missions that collected everything.
+        ratio: Mean collection ratio.
+    """
+    if whole.mean == 1:
+        return REFUTED
+    never = whole.mean == 0 and whole.high < NEAR
+    return judged(never or None, ratio.high < 1 or None)
 
 
+_TWO = (
+    "both by the whole interval; in part if only one of the two is shown; does not hold if none "
+    f"is, and one is surely not so; {_ELSE}"
+)
 IGNORED = (
     "A node is ignored if less than half of its data is collected. Holds if that befalls most of "
-    "these nodes, and more of them than of the others, both by the whole interval; in part if "
-    "only one of the two is so."
+    f"these nodes, and more of them than of the others, {_TWO}"
 )
 
 
 def ignored(there: Interval, more: Interval) -> str:
     """Whether most of some nodes are ignored, more often than the others."""
-    return _both(there.low > 0.5, more.low > 0)
+    return judged(above(there, 0.5), above(more))
 
 
 DIVIDED = (
     "A straight line parts the nodes, the best one for the share of the data that every UAV "
     "collects on its own side. Holds if that share is above what chance gives (the same data, the "
     "nodes shuffled), and the UAV that serves a node most collects more than three quarters of its "
-    "data, both by the whole interval; in part if only one of the two is so."
+    f"data, {_TWO}"
 )
 
 
 def divided(beyond_chance: Interval, division: Interval) -> str:
     """Whether two UAVs have sectors, and nodes, of their own."""
-    return _both(beyond_chance.low > 0, division.low > 0.75)
+    return judged(above(beyond_chance), above(division, 0.75))
 
 
-# Verdicts of ``effects`` as those here: open is what nothing contradicts, but not all of it shows.
-OF_EFFECTS = {effects.HOLDS: HOLDS, effects.OPEN: IN_PART, effects.REFUTED: FAILS}
-_OPEN = "in part if nothing contradicts it, but not all of it is sure (Holm-adjusted)."
-BEST = f"Holds if every other value is surely lower; {_OPEN}"
-LOWEST = f"Holds if every other value is surely higher; {_OPEN}"
-RISES = f"Holds if some values differ surely, and all that do go up; {_OPEN}"
+# The words of ``effects``.
+_PAIRS = "(Holm, all pairs of values)"
+BEST = (
+    f"Holds if every other value is surely lower {_PAIRS}; does not hold if one is surely higher; "
+    f"{_ELSE}"
+)
+LOWEST = (
+    f"Holds if every other value is surely higher {_PAIRS}; does not hold if one is surely lower; "
+    f"{_ELSE}"
+)
+RISES = (
+    f"Holds if some values differ surely {_PAIRS}, and all that do go up; does not hold if some "
+    f"surely go down; {_ELSE}"
+)
 PEAKS = (
-    "Holds if it rises, then falls, and may be highest there; in part if nothing that differs "
-    "surely contradicts it."
+    f"Holds if it surely rises {_PAIRS}, then falls, and may be highest there; does not hold if "
+    f"values that differ surely contradict that; {_ELSE}"
 )
 
 
 def alike_words(margin: float) -> str:
     """The words of ``effects.alike``."""
-    return f"Holds if all intervals of differences lie within {margin_in_words(margin)}; {_OPEN}"
+    points = margin_in_words(margin)
+    return (
+        f"Holds if all intervals of differences lie within {points}; does not hold if one, widened "
+        f"for their number (Bonferroni), lies wholly beyond; {_ELSE}"
+    )
+
+
+def no_lower_words(margin: float) -> str:
+    """The words of ``effects.no_lower``."""
+    points = margin_in_words(margin)
+    return (
+        f"Holds if all intervals of differences lie above −{points}; does not hold if one, widened "
+        f"for their number (Bonferroni), lies wholly below; {_ELSE}"
+    )
 
 
 CHOSEN = (
     "Holds if the setting that the study selects has that many, and so have all that it could not "
-    "rule out; in part if only some of these have."
+    f"rule out; does not hold if none of these has; {_ELSE}"
 )
 
 
@@ -204,15 +233,22 @@ def chosen(choice: Choice, wanted: Collection[int]) -> str:
         wanted: Numbers of the design points.
     """
     left = {choice.best, *choice.survivors}
-    if left <= {*wanted}:
-        return HOLDS
-    return IN_PART if left & {*wanted} else FAILS
+    part: Part = None if left & {*wanted} else False
+    return judged(left <= {*wanted} or part)
 
 
+_LONG = f"Trainings of fewer than the {CROSSING:,} steps of the paper's crossing cannot tell."
+_AT_THE_END = f"the {100 * BAND:g} % interval of the last difference is above 0"
+_NOT_AT_THE_END = f"does not hold if that is below 0; {_ELSE} {_LONG}"
+
+PASSES = (
+    f"Mean curves are compared in phase II. Holds if {_AT_THE_END}: the curve with transfer is "
+    f"then above from some step to the end; {_NOT_AT_THE_END}"
+)
 THROUGHOUT = (
     "Mean curves (exponential moving averages) are compared in phase II. Holds if that with "
-    "transfer is above at every step and the 99 % interval of the last difference is above 0; in "
-    "part if only its end is above."
+    f"transfer is above at every step and {_AT_THE_END}; in part if only its end is above; "
+    f"{_NOT_AT_THE_END}"
 )
 
 
@@ -226,28 +262,19 @@ def throughout(verdict: str, all_along: bool) -> str:
     return IN_PART if verdict == HOLDS and not all_along else verdict
 
 
-PASSES = (
-    "Mean curves are compared in phase II. Holds if that with transfer is above from some step to "
-    "the end and the 99 % interval of the last difference is above 0; in part if only the curve is."
-)
-
 LEVELS_OFF = (
     f"Holds if the mean curve stays within {margin_in_words(MARGIN)} of its end from the first "
-    "half of the training on, and ends lower than that with transfer, by the 99 % interval; in "
-    "part if only one of the two is so."
+    "half of the training on, and ends lower than that with transfer, by the "
+    f"{100 * BAND:g} % interval; in part if only one of the two is so; does not hold if neither "
+    f"is, and it ends surely higher; {_ELSE} {_LONG}"
 )
 
 
-def levels_off(settled: float, gap: Interval) -> str:
+def levels_off(settled: float, end: Interval) -> str:
     """Whether training without transfer learning levels off, and low.
 
     Args:
         settled: Share of the training after which the curve stays near its end.
-        gap: Last difference, with transfer - without.
+        end: Last difference, with transfer - without.
     """
-    return _both(settled <= 0.5, gap.low > 0)
-
-
-def _both(one: bool, other: bool) -> str:
-    """Holds if both are so, in part if one is."""
-    return (FAILS, IN_PART, HOLDS)[int(one) + int(other)]
+    return judged(settled <= 0.5 or None, above(end))

@@ -16,7 +16,9 @@ import pandas as pd
 from scipy import stats
 
 from analysis.comparison import adjust
+from analysis.paper import CROSSING
 from analysis.statistics import LEVEL, Interval, mean_interval
+from analysis.verdicts import OPEN, above, judged
 
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
@@ -25,20 +27,18 @@ BAND = 0.99
 # Trainings that a band takes: Student's t for two is 64 standard errors wide at 99 %.
 FEWEST = 3
 
-HOLDS, IN_PART, FAILS = "holds", "holds in part", "does not hold"
-
 
 @dataclass(frozen=True)
 class Transfer:
     """How trainings with transfer learning compare to those without it.
 
     Attributes:
-        verdict: ``HOLDS`` if the mean curve with transfer is above from some step to the end and
-            the interval of the last difference is above 0; ``IN_PART`` if the curve alone is;
-            else ``FAILS``.
+        verdict: Of ``verdicts``, whether the mean curve with transfer ends above, by the interval
+            of the last difference; ``OPEN`` if the trainings are too short to tell.
         since: The first training step from which the mean curve stays above; none if it ends below.
         throughout: Whether that is the first step that both can be compared at.
         last: Difference of the curves at the last step, with its interval.
+        length: The last step that both reach.
         trainings: Numbers of trainings with and without transfer.
     """
 
@@ -46,6 +46,7 @@ class Transfer:
     since: int | None
     throughout: bool
     last: Interval
+    length: int
     trainings: tuple[int, int]
 
 
@@ -86,7 +87,13 @@ def bands(averages: pd.DataFrame, level: float = BAND) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*keys, "mean", "low", "high", "n"])
 
 
-def transfer(averages: pd.DataFrame, using: str, without: str, level: float = BAND) -> Transfer:
+def transfer(
+    averages: pd.DataFrame,
+    using: str,
+    without: str,
+    level: float = BAND,
+    shortest: int = CROSSING,
+) -> Transfer:
     """Whether a variant with transfer learning passes the one without it and ends higher.
 
     They are compared where both fly the mission itself: in the last phase of both.
@@ -96,6 +103,7 @@ def transfer(averages: pd.DataFrame, using: str, without: str, level: float = BA
         using: The variant with transfer learning.
         without: The variant without it.
         level: Confidence level of the last difference.
+        shortest: Steps below which trainings cannot tell; the paper's crossing.
     """
     a, b = (_last_phase(averages, variant) for variant in (using, without))
     steps = a.index.intersection(b.index)
@@ -104,9 +112,9 @@ def transfer(averages: pd.DataFrame, using: str, without: str, level: float = BA
     first = behind[-1] + 1 if len(behind) else 0
     since = int(steps[first]) if first < len(steps) else None
     last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), level)[0]
-    ahead = IN_PART if not last.low > 0 else HOLDS
-    verdict = FAILS if since is None else ahead
-    return Transfer(verdict, since, not len(behind), last, (a.shape[1], b.shape[1]))
+    length = int(steps[-1])
+    verdict = judged(above(last)) if length >= shortest else OPEN
+    return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
 
 
 def finals(curves: pd.DataFrame) -> pd.DataFrame:

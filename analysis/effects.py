@@ -16,6 +16,7 @@ from analysis import findings
 from analysis.comparison import adjust, paired
 from analysis.results import Results
 from analysis.statistics import LEVEL, SHARES
+from analysis.verdicts import HOLDS, OPEN, REFUTED
 from dess.errors import InputError
 
 
@@ -25,6 +26,11 @@ class Parameter(NamedTuple):
     name: str
     short: str
     unit: str = ""
+
+    @property
+    def within(self) -> str:
+        """The name inside a sentence."""
+        return self.name[0].lower() + self.name[1:]
 
 
 PARAMETERS = {
@@ -37,8 +43,6 @@ PARAMETERS = {
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"
-
-HOLDS, OPEN, REFUTED = "holds", "cannot be told", "does not hold"
 
 
 @dataclass(frozen=True)
@@ -96,8 +100,9 @@ def changes(
 
     Returns:
         A row per pair: ``first`` and ``second`` (positions), ``difference`` (second - first) with
-        ``low`` and ``high`` (95 % each), ``p``, ``p_adjusted`` (Holm, over the pairs) and ``n``,
-        the number of replications.
+        ``low`` and ``high`` (95 % each), ``wide_low`` and ``wide_high`` (95 % for all pairs at
+        once, by Bonferroni), ``p``, ``p_adjusted`` (Holm, over the pairs) and ``n``, the number of
+        replications.
     """
     points = table[table["field"] == field].drop_duplicates("position")
     places = dict(zip(points["point"], points["position"], strict=True))
@@ -107,13 +112,19 @@ def changes(
     values = ours.pivot(index="replication", columns="point", values=metric).dropna()
     values = values.rename(columns=places).astype(float)
     generator = np.random.default_rng(results.store.manifest.seed)
+    couples = [*combinations(sorted(values), 2)]
+    at_once = 1 - (1 - LEVEL) / max(len(couples), 1)
     rows = []
-    for first, second in combinations(sorted(values), 2):
+    for first, second in couples:
         of = values[second].to_numpy(), values[first].to_numpy()
         # Of the intervals it is Student's that is used; the bootstrap's need not be sharp.
-        pair = paired(*of, generator, resamples=100, share=metric in SHARES)
-        rows.append((first, second, pair.difference, pair.low, pair.high, pair.p, pair.n))
-    columns = ["first", "second", "difference", "low", "high", "p", "n"]
+        pair, wide = (
+            paired(*of, generator, level, resamples=100, share=metric in SHARES)
+            for level in (LEVEL, at_once)
+        )
+        ends = pair.low, pair.high, wide.low, wide.high
+        rows.append((first, second, pair.difference, *ends, pair.p, pair.n))
+    columns = ["first", "second", "difference", "low", "high", "wide_low", "wide_high", "p", "n"]
     pairs = pd.DataFrame(rows, columns=columns)
     return pairs.assign(p_adjusted=adjust(pairs["p"].to_numpy(float), "holm"))
 
@@ -147,22 +158,28 @@ def best_at(pairs: pd.DataFrame, position: int) -> str:
 
 
 def no_lower(pairs: pd.DataFrame, positions: Iterable[int], margin: float) -> str:
-    """Whether the metric is no lower at some values than at all others, up to a margin."""
+    """Whether the metric is no lower at some values than at all others, up to a margin.
+
+    It holds if all intervals of a difference are above -margin; it does not if one of those that
+    hold at once is below.
+    """
     chosen = [*positions]
     inside = pairs["second"].isin(chosen)
     across = inside != pairs["first"].isin(chosen)
     rows, upwards = pairs[across], inside[across]
-    gaps = rows["difference"].where(upwards, -rows["difference"])
     lows = rows["low"].where(upwards, -rows["high"])
-    if ((gaps < 0) & (rows["p_adjusted"] <= 1 - LEVEL)).any():
+    tops = rows["wide_high"].where(upwards, -rows["wide_low"])
+    if (tops < -margin).any():
         return REFUTED
     return HOLDS if (lows > -margin).all() else OPEN
 
 
 def alike(pairs: pd.DataFrame, margin: float) -> str:
-    """Whether all values are alike: every interval of a difference within a margin."""
-    differ = (pairs["p_adjusted"] <= 1 - LEVEL) & (pairs["difference"].abs() > margin)
-    if differ.any():
+    """Whether all values are alike: every interval of a difference within a margin.
+
+    They are not if one of the intervals that hold at once is wholly beyond.
+    """
+    if ((pairs["wide_low"] > margin) | (pairs["wide_high"] < -margin)).any():
         return REFUTED
     within = (pairs["low"] >= -margin) & (pairs["high"] <= margin)
     return HOLDS if within.all() else OPEN

@@ -3,6 +3,8 @@
 The paper: the learned policy of its Section V on a 32 x 32 map.
 """
 
+from analysis.statistics import Interval, wilson
+
 # The metrics, in the paper's order and words (Section VI-A).
 METRICS = {
     "success": "Successful communication",
@@ -37,6 +39,17 @@ SWEET_SPOT = {
 # By the shipped study that does the same.
 PRINTED = {"table4": TABLE_IV, "sweet-spot": SWEET_SPOT}
 
+# The best number of UAVs (Section V-D); extremes of two parameters (V-C); values of C_S [%] that
+# are adventurous (Fig. 5b); initial data per node that is the best, and what comes next (Fig. 5d).
+BEST_UAVS = 3
+LONE_UAV, EARLIEST_CHARGE = 1, 10
+ADVENTUROUS = (10, 20)
+TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
+
+# Training steps at which the curve with transfer learning passes that without, and from which on
+# that without stays level (Fig. 3b, Section V-B).
+CROSSING, LEVEL_FROM = 800_000, 500_000
+
 ABOVE, LEVEL, BELOW = "above", "not distinguishable", "below"
 
 
@@ -45,3 +58,8 @@ def verdict(low: float, high: float, printed: float) -> str:
     if low > printed:
         return ABOVE
     return BELOW if high < printed else LEVEL
+
+
+def spread(share: float, missions: int) -> Interval:
+    """A printed share of missions with the interval that it does not print (Wilson)."""
+    return Interval(share, *wilson(round(share * missions), missions)[1:])

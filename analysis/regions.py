@@ -18,13 +18,13 @@ from analysis.findings import PRODUCT, learners
 from analysis.paper import METRICS
 from analysis.results import Results
 from analysis.statistics import LEVEL, Interval, wilson
+from analysis.verdicts import OPEN
 from dess.errors import InputError
 from dess.scenario import Scenario
 
 PARAMETERS = ("uavs", "flying_time", "charge_start", "charge_complete", "initial_data")
 
-AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission
-OPEN = "cannot be told"  # of the mean of many, where it is neither ahead nor behind
+AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be OPEN
 
 BINS = 5  # of a parameter, at most
 DEPTH, LEAST, SHARE = 3, 20, 0.05  # of the tree: its depth, and the missions in a leaf at least
@@ -137,6 +137,15 @@ def varied(missions: pd.DataFrame) -> list[str]:
     return [field for field in PARAMETERS if missions[field].nunique() > 1]
 
 
+def halves(missions: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The missions of even replications, and those of odd ones.
+
+    What is found on the one half is told by the other, which had no part in it.
+    """
+    even = missions["replication"] % 2 == 0
+    return missions[even], missions[~even]
+
+
 def outcomes(missions: pd.DataFrame) -> pd.DataFrame:
     """In what share of the missions of ``duels`` the policy is ahead, level and behind.
 
@@ -224,9 +233,8 @@ def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
         A row per region that has missions to tell of, the lowest mean first: ``rule`` in words,
         ``found_on`` (number of missions), and the columns of a comparison, as of ``along``.
     """
-    even = missions["replication"] % 2 == 0
     fields = varied(missions) or [*PARAMETERS[:1]]
-    train, test = missions[even], missions[~even]
+    train, test = halves(missions)
     columns = ["rule", "found_on"]
     if train.empty or test.empty:
         return _compared([], columns, candidates)

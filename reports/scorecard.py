@@ -12,17 +12,23 @@ from markupsafe import Markup, escape
 
 from analysis import paper
 from analysis.case import Finding, Quantity
-from analysis.claims import FAILS, HOLDS, IN_PART, NO_RESULTS, VERDICTS
+from analysis.claims import NO_RESULTS, VERDICTS
 from analysis.scorecard import Row
+from analysis.statistics import LEVEL
+from analysis.verdicts import HOLDS, IN_PART, OPEN, REFUTED
 from reports import page
 
-COLUMNS = {"learned": "The best learned policy", "paper_means": "The paper's own means"}
+COLUMNS = {
+    "learned": "The best learned policy",
+    "papers_network": "The paper's network and algorithm, with means of ours",
+}
 
 # Verdict -> class and sign: never told by colour alone.
 _LOOK = {
     HOLDS: ("holds", "✓"),
     IN_PART: ("in-part", "◐"),
-    FAILS: ("fails", "✗"),
+    OPEN: ("open", "?"),
+    REFUTED: ("refuted", "✗"),
     NO_RESULTS: ("none", "–"),
 }
 _AGAINST = {
@@ -32,12 +38,17 @@ _AGAINST = {
 }
 
 
-def scorecard(rows: Sequence[Row], pages: Collection[str] | None = None) -> HTML:
+def scorecard(
+    rows: Sequence[Row],
+    pages: Collection[str] | None = None,
+    departures: Sequence[str] = (),
+) -> HTML:
     """The scorecard.
 
     Args:
         rows: As of ``analysis.scorecard.scorecard``.
         pages: File names of the pages that there are, to link to; None for all.
+        departures: What of the policy with the paper's network is not the paper's.
     """
     environment = Environment(
         loader=PackageLoader("reports", "templates"),
@@ -55,7 +66,7 @@ def scorecard(rows: Sequence[Row], pages: Collection[str] | None = None) -> HTML
         for part, own in groupby(rows, key=lambda row: row.part)
     ]
     html = environment.get_template("scorecard.html").render(
-        explanation=_EXPLANATION,
+        explanation=_explanation(rows, usual["papers_network"], departures),
         counts=[_count(rows, column, title) for column, title in titles.items()],
         titles=[*titles.values()],
         parts=parts,
@@ -64,11 +75,45 @@ def scorecard(rows: Sequence[Row], pages: Collection[str] | None = None) -> HTML
     return HTML(html)
 
 
-_EXPLANATION = (
-    "What Section V of the paper claims, and whether it is so here. Every verdict is computed from "
-    "results by the rule that stands with the claim; intervals are of 95 % unless it says "
-    "otherwise. A figure of the paper holds if it is reached; better ones hold, too."
-)
+def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) -> list[str]:
+    """How to read the scorecard, a paragraph each."""
+    spreads = {each.interval: each for row in rows for each in row.printed if each.low is not None}
+    examples = [
+        f"{page.interval(*each.interval).partition(' % ')[2]} for a success in "
+        f"{page.percent(each.value)} of {each.n:,} missions"
+        for each in spreads.values()
+    ]
+    verdicts = (
+        "What Section V of the paper claims, and whether it is so here. Every verdict is computed "
+        "from results by the rule that stands with the claim. A claim holds, or does not hold, "
+        "where whole intervals say so; it holds in part where a part of it is shown; where the "
+        "missions or trainings here leave it open, it cannot be told. A figure of the paper holds "
+        "if it is reached; better ones hold, too."
+    )
+    no_score = (
+        f"The counts are no score. Rows overlap, as those that find {paper.BEST_UAVS} UAVs the "
+        f"best; intervals are of {page.level(LEVEL)} each, unless a rule says otherwise, not of "
+        f"all {len(rows)} rows at once, so some may miss by chance; and the best learned policy of "
+        "a study is chosen on the missions that judge it, which flatters it. What follows from the "
+        "model by itself, as that success takes a charge, is left out."
+    )
+    spread = (
+        "The paper's figures are means of missions as well, but it prints no intervals"
+        + (
+            f". At {page.level(LEVEL)} (Wilson) they are {page.words(examples)}; the verdicts on "
+            "these allow for that"
+            if examples
+            else ""
+        )
+        + ". Of its other figures it says too little for one: they count as exact, which makes "
+        "verdicts on them a little too sure."
+    )
+    ours = (
+        f"{papers or 'The other policy'} has the paper's observation, network and Algorithm 1. Not "
+        f"the paper's, but ours, are {page.words(departures)}. So its column does not tell what "
+        "the paper's means come to by themselves."
+    )
+    return [verdicts, no_score, spread, *([ours] if departures else [])]
 
 
 def _claim(row: Row, pages: Collection[str] | None, usual: dict[str, str]) -> dict[str, Any]:

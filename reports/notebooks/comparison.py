@@ -30,40 +30,27 @@ from analysis import comparison_figures as drawings
 from analysis import figures, findings, fly, load_results, paper, regions, summary, timing
 from analysis.comparison import CHECKPOINT
 from analysis.effects import parameter
+from analysis.findings import PRODUCT
 from analysis.statistics import LEVEL
 from reports import page
 
 study = load_results(Path(results) / "comparison")
 times = timing.read(Path(results) / "timing")
-product = "collection_ratio_and_communication"
 
 pair = regions.pair_of(study, learned, heuristic)
 policy, baseline = pair.policy, pair.baseline
 missions = regions.duels(study, pair)
 seed = study.manifest["seed"]
+level = page.level(LEVEL)
 means = summary(study.missions, by=["policy"])
-ranked = means[means["metric"] == product].sort_values("mean", ascending=False, kind="stable")[
+ranked = means[means["metric"] == PRODUCT].sort_values("mean", ascending=False, kind="stable")[
     "policy"
 ]
 taught = {name for names in findings.learners(study).values() for name in names}
 
 
-def percent(level):
-    return f"{100 * level:g} %"
-
-
-def p_value(p):
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
-
-
 def points(row, mean="mean"):
     return page.points(row[mean], row["low"], row["high"])
-
-
-def within(field):
-    """The name of a parameter inside a sentence."""
-    name = parameter(field).name
-    return name[0].lower() + name[1:]
 
 
 def plural(n, one, many):
@@ -152,7 +139,7 @@ caveats = [
     if more
     else "",
 ]
-gain = own.set_index("metric").loc[product, "variance_reduction"]
+gain = own.set_index("metric").loc[PRODUCT, "variance_reduction"]
 worth = (
     f"The common missions are worth much: with missions of its own for each policy, it would "
     f"take {1 / (1 - gain):.0f} times as many for intervals as narrow."
@@ -161,7 +148,7 @@ worth = (
 )
 display(
     Markdown(
-        f"By the p-values at {percent(LEVEL)}, after Holm's correction for the number of "
+        f"By the p-values at {level}, after Holm's correction for the number of "
         "comparisons:\n\n"
         + "\n\n".join(text for text in ("\n".join(lines), *caveats, worth) if text)
     )
@@ -177,7 +164,8 @@ def by_metric(rows, name):
     for who, own in rows.groupby(name, sort=False):
         own = own.set_index("metric").loc[[*paper.METRICS]]
         cells = [
-            (points(row, "difference"), p_value(row["p_adjusted"])) for _, row in own.iterrows()
+            (points(row, "difference"), page.p_value(row["p_adjusted"]))
+            for _, row in own.iterrows()
         ]
         base = own["baseline"].iloc[0]
         lines.append([f"{who} − {base}", *(text for cell in cells for text in cell)])
@@ -185,7 +173,7 @@ def by_metric(rows, name):
 
 
 how = (
-    f"mean differences in points, with {percent(LEVEL)} intervals of one difference each; p by "
+    f"mean differences in points, with {level} intervals of one difference each; p by "
     "Holm over the whole table, and by Bonferroni for the choice of the"
 )
 if len(versus):
@@ -233,9 +221,9 @@ page.figure(
     drawings.distribution(missions, pair),
     f"Distribution of the difference between {policy} and {baseline} over the missions",
     f"Share of the missions (n = {len(missions):,}) in which the difference in collection ratio "
-    f"and communication is at most the value below. The {percent(LEVEL)} band holds the whole "
+    f"and communication is at most the value below. The {level} band holds the whole "
     "curve. Where the curve crosses 0 is the share of missions that are lost. Up to "
-    f"{percent(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
+    f"{page.level(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
     f"{page.difference(missions['difference'].min(), 0)}, the highest "
     f"{page.difference(missions['difference'].max(), 0)}.",
 )
@@ -253,7 +241,7 @@ verdicts = {v: int((lead["verdict"] == v).sum()) for v in ("ahead", "behind", re
 
 
 def place(row):
-    return f"{within(row['field'])} {row['value']}, {points(row)} points"
+    return f"{parameter(row['field']).within} {row['value']}, {points(row)} points"
 
 
 def spread(field):
@@ -261,14 +249,14 @@ def spread(field):
     rows = lead[lead["field"] == field]
     low, high = rows.loc[rows["mean"].idxmin()], rows.loc[rows["mean"].idxmax()]
     return (
-        f"{within(field)} ({page.difference(low['mean'], 0)} at {low['value']}, "
+        f"{parameter(field).within} ({page.difference(low['mean'], 0)} at {low['value']}, "
         f"{page.difference(high['mean'], 0)} at {high['value']})"
     )
 
 
 matters = depends["p_adjusted"] <= 1 - LEVEL
 named = [spread(field) for field in depends.loc[matters, "field"]]
-unnamed = [within(field) for field in depends.loc[~matters, "field"]]
+unnamed = [parameter(field).within for field in depends.loc[~matters, "field"]]
 if len(lead):
     display(
         Markdown(
@@ -276,7 +264,7 @@ if len(lead):
             "the initial data are the mean of a mission's nodes. "
             f"Of these {len(lead)} bins, {policy} is ahead in {verdicts['ahead']} and behind in "
             f"{verdicts['behind']}; of {verdicts[regions.OPEN]} it cannot be told (at "
-            f"{percent(LEVEL)}, after Holm's correction for all of them). The difference is lowest "
+            f"{level}, after Holm's correction for all of them). The difference is lowest "
             f"at {place(order.iloc[0])}, highest at {place(order.iloc[-1])}."
             + (f"\n\nIt depends on {page.words(named)}." if named else "")
             + (f" That it depends on {page.words(unnamed)} is not shown." if unnamed else "")
@@ -291,26 +279,30 @@ page.gallery(
     [
         (
             drawings.lead(lead, field, overall),
-            f"Mean difference between {policy} and {baseline} against the {within(field)}",
+            f"Mean difference of {policy} and {baseline} against the {parameter(field).within}",
             f"{policy} − {baseline}, collection ratio and communication, n = "
             f"{span(lead.loc[lead['field'] == field, 'n'])} missions per dot. Bars are "
-            f"{percent(LEVEL)} intervals. Dashed: all missions.",
+            f"{level} intervals. Dashed: all missions.",
         )
         for field in fields
     ]
 )
 
 # %%
-if len(depends) > 1:
-    first, second = depends["field"][:2]
-    cells = regions.across(missions, first, second, pair.candidates)
+finding, telling = regions.halves(missions)
+strongest = regions.dependence(finding)
+if len(strongest) > 1 and len(telling):
+    first, second = strongest["field"][:2]
+    names = [parameter(field).within for field in (first, second)]
+    cells = regions.across(telling, first, second, pair.candidates)
     low = cells.loc[cells["mean"].idxmin()]
     sure = {v: int((cells["verdict"] == v).sum()) for v in verdicts}
     display(
         Markdown(
-            f"The two parameters that explain most of the difference are the {within(first)} "
-            f"({page.percent(depends['explained'][0])} of its variance) and the {within(second)} "
-            f"({page.percent(depends['explained'][1])}). Both at once, "
+            "The two parameters that explain most of the difference were sought on the missions of "
+            f"even replications: the {names[0]} ({page.percent(strongest['explained'][0])} of its "
+            f"variance) and the {names[1]} ({page.percent(strongest['explained'][1])}). Both at "
+            "once are shown by the missions of odd replications, which had no part in that choice: "
             f"{policy} is ahead in {sure['ahead']} of {len(cells)} cells, behind in "
             f"{sure['behind']}. The lowest mean is {points(low)} points, with "
             f"{parameter(first).short} {low['value']} and {parameter(second).short} "
@@ -320,11 +312,11 @@ if len(depends) > 1:
     display(
         page.figure(
             drawings.heat(cells, first, second),
-            f"Mean difference over {within(first)} and {within(second)}",
+            f"Mean difference over {names[0]} and {names[1]}",
             f"{policy} − {baseline}, mean difference in points of collection ratio and "
             f"communication; blue is ahead, orange behind. In brackets: cannot be told at "
-            f"{percent(LEVEL)} (p of the paired t test, Holm's correction for {len(cells)} cells). "
-            f"n = {span(cells['n'])} missions per cell.",
+            f"{level} (p of the paired t test, Holm's correction for {len(cells)} cells). "
+            f"n = {span(cells['n'])} missions per cell, of odd replications.",
         )
     )
 
@@ -355,7 +347,7 @@ elif len(behind):
 else:
     text = (
         f"{policy} is **behind in none** of the {plural(len(found), 'region', 'regions')}, at "
-        f"{percent(LEVEL)} after Holm's correction. The difference is lowest in "
+        f"{level} after Holm's correction. The difference is lowest in "
         f"{region(found.iloc[0])}"
     )
 if len(unsure):
@@ -367,7 +359,7 @@ page.table(
             [
                 row["rule"],
                 points(row),
-                p_value(row["p_adjusted"]),
+                page.p_value(row["p_adjusted"]),
                 row["verdict"],
                 page.interval(row["behind"], row["behind_low"], row["behind_high"]),
                 f"{row['n']:,}",
@@ -378,7 +370,7 @@ page.table(
     ),
     f"The regions, on missions that did not find them: mean difference in collection ratio and "
     f"communication and share of the missions in which {policy} is behind, with "
-    f"{percent(LEVEL)} intervals. A parameter that is not named may have any value",
+    f"{level} intervals. A parameter that is not named may have any value",
 )
 
 # %% [markdown]
@@ -544,7 +536,7 @@ page.figure(
     drawings.decision_time(shown or times.costs, study.policies),
     "Time of a decision of every policy, for one mission and in the batch",
     f"n = {min(cost.calls for cost in shown or times.costs):,} calls or more per policy, on a "
-    f"logarithmic axis. A line goes from the median to what {percent(timing.SLOW)} of the calls "
+    f"logarithmic axis. A line goes from the median to what {page.level(timing.SLOW)} of the calls "
     "keep below: the spread of the calls, not an interval of their mean.",
 )
 
@@ -582,8 +574,9 @@ display(
         "Is that fast enough? A decision must be ready within a mission slot. The model gives a "
         f"slot no length in seconds; but in one, a UAV flies a cell of {cell:g} m, so a UAV of v "
         f"m/s gives {cell:g}/v seconds to decide. The slowest policy here, {slowest.policy}, needs "
-        f"no more than {drawings.duration(slowest.slow)} in {percent(timing.SLOW)} of its calls: "
-        f"enough up to about {float(f'{cell / slowest.slow:.2g}'):,.0f} m/s, on this processor."
+        f"no more than {drawings.duration(slowest.slow)} in {page.level(timing.SLOW)} of its "
+        f"calls: enough up to about {float(f'{cell / slowest.slow:.2g}'):,.0f} m/s, on this "
+        "processor."
     )
 )
 

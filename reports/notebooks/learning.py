@@ -25,8 +25,10 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import curves, learning_figures
-from analysis.paper import METRICS
+from analysis import claims, curves, learning_figures
+from analysis.findings import PRODUCT
+from analysis.paper import CROSSING, METRICS
+from analysis.section_v import curve_verdict
 from analysis.statistics import LEVEL
 from reports import page
 
@@ -34,7 +36,7 @@ folder = Path(trained or str(files("policies") / "trained"))
 trainings = pd.read_parquet(folder / "curves.parquet")
 each = trainings.groupby(["variant", "seed"]).last()  # the end of every training
 seeds = each.groupby("variant").size()
-product = "collection_ratio_and_communication"
+level, band_level = page.level(LEVEL), page.level(curves.BAND)
 baseline = "quick"
 
 pairs = {  # what a training has besides -> the variants with and without transfer learning
@@ -43,10 +45,6 @@ pairs = {  # what a training has besides -> the variants with and without transf
     "the paper's means alone": ("none of the three", "none of the three, no transfer"),
 }
 pairs = {name: pair for name, pair in pairs.items() if {*pair} <= {*seeds.index}}
-
-
-def percent(level):
-    return f"{100 * level:g} %"
 
 
 def spread(numbers, form):
@@ -78,10 +76,10 @@ def captioned(name, metric):
     figure = learning_figures.transfer(trainings, metric, labels)
     fewest = seeds[[using, without]].min()
     band = (
-        f"Bands: {percent(curves.BAND)} by Student's t over n = {seeds[using]} and "
+        f"Bands: {band_level} by Student's t over n = {seeds[using]} and "
         f"{seeds[without]} trainings."
         if fewest >= curves.FEWEST
-        else f"No band: over n = {fewest}, one of {percent(curves.BAND)} would be of no use."
+        else f"No band: over n = {fewest}, one of {band_level} would be of no use."
     )
     caption = (
         f"{name[0].upper() + name[1:]}. Thick: mean of the exponential moving averages (weight of "
@@ -91,7 +89,7 @@ def captioned(name, metric):
     return figure, f"{title} against training step, {name}, with and without transfer", caption
 
 
-fig3 = ("evaluation_reward", f"evaluation_{product}")
+fig3 = ("evaluation_reward", f"evaluation_{PRODUCT}")
 shown = [*pairs][:1] + [*pairs][1:][-1:]
 page.gallery([captioned(name, metric) for name in shown for metric in fig3])
 
@@ -102,9 +100,11 @@ found = {
     for name, pair in pairs.items()
     for metric in fig3
 }
-verdicts = {comparison.verdict for comparison in found.values()}
-agreed = len(verdicts) == 1
-(overall,) = verdicts if agreed else (curves.IN_PART,)
+verdicts = {key: curve_verdict(key[1], comparison) for key, comparison in found.items()}
+given = [*verdicts.values()]
+counted = [
+    f"**{verdict}** in {given.count(verdict)}" for verdict in claims.VERDICTS if verdict in given
+]
 
 
 def told(metric, transfer):
@@ -126,12 +126,10 @@ display(
     Markdown(
         "**The paper's claim**: the agent with transfer learning has the higher reward throughout, "
         "passes the other in collection ratio and communication, and ends higher; without it, "
-        "training levels off early and low. **The rule here**: the claim holds for a metric if, in "
-        "phase II, the mean curve with transfer is above from some step to the end, and the "
-        f"{percent(curves.BAND)} interval of the last difference (Welch's t over the trainings) "
-        "lies above 0; in part if the curve alone is above; else it does not hold.\n\n"
-        f"By this rule the claim **{overall}**"
-        + (f", in all {len(found)} comparisons." if agreed else ": the comparisons disagree.")
+        "training levels off early and low. **The rules here**, with Welch's t over the trainings:"
+        f"\n\n- of the reward: {claims.THROUGHOUT}\n- of collection ratio and communication: "
+        f"{claims.PASSES}\n\nBy these rules the claim "
+        f"{page.words(counted)} of {len(found)} comparisons."
     )
 )
 
@@ -140,7 +138,7 @@ def judged(name):
     using, without = pairs[name]
     lines = [f"- With {name} (n = {seeds[using]} and {seeds[without]}):"]
     return lines + [
-        f"    - {learning_figures.NAMES[metric]} **{found[name, metric].verdict}**: "
+        f"    - {learning_figures.NAMES[metric]} **{verdicts[name, metric]}**: "
         + told(metric, found[name, metric])
         for metric in fig3
     ]
@@ -148,7 +146,7 @@ def judged(name):
 
 display(
     Markdown(
-        f"Where the curve with transfer lies, with {percent(curves.BAND)} intervals of the last "
+        f"Where the curve with transfer lies, with {band_level} intervals of the last "
         "difference, of the product in percentage points:\n\n"
         + "\n".join(line for name in pairs for line in judged(name))
     )
@@ -157,13 +155,14 @@ display(
 # %%
 unclear = [f for f in found.values() if f.last.low <= 0 <= f.last.high]
 alone = [*pairs][-1]
-ends = {v: 100 * each.loc[v, f"final_{product}"].max() for v in pairs[alone]}
+ends = {v: 100 * each.loc[v, f"final_{PRODUCT}"].max() for v in pairs[alone]}
 display(
     Markdown(
         f"In {len(unclear)} of {len(found)} comparisons the interval of the last difference holds "
         "0: so few trainings cannot tell whether transfer helps or harms there. The paper sees its "
-        f"crossing at 0.8 million steps, far beyond this budget of {each['updates'].max():,}; a "
-        f"longer one might say otherwise. With {alone}, the best training with transfer reaches "
+        f"crossing at {CROSSING:,} steps; the trainings here have {each['updates'].max():,}"
+        + (", and longer ones might say otherwise" if each["updates"].max() < CROSSING else "")
+        + f". With {alone}, the best training with transfer reaches "
         f"{ends[pairs[alone][0]]:.1f} %, the best without {ends[pairs[alone][1]]:.1f} % in "
         "collection ratio and communication."
     )
@@ -185,13 +184,13 @@ display(
 
 # %%
 last = curves.finals(trainings)
-table = curves.ablation(last, f"final_{product}", baseline)
+table = curves.ablation(last, f"final_{PRODUCT}", baseline)
 table = table.sort_values("mean", ascending=False, kind="stable").reset_index(drop=True)
 single = table[table["n"] == 1]
 page.figure(
-    learning_figures.ablation(table, last, f"final_{product}", baseline),
+    learning_figures.ablation(table, last, f"final_{PRODUCT}", baseline),
     "Collection ratio and communication that the trainings of every variant reach",
-    f"Dots are trainings, n of them; a diamond is their mean, with its {percent(LEVEL)} interval "
+    f"Dots are trainings, n of them; a diamond is their mean, with its {level} interval "
     "by Student's t over the trainings. One training has no interval, and no diamond. Dashed: the "
     f"mean of {baseline}. An arrow: all trainings are left of the axis.",
 )
@@ -209,7 +208,7 @@ def line(row):
         if row["low"] < row["high"]
         else page.percent(row["mean"]),
         "" if same else page.points(row["difference"], *ends),
-        "" if same else f"{row['p_adjusted']:.2g}",
+        "" if same else page.p_value(row["p_adjusted"]),
         *map(page.percent, others.mean()),
     ]
 
@@ -218,7 +217,7 @@ def line(row):
 head = ["Variant", "n", name, f"To {baseline} [points]", "p (Holm)", *others]
 page.table(
     pd.DataFrame([line(row) for _, row in table.iterrows()], columns=head),
-    f"Means over n trainings with {percent(LEVEL)} intervals; none of one training, or where all "
+    f"Means over n trainings with {level} intervals; none of one training, or where all "
     "are the same. Differences: Welch's t; of a single training, Student's t with the spread of "
     f"{baseline}, so the interval holds 0 if one more training of {baseline} might have come out "
     "like that",
@@ -272,19 +271,17 @@ def trained_once(name):
 
 page.gallery([trained_once(name) for name in ran])
 
+
 # %%
-margin = 0.01
-
-
 def course(name):
     curve = ran[name]
-    near, end = curves.settled(curve, f"evaluation_{product}", margin), curve.iloc[-1]
+    near, end = curves.settled(curve, f"evaluation_{PRODUCT}", claims.MARGIN), curve.iloc[-1]
     return (
-        f"- **{name}** ends at {page.percent(end[f'evaluation_{product}'])} after "
+        f"- **{name}** ends at {page.percent(end[f'evaluation_{PRODUCT}'])} after "
         f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots and "
         f"{end['seconds'] / 60:.0f} minutes. From update {near['updates']:,} on "
         f"({near['seconds'] / 60:.0f} minutes) its moving average stays within "
-        f"{100 * margin:g} point of its end: the other "
+        f"{claims.margin_in_words(claims.MARGIN)} of its end: the other "
         f"{page.percent(1 - near['updates'] / end['updates'])} of the updates moved it no further."
     )
 

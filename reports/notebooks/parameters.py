@@ -27,16 +27,21 @@ import pandas as pd
 from IPython.display import Markdown, display
 
 from analysis import effects, figures, findings, load_results, paper, parameter_figures, summary
+from analysis.claims import NO_RESULTS, VERDICTS, margin_in_words
 from analysis.design import NOISE
+from analysis.effects import parameter
+from analysis.findings import PRODUCT
+from analysis.scorecard import margin, of_policy
+from analysis.section_v import FIG_5
 from analysis.statistics import LEVEL
 from reports import page
 
 folder = Path(results)
+level = page.level(LEVEL)
 fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
-product = "collection_ratio_and_communication"
 
 means = summary(fig5.missions, by=["policy"])
-ranked = means[means["metric"] == product].sort_values("mean", ascending=False)["policy"]
+ranked = means[means["metric"] == PRODUCT].sort_values("mean", ascending=False)["policy"]
 taught = {policy for those in findings.learners(fig5).values() for policy in those}
 learned = learned or next((policy for policy in ranked if policy in taught), None)
 heuristic = heuristic or next((policy for policy in ranked if policy not in taught), None)
@@ -54,21 +59,8 @@ pairs = {
     (policy, field, metric): effects.changes(fig5, table, policy, field, metric)
     for policy in drawn
     for field in fields
-    for metric in ("success", product)
+    for metric in ("success", PRODUCT)
 }
-
-
-def percent(level):
-    return f"{100 * level:g} %"
-
-
-def name_of(field):
-    return effects.parameter(field).name
-
-
-def within(field):
-    """The name of a parameter inside a sentence."""
-    return name_of(field)[0].lower() + name_of(field)[1:]
 
 
 # %% [markdown]
@@ -91,15 +83,15 @@ display(
 
 # %%
 def captioned(field):
-    changes = {policy: pairs[policy, field, product] for policy in drawn}
+    changes = {policy: pairs[policy, field, PRODUCT] for policy in drawn}
     shapes = [f"{policy} {effects.shape(own).words}" for policy, own in changes.items()]
     caption = (
         f"Collection ratio and communication: {'; '.join(shapes)}. n = "
         f"{table.loc[table['field'] == field, 'n'].min():,} missions per point, bars are "
-        f"{percent(LEVEL)} intervals."
+        f"{level} intervals."
     )
     figure = parameter_figures.effect(table, field, changes, fig5.policies)
-    return figure, f"The three metrics against the {within(field)}", caption
+    return figure, f"The three metrics against the {parameter(field).within}", caption
 
 
 page.gallery([captioned(field) for field in fields])
@@ -116,15 +108,15 @@ page.gallery([captioned(field) for field in fields])
 # %%
 def at(policy, field, position):
     rows = table[(table["policy"] == policy) & (table["field"] == field)]
-    (row,) = rows[(rows["metric"] == product) & (rows["position"] == position)].itertuples()
+    (row,) = rows[(rows["metric"] == PRODUCT) & (rows["position"] == position)].itertuples()
     return row
 
 
 def seen(policy, field):
     """How collection ratio and communication goes along a parameter, in words."""
-    found = effects.shape(pairs[policy, field, product])
+    found = effects.shape(pairs[policy, field, PRODUCT])
     first, last = (at(policy, field, n) for n in (0, len(values[field]) - 1))
-    change = pairs[policy, field, product].query("first == 0 and second == @last.position").iloc[0]
+    change = pairs[policy, field, PRODUCT].query("first == 0 and second == @last.position").iloc[0]
     ends = page.points(change["difference"], change["low"], change["high"])
     text = (
         f"{policy} **{found.words}**: {page.percent(first.mean)} at {first.value}, "
@@ -137,7 +129,7 @@ def seen(policy, field):
 
 
 lines = [
-    f"- **{name_of(field)}**" + "".join(f"\n    - {seen(policy, field)}" for policy in drawn)
+    f"- **{parameter(field).name}**" + "".join(f"\n    - {seen(policy, field)}" for policy in drawn)
     for field in fields
 ]
 display(Markdown("Collection ratio and communication, from the first value to the last:"))
@@ -147,73 +139,34 @@ display(Markdown("\n".join(lines)))
 # ### What the paper sees
 
 # %%
-margin = sweet.manifest["study"]["selection"]["indifference"] or 0.01
-too_little = f"{100 * margin:g} point{'' if margin == 0.01 else 's'}"  # to matter
-
-
-def judged(judge, field, metric, named=()):
-    """The verdict on a claim about a parameter; none if the study lacks the values named."""
-    if field not in fields or not {*named} <= {*values[field]}:
-        return None
-    return judge(pairs[leading, field, metric], *(values[field].index(v) for v in named))
-
-
-claims = [
-    (
-        "Performance is best with three UAVs",
-        judged(effects.best_at, "uavs", product, ["3"]),
-        "every other number differs, downwards",
-    ),
-    (
-        "Success is no lower at C_S 10–20 % than above",
-        judged(
-            lambda own, *low: effects.no_lower(own, low, margin),
-            "charge_start",
-            "success",
-            ["10", "20"],
-        ),
-        f"no interval of a difference reaches {too_little} down",
-    ),
-    (
-        "All values of C_C are served well",
-        judged(lambda own: effects.alike(own, margin), "charge_complete", product),
-        f"all intervals of differences lie within {too_little}",
-    ),
-    (
-        "More initial data is good up to 15–17.5 data units, and bad above",
-        judged(effects.peaks_at, "initial_data", product, ["15–17.5"]),
-        "the metric rises, then falls, and may be highest there",
-    ),
-    (
-        "More flying time is better",
-        judged(effects.rises, "flying_time", product),
-        "the metric rises",
-    ),
-]
-claims = [claim for claim in claims if claim[1]]
+too_little = margin_in_words(margin({"sweet-spot": sweet}))  # to matter
+of_leading = of_policy({"fig5": fig5, "sweet-spot": sweet}, leading, FIG_5)
+claims = [(claim, found) for claim, found in of_leading if found.verdict != NO_RESULTS]
 display(
     Markdown(
-        f"The claims of Section V-D, and what they are worth for {leading}: by collection ratio "
-        "and communication, that of C_S by success. One cannot be told where the missions are too "
-        "few for either answer.\n\n"
+        f"The claims of the paper on its Fig. 5, and what they are worth for {leading}; by the "
+        "rules of the replication scorecard. One cannot be told where the missions are too few for "
+        "either answer.\n\n"
         + "\n".join(
-            f"- {claim}: **{verdict}**. (It holds if {condition}.)"
-            for claim, verdict, condition in claims
+            f"- {claim.text}: **{found.verdict}**"
+            + (f"; {found.note}" if found.note else "")
+            + f". ({claim.rule})"
+            for claim, found in claims
         )
     )
 )
 
 # %%
-verdicts = [verdict for _, verdict, _ in claims]
-counted = {v: verdicts.count(v) for v in (effects.HOLDS, effects.OPEN, effects.REFUTED)}
-sizes = {field: max(pairs[leading, field, product]["difference"].abs()) for field in fields}
+verdicts = [found.verdict for _, found in claims]
+counted = [f"{v}: {verdicts.count(v)}" for v in VERDICTS if v in verdicts]
+sizes = {field: max(pairs[leading, field, PRODUCT]["difference"].abs()) for field in fields}
 order = sorted(fields, key=sizes.get, reverse=True)
 display(
     Markdown(
-        f"Claims that hold for {leading}: {counted[effects.HOLDS]} of {len(claims)}; that do not: "
-        f"{counted[effects.REFUTED]}; that cannot be told: {counted[effects.OPEN]}. By the "
-        "largest difference between two values, the parameters rank: "
-        + page.words([f"{within(f)} ({100 * sizes[f]:.1f} points)" for f in order])
+        f"So for {leading}, of {len(claims)} claims, {'; '.join(counted)}. They overlap, so their "
+        "number is no score. By the largest difference between two values, the "
+        "parameters rank: "
+        + page.words([f"{parameter(f).within} ({100 * sizes[f]:.1f} points)" for f in order])
         + "."
     )
 )
@@ -245,7 +198,7 @@ page.gallery(
         (
             figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, beside the paper's figure",
-            f"The check: n = {checks['n'].min():,} missions per policy, bars are {percent(LEVEL)} "
+            f"The check: n = {checks['n'].min():,} missions per policy, bars are {level} "
             "intervals. Dashed: the paper.",
         )
         for metric, name in paper.METRICS.items()
@@ -274,30 +227,30 @@ lines = [
     + [f"{row.missions:,}", row.left]
     for row in selections.itertuples()
 ]
-shorts = [effects.parameter(field).short for field in swept]
+shorts = [parameter(field).short for field in swept]
 head = ["Policy", *shorts, *paper.METRICS.values(), "Missions", "Settings left"]
 page.table(
     pd.DataFrame([printed, *lines], columns=head),
-    f"The setting selected, and its check: means with {percent(LEVEL)} intervals, ▲ wholly above "
+    f"The setting selected, and its check: means with {level} intervals, ▲ wholly above "
     "the paper's figure, ▼ below it, ≈ around it. Then the missions that the selection took, and "
     "the settings that were not ruled out, itself among them",
 )
 
 # %%
-top = by["mean"].xs(product, level="metric").idxmax() if len(checks) else None
+top = by["mean"].xs(PRODUCT, level="metric").idxmax() if len(checks) else None
 if top:
     (point,) = selections[selections["policy"] == top]["point"]
     at_best = page.words(
         [f"{short} {value}" for short, value in zip(shorts, setting_of(point), strict=True)]
     )
-    mean, *ends = by.loc[(top, product), ["mean", "low", "high"]]
-    verdict = paper.verdict(*ends, paper.SWEET_SPOT[product])
+    mean, *ends = by.loc[(top, PRODUCT), ["mean", "low", "high"]]
+    verdict = paper.verdict(*ends, paper.SWEET_SPOT[PRODUCT])
     display(
         Markdown(
             f"The best at its best setting is **{top}**, with {at_best}: "
             f"{page.interval(mean, *ends)} in collection ratio and communication, {verdict} "
             f"{'from ' if verdict == paper.LEVEL else ''}"
-            f"the paper's {page.percent(paper.SWEET_SPOT[product])}."
+            f"the paper's {page.percent(paper.SWEET_SPOT[PRODUCT])}."
         )
     )
 
@@ -316,11 +269,11 @@ display(
 indices = findings.sensitivities(sobol)
 ranges = sobol.manifest["study"]["design"]["ranges"]
 told = indices.dropna()
-of_product = told[told["metric"] == product]
+of_product = told[told["metric"] == PRODUCT]
 display(
     Markdown(
         "Here all parameters are drawn together: "
-        + page.words([f"{within(f)} {effects.words(ends)}" for f, ends in ranges.items()])
+        + page.words([f"{parameter(f).within} {effects.words(ends)}" for f, ends in ranges.items()])
         + ". A Sobol index is the share of a metric's variance that a parameter accounts for: "
         "*alone*, or *with all interactions* that it takes part in. The replication, which is the "
         "sea, the arrivals and the start, is a parameter too: what it accounts for, no setting "
@@ -332,8 +285,8 @@ page.gallery(
         (
             parameter_figures.sensitivity(rows, policy),
             f"Sobol indices of {policy}",
-            f"{paper.METRICS[product]} of {policy}. n = {rows['n'].min():,} missions; lines: "
-            f"{percent(LEVEL)} intervals by bootstrap. Estimates are not cut: that of a small "
+            f"{paper.METRICS[PRODUCT]} of {policy}. n = {rows['n'].min():,} missions; lines: "
+            f"{level} intervals by bootstrap. Estimates are not cut: that of a small "
             "share may be negative, an interval may go beyond 100 %. Below the dotted line: noise.",
         )
         for policy, rows in of_product.groupby("policy", sort=False)
@@ -348,11 +301,11 @@ def weighed(policy):
     most = rows.drop(NOISE)["first"].idxmax()
     small = [f for f in rows.drop(NOISE).index if rows.loc[f, "total_high"] < margin_of_share]
     text = (
-        f"- **{policy}**: {name_of(most)} matters most, alone "
+        f"- **{policy}**: {parameter(most).name} matters most, alone "
         f"{share(rows.loc[most], 'first')} of the variance. The noise leaves "
         f"{share(rows.loc[NOISE], 'total')} that no setting removes."
     )
-    few = page.words([within(f) for f in small])
+    few = page.words([parameter(f).within for f in small])
     return text + (
         f" Less than {page.percent(margin_of_share)} of it has to do with {few}, by the whole "
         "interval, interactions included."
@@ -390,7 +343,7 @@ page.table(
             [
                 row["policy"],
                 paper.METRICS[row["metric"]],
-                "noise" if row["parameter"] == NOISE else name_of(row["parameter"]),
+                "noise" if row["parameter"] == NOISE else parameter(row["parameter"]).name,
                 share(row, "first"),
                 share(row, "total"),
             ]
@@ -398,7 +351,7 @@ page.table(
         ],
         columns=["Policy", "Metric", "Parameter", "Alone", "With all interactions"],
     ),
-    f"Sobol indices as shares of the variance, with {percent(LEVEL)} intervals",
+    f"Sobol indices as shares of the variance, with {level} intervals",
 )
 
 # %% [markdown]

@@ -23,7 +23,7 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import figures, load_results, paper, summary
+from analysis import figures, findings, load_results, paper, summary
 from analysis.statistics import wilson
 from reports import page
 
@@ -95,7 +95,7 @@ def sorted_out(metric):
     return f"- **{name}** (paper {figure}), {'; '.join(found)}."
 
 
-product = "collection_ratio_and_communication"
+product = findings.PRODUCT
 best = rows.xs(product, level="metric")["mean"].idxmax()
 spread = wilson(round(paper.TABLE_IV["success"] * paper.TABLE_IV_MISSIONS), paper.TABLE_IV_MISSIONS)
 display(

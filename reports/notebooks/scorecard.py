@@ -11,7 +11,7 @@
 # %% [markdown]
 # # Replication scorecard
 #
-# Every claim of the paper's Section V beside what the simulations here found, with a verdict that a
+# What the paper's Section V claims beside what the simulations here found, with a verdict that a
 # stated rule computes.
 
 # %% tags=["parameters"]
@@ -19,20 +19,24 @@ results = "../../results"  # folder with the results folders of table4, fig4, fi
 trained = None  # folder with the learning curves; None for those shipped
 
 # %%
+import json
 from importlib.resources import files
 from pathlib import Path
 
 import pandas as pd
 
 from analysis import load_results
-from analysis.scorecard import scorecard
+from analysis.scorecard import PAPERS_NETWORK, departures, scorecard
 from reports import page
 from reports import scorecard as layout
 
 folder = Path(trained or str(files("policies") / "trained"))
 names = ("table4", "fig4", "fig5", "sweet-spot")
 studies = {name: load_results(Path(results) / name) for name in names}
-layout.scorecard(scorecard(studies, pd.read_parquet(folder / "curves.parquet")))
+rows = scorecard(studies, pd.read_parquet(folder / "curves.parquet"))
+config = folder / PAPERS_NETWORK / "config.json"
+ours = departures(json.loads(config.read_text("utf-8"))["training"]) if config.exists() else []
+layout.scorecard(rows, departures=ours)
 
 # %% [markdown]
 # ## Where the figures come from

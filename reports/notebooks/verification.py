@@ -74,18 +74,10 @@ table = judge(
 )
 
 
-def percent(share):
-    return f"{100 * share:g} %"
-
-
-def p_value(p):
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
-
-
 def told(row):
     """The p-value and its correction, or the error and its bound."""
     if not np.isnan(row.p):
-        return f"p {p_value(row.p)}, Holm {p_value(row.p_adjusted)}"
+        return f"p {page.p_value(row.p)}, Holm {page.p_value(row.p_adjusted)}"
     if np.isnan(row.error):
         return ""
     return (
@@ -122,7 +114,7 @@ display(
         )
         + f" {exact.sum()} are exact: an error above its bound, which is zero or what rounding can "
         f"do, refutes. {chance.sum()} are of chance: they have a p-value, corrected by Holm for "
-        f"their number and judged at {percent(ALPHA)}. So if all is as it should be, any of them "
+        f"their number and judged at {page.level(ALPHA)}. So if all is as it should be, any of them "
         f"fails for at most one seed in {1 / ALPHA:.0f}."
         + (f" Too few observations for: {page.words(unknown)}." if unknown else "")
     )
@@ -167,7 +159,7 @@ page.gallery(
             ),
             f"{name}: observed and expected numbers",
             f"Dots should lie on the bars, and inside the band below, which holds all dots of "
-            f"{percent(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with mean "
+            f"{page.level(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with mean "
             f"{mean:g}.",
         )
         for name, fit, mean in panels
@@ -195,7 +187,7 @@ page.figure(
     drawings.rates(rates, space),
     "Mean rate of a lone UAV against its distance from the node",
     f"Dots should lie on the curve, and inside the band below, which holds all dots of "
-    f"{percent(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per distance.",
+    f"{page.level(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per distance.",
 )
 
 # %% [markdown]
@@ -230,7 +222,7 @@ drawn = [
         drawings.fit(fit, parameter(field).name, parameter(field).unit or "value"),
         f"How often each {parameter(field).name} was drawn",
         f"All values should be drawn equally often. n = {fit.n:,} missions. The band holds all "
-        f"dots of {percent(LEVEL)} of such figures.",
+        f"dots of {page.level(LEVEL)} of such figures.",
     )
     for field, fit in fits.parameter_fits(missions, space).items()
 ]
@@ -262,7 +254,7 @@ held = {metric: f"{rows['holds'].sum():,} of {len(rows):,}" for metric, rows in 
 display(
     Markdown(
         f"{verdicts(fits.COVERAGE)} The {len(of_best):,} missions of {best} in blocks of "
-        f"{block:,}: of intervals at {percent(LEVEL)}, each computed from a block, about that "
+        f"{block:,}: of intervals at {page.level(LEVEL)}, each computed from a block, about that "
         "share should hold the mean of all. For Student's t it is a little more, since a block is "
         "itself a part of all. Wilson's interval, for success, cannot keep to a level: a block has "
         "a whole number of successes, so what its interval holds jumps with their share. How often "
@@ -277,7 +269,7 @@ page.gallery(
             f"{name}: intervals of blocks of missions",
             f"The first {min(len(rows), drawings.SHOWN)} of {len(rows):,} blocks; the line is the "
             f"mean of all missions. Of all blocks {held[metric]} hold it. n = {block:,} missions "
-            f"per interval, at {percent(LEVEL)}.",
+            f"per interval, at {page.level(LEVEL)}.",
         )
         for metric, name in paper.METRICS.items()
         if len(rows := blocks[metric])

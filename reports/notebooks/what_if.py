@@ -37,7 +37,7 @@ asked = what_if.question(settings, baseline, scenario, policies, missions, seed)
 what_if.check_policy(asked, shown or asked.policies[0])
 study = what_if.ask(asked, results, workers)
 
-product = "collection_ratio_and_communication"
+product = findings.PRODUCT
 changes = what_if.changes(study)
 means, answers = what_if.means(study), what_if.answers(study)
 told = answers.set_index(["policy", "metric"])

@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis import curves
-from analysis.curves import FAILS, HOLDS, IN_PART
+from analysis import curves, paper
+from analysis.verdicts import HOLDS, OPEN, REFUTED
 
 METRIC = "evaluation_reward"
 STEPS = [1000, 2000, 3000, 4000]
@@ -30,7 +30,7 @@ def several(variant, ends, level=0.0, before=0):
 
 def compared(using, without, **options):
     both = pd.concat([several("with", using, **options), several("without", without)])
-    return curves.transfer(curves.smoothed(both, METRIC), "with", "without")
+    return curves.transfer(curves.smoothed(both, METRIC), "with", "without", shortest=STEPS[-1])
 
 
 def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
@@ -67,16 +67,28 @@ def test_transfer_holds_where_the_curve_passes_and_ends_surely_higher():
     assert 0 < found.last.low < found.last.mean < found.last.high
 
 
-def test_transfer_holds_in_part_where_the_end_is_not_sure():
+def test_transfer_cannot_be_told_where_the_end_is_not_sure():
     found = compared([4.0, 9.0], [3.0, 8.0], level=1.0)
-    assert (found.verdict, found.since, found.throughout) == (IN_PART, STEPS[0], True)
+    assert (found.verdict, found.since, found.throughout) == (OPEN, STEPS[0], True)
     assert found.last.low < 0 < found.last.mean
+    found = compared([3.0, 8.0], [4.0, 9.0])  # nor where it ends below
+    assert (found.verdict, found.since) == (OPEN, None)
+    assert compared([9.0], [5.0]).verdict == OPEN  # two single trainings
 
 
-def test_transfer_fails_where_the_curve_ends_below():
+def test_transfer_does_not_hold_where_the_curve_ends_surely_below():
     found = compared([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], level=1.0)  # ahead at first
-    assert (found.verdict, found.since) == (FAILS, None)
-    assert compared([4.0, 4.0], [4.0, 4.0]).verdict == FAILS  # level is not above
+    assert (found.verdict, found.since) == (REFUTED, None)
+
+
+@pytest.mark.parametrize("ends", [([9.0, 9.1, 9.2], [5.0, 5.1, 5.2]), ([2.0, 2.1], [9.0, 9.1])])
+def test_trainings_shorter_than_the_paper_s_crossing_cannot_tell(ends):
+    both = pd.concat([several("with", ends[0]), several("without", ends[1])])
+    averages = curves.smoothed(both, METRIC)
+    found = curves.transfer(averages, "with", "without")
+    assert (found.verdict, found.length) == (OPEN, STEPS[-1])
+    assert STEPS[-1] < paper.CROSSING
+    assert curves.transfer(averages, "with", "without", shortest=found.length).verdict != OPEN
 
 
 def test_transfer_is_judged_in_the_last_phase_alone():

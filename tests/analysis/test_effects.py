@@ -6,8 +6,9 @@ import pytest
 
 from analysis import effects, findings, run_study
 from analysis.comparison import adjust, paired
-from analysis.effects import FALLS, HOLDS, IRREGULAR, LEVELS, OPEN, PEAK, REFUTED, RISES, VALLEY
+from analysis.effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.statistics import mean_interval
+from analysis.verdicts import HOLDS, OPEN, REFUTED
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -27,7 +28,7 @@ def table(results):
     return effects.effects(results)
 
 
-def pairs_of(steps, sure=True, half=0.001):
+def pairs_of(steps, sure=True, half=0.001, widened=2):
     """All pairs of values with these steps between neighbours, all of them sure, or none."""
     level = np.concatenate([[0.0], np.cumsum(steps)])
     rows = [
@@ -36,7 +37,9 @@ def pairs_of(steps, sure=True, half=0.001):
     table = pd.DataFrame(rows, columns=["first", "second", "difference"])
     p = np.where(sure & (table["difference"].abs() > half), 0.001, 1.0)
     gap = table["difference"]
-    return table.assign(low=gap - half, high=gap + half, p_adjusted=p)
+    wide = widened * half
+    ends = {"low": gap - half, "high": gap + half, "wide_low": gap - wide, "wide_high": gap + wide}
+    return table.assign(**ends, p_adjusted=p)
 
 
 def test_effects_are_the_means_by_value(results, table):
@@ -69,6 +72,21 @@ def test_changes_are_paired_by_replication(results, table):
     assert pairs.loc[2, ["difference", "low", "high"]].tolist() == pytest.approx(list(ends))
     assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
     assert set(pairs["n"]) == {20}
+
+
+def test_intervals_that_hold_at_once_are_wider(results, table):
+    """By Bonferroni: three pairs, each at 1 - 0.05 / 3."""
+    pairs = effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = ours.loc[4, "collection_ratio"] - ours.loc[3, "collection_ratio"]
+    _, low, high = mean_interval(gaps, 1 - 0.05 / 3)
+    assert pairs.loc[2, ["wide_low", "wide_high"]].tolist() == pytest.approx([low, high])
+    assert (pairs["wide_low"] < pairs["low"]).all() and (pairs["high"] < pairs["wide_high"]).all()
+
+
+def test_a_name_inside_a_sentence():
+    assert effects.parameter("charge_start").within == "charging start capacity C_S"
+    assert effects.parameter("quota").within == "quota"
 
 
 def test_successes_are_compared_as_shares(results, table):
@@ -121,12 +139,28 @@ def test_no_lower():
     assert effects.no_lower(pairs_of([0, -1, 0]), [2, 3], 0.01) == REFUTED
     assert effects.no_lower(pairs_of([0, 0, 0], half=0.02), [0, 1], 0.01) == OPEN
     assert effects.no_lower(pairs_of([1, 0, 0]), [0, 1], 0.01) == REFUTED  # the first is lower
+    assert effects.no_lower(pairs_of([0, 0.005, 0]), [0, 1], 0.01) == HOLDS  # by less than matters
+
+
+def test_no_lower_is_refuted_beyond_the_margin_alone():
+    """Surely lower, but perhaps by less than matters; or beyond, but not with all at once."""
+    assert effects.no_lower(pairs_of([0, 0.02, 0], half=0.015), [0, 1], 0.01) == OPEN
+    assert effects.no_lower(pairs_of([0, 0.02, 0], half=0.006), [0, 1], 0.01) == OPEN
+    assert effects.no_lower(pairs_of([0, 0.02, 0], half=0.004), [0, 1], 0.01) == REFUTED
 
 
 def test_alike():
     assert effects.alike(pairs_of([0, 0.005]), 0.01) == HOLDS
     assert effects.alike(pairs_of([0.005, 0.005]), 0.01) == OPEN  # it might be a little more
     assert effects.alike(pairs_of([0, 0.05]), 0.01) == REFUTED
+    assert effects.alike(pairs_of([0, -0.05]), 0.01) == REFUTED
+
+
+def test_alike_is_refuted_beyond_the_margin_alone():
+    """The differences are sure, and by their means beyond the margin: that is not enough."""
+    assert effects.alike(pairs_of([0, 0.02], half=0.015), 0.01) == OPEN
+    assert effects.alike(pairs_of([0, 0.02], half=0.006), 0.01) == OPEN  # not all at once
+    assert effects.alike(pairs_of([0, 0.02], half=0.004), 0.01) == REFUTED
 
 
 def test_peaks_at():

@@ -231,6 +231,12 @@ def test_what_is_told_of_regions_does_not_depend_on_the_missions_that_found_them
     assert same["mean"].tolist() == regions.rules(missions)["mean"].tolist()
 
 
+def test_halves_share_no_mission():
+    found, told = regions.halves(missions_of(lambda t: 0, n=9))
+    assert found["replication"].tolist() == [0, 2, 4, 6, 8]
+    assert told["replication"].tolist() == [1, 3, 5, 7]
+
+
 def test_few_missions_make_few_rules():
     assert regions.rules(missions_of(lambda t: 0.1, n=1)).empty
     (row,) = regions.rules(missions_of(lambda t: 0.1, n=8)).itertuples()

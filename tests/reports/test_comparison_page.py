@@ -9,6 +9,7 @@ import pytest
 
 from analysis import findings, load_results, load_study, regions, run_study, timing
 from analysis.comparison_figures import duration
+from analysis.effects import parameter
 from dess import InputError
 from reports import page
 from tests.reports.small import said_by
@@ -59,6 +60,21 @@ def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
     lead = regions.along(missions, pair.candidates)
     verdicts = lead["verdict"].value_counts()
     assert f"Of these {len(lead)} bins, ddqn is ahead in {verdicts.get('ahead', 0)}" in text
+
+
+def test_the_heat_map_is_of_missions_that_did_not_choose_it(text: str, results: Path) -> None:
+    study = load_results(results / NAME)
+    pair = regions.pair_of(study)
+    found, told = regions.halves(regions.duels(study, pair))
+    strongest = regions.dependence(found)
+    first, second = strongest["field"][:2]
+    shares = map(page.percent, strongest["explained"][:2])
+    names = [parameter(field).within for field in (first, second)]
+    one, two = (f"the {n} ({s}" for n, s in zip(names, shares, strict=True))
+    assert f"{one} of its variance) and {two})" in text
+    cells = regions.across(told, first, second, pair.candidates)
+    low = cells.loc[cells["mean"].idxmin()]
+    assert f"The lowest mean is {page.points(low['mean'], low['low'], low['high'])}" in text
 
 
 def test_the_worst_missions_can_be_flown_again(text: str, results: Path) -> None:

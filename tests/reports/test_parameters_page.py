@@ -2,14 +2,17 @@
 
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from analysis import effects, findings, load_results, load_study, run_study
+from analysis.claims import NO_RESULTS
+from analysis.findings import PRODUCT
 from analysis.paper import METRICS
+from analysis.scorecard import scorecard
+from analysis.section_v import FIG_5
 from reports import page
 from tests.reports.small import run_small_studies, said_by
-
-PRODUCT = "collection_ratio_and_communication"
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +41,18 @@ def test_the_page_tells_what_the_studies_found(results: Path) -> None:
     assert "random falls" not in text and "random rises" not in text
 
 
+def test_verdicts_are_those_of_the_scorecard(results: Path) -> None:
+    text = said_by("parameters", results=str(results))
+    studies = {name: load_results(results / name) for name in ("fig5", "sweet-spot")}
+    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.part == FIG_5]
+    told = [row for row in rows if row.learned.verdict != NO_RESULTS]
+    assert len(told) > 5
+    for row in told:
+        assert f"- {row.claim}: {row.learned.verdict}" in text
+        assert row.rule in text
+    assert f"So for ddqn, of {len(told)} claims" in text
+
+
 def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_path: Path) -> None:
     folder = tmp_path / "results"
     folder.mkdir()
@@ -46,3 +61,4 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
     text = said_by("parameters", results=str(folder))
     assert "Shown is greedy." in text
+    assert "what they are worth for greedy" in text

@@ -1,6 +1,7 @@
 """The scorecard as HTML tells every row whole, in plain words."""
 
 import re
+from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
 
@@ -8,8 +9,10 @@ import pytest
 
 from analysis import paper
 from analysis.case import Finding, Quantity
-from analysis.claims import FAILS, HOLDS, IN_PART, NO_RESULTS, VERDICTS
+from analysis.claims import NO_RESULTS, VERDICTS
 from analysis.scorecard import Row
+from analysis.verdicts import HOLDS, IN_PART, OPEN, REFUTED
+from reports import page
 from reports.scorecard import scorecard
 
 ABSENT = Finding(NO_RESULTS, note="the study fig4 has not run")
@@ -31,7 +34,7 @@ ROWS = [
         (),
         "Holds if C_S does not matter.",
         "mission.html",
-        Finding(HOLDS, "ddqn", (Quantity(-0.0001, -0.009, 0.009, 300, "points", "change"),)),
+        Finding(OPEN, "ddqn", (Quantity(-0.0001, -0.009, 0.009, 300, "points", "change"),)),
         ABSENT,
     ),
     Row(
@@ -42,7 +45,7 @@ ROWS = [
         "Holds if it is.",
         "learning.html",
         Finding(
-            FAILS,
+            REFUTED,
             "quick",
             (Quantity(-12.6, -46.4, 21.2, 3, "reward"), Quantity(3, unit="number", name="UAVs")),
             note="ends below",
@@ -104,11 +107,13 @@ def test_every_row_is_told(html: str) -> None:
 
 def test_verdicts_are_words_and_signs_and_are_counted(html: str) -> None:
     text = text_of(html)
-    assert "The best learned policy (ddqn) , of 3 claims: 2 ✓ holds 1 ✗ does not hold" in text
-    assert "The paper's own means (plain) , of 3 claims: 1 ◐ holds in part 2 – no results" in text
+    counts = "1 ✓ holds 1 ? cannot be told 1 ✗ does not hold"
+    assert f"The best learned policy (ddqn) , of 3 claims: {counts}" in text
+    other = "The paper's network and algorithm, with means of ours (plain)"
+    assert f"{other} , of 3 claims: 1 ◐ holds in part 2 – no results" in text
     for verdict in VERDICTS:
         assert re.search(rf'<span class="verdict [a-z-]+">. {verdict}</span>', html)
-    assert html.count('class="verdict ') == 2 * len(ROWS) + 4
+    assert html.count('class="verdict ') == 2 * len(ROWS) + 5
 
 
 def test_on_a_phone_every_cell_has_its_label(html: str) -> None:
@@ -137,3 +142,20 @@ def test_without_any_results_columns_have_no_policy() -> None:
     text = text_of(scorecard(rows).data)
     assert "The best learned policy , of 1 claim: 1 – no results" in text
     assert "()" not in text
+
+
+def test_it_says_how_to_read_it() -> None:
+    success = Quantity(*paper.spread(0.901, 1000), n=1000)
+    rows = [replace(ROWS[0], printed=(success,)), *ROWS[1:]]
+    text = text_of(scorecard(rows, departures=["a guard", "5-step returns"]).data)
+    spread = page.interval(*success.interval).partition(" % ")[2]
+    assert f"At 95 % (Wilson) they are {spread} for a success in 90.1 % of 1,000 missions" in text
+    assert f"not of all {len(rows)} rows at once" in text
+    assert "The counts are no score." in text and "chosen on the missions that judge it" in text
+    assert "plain has the paper's observation, network and Algorithm 1." in text
+    assert "Not the paper's, but ours, are a guard and 5-step returns." in text
+
+
+def test_it_says_no_more_than_it_knows(html: str) -> None:
+    text = text_of(html)
+    assert "Wilson" not in text and "but ours" not in text
