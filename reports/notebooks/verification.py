@@ -114,8 +114,8 @@ display(
         )
         + f" {exact.sum()} are exact: an error above its bound, which is zero or what rounding can "
         f"do, refutes. {chance.sum()} are of chance: they have a p-value, corrected by Holm for "
-        f"their number and judged at {page.level(ALPHA)}. So if all is as it should be, any of them "
-        f"fails for at most one seed in {1 / ALPHA:.0f}."
+        f"their number and judged at {page.level(ALPHA)}. So if all is as it should be, any of "
+        f"them fails for at most one seed in {1 / ALPHA:.0f}."
         + (f" Too few observations for: {page.words(unknown)}." if unknown else "")
     )
 )
@@ -159,8 +159,8 @@ page.gallery(
             ),
             f"{name}: observed and expected numbers",
             f"Dots should lie on the bars, and inside the band below, which holds all dots of "
-            f"{page.level(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with mean "
-            f"{mean:g}.",
+            f"{page.level(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with "
+            f"mean {mean:g}.",
         )
         for name, fit, mean in panels
         if len(fit.table) > 1
@@ -187,7 +187,8 @@ page.figure(
     drawings.rates(rates, space),
     "Mean rate of a lone UAV against its distance from the node",
     f"Dots should lie on the curve, and inside the band below, which holds all dots of "
-    f"{page.level(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per distance.",
+    f"{page.level(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per "
+    "distance.",
 )
 
 # %% [markdown]

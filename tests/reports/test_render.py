@@ -175,10 +175,9 @@ def test_all_pages_are_the_same_bytes_elsewhere(
         assert (tmp_path / "new" / name).read_text("utf-8") == html
 
 
-# By default those that are run quickly.
+# By default one that is run quickly.
 IN_JUPYTER = [
-    name if name in {"performance", "what-if"} else pytest.param(name, marks=pytest.mark.slow)
-    for name in NAMES
+    name if name == "performance" else pytest.param(name, marks=pytest.mark.slow) for name in NAMES
 ]
 
 

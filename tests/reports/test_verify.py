@@ -17,7 +17,7 @@ from policies.registry import TRAINED
 from reports import page as pieces
 from reports.cli import main
 from reports.page import STUDY, embedded
-from reports.render import render
+from reports.render import _index, _pages, render
 from reports.verify import sealed, verify_page, verify_results
 
 ALL = 10**6
@@ -168,25 +168,18 @@ def test_a_page_without_missions_or_with_few_fields_says_so(page: Path, tmp_path
 
 
 def test_an_altered_page_does_not_get_into_the_index(
-    results: Path, page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+    page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = shutil.copytree(page.parent, tmp_path / "out")
+    assert {*_pages(folder)} == {"performance.html"}
     altered(page, "Performance", "Perfection", folder / "performance.html")
     (folder / "comparison.html").write_bytes(b"\xff")
-    render(["mission"], _with_fig1(results, tmp_path), folder)
-    index = (folder / "index.html").read_text("utf-8")
-    assert "mission.html" in index
-    assert "performance.html" not in index and "comparison.html" not in index
-    assert sorted(record.args[0].name for record in caplog.records) == [
-        "comparison.html",
-        "performance.html",
-    ]
-
-
-def _with_fig1(results: Path, tmp_path: Path) -> Path:
-    folder = shutil.copytree(results, tmp_path / "results")
-    run_study(load_study("fig1", missions=1), folder / "fig1")
-    return folder
+    old = page.read_text("utf-8").replace(embedded(STUDY, page.read_text("utf-8"))[0], "{}")
+    (folder / "mission.html").write_text(sealed(old), "utf-8")
+    assert not _pages(folder)
+    told = {record.args[0].name for record in caplog.records}
+    assert told == {"comparison.html", "performance.html", "mission.html"}
+    assert "performance.html" not in _index(_pages(folder))
 
 
 def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> None:
