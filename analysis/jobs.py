@@ -141,13 +141,25 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
 
     Raises:
         InputError: If it cannot be done at all, such as for want of its policy.
+        KeyboardInterrupt: If it is interrupted.
     """
     try:
         return job.run(progress)
     except InputError:
         raise
     except Exception as error:
+        if was_interrupted(error):
+            raise KeyboardInterrupt from None
         return Problem.of(error, _culprit(job))
+
+
+def was_interrupted(error: BaseException | None) -> bool:
+    """Whether an error comes of Ctrl-C: in compiled code, numba makes it a ``SystemError``."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _culprit(job: Job) -> Part | None:

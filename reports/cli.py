@@ -83,6 +83,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return console.fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
     except InputError as error:
         return console.fail(f"dess: error: {error}", 2)
+    except SystemError as error:
+        from analysis.jobs import was_interrupted
+
+        if not was_interrupted(error):
+            raise
+        return console.fail("interrupted", 1)
     return console.fail("interrupted", 1) if code == INTERRUPTED else code or 0
 
 

@@ -262,6 +262,7 @@ def test_the_readmes_table_is_what_its_command_prints(capsys: pytest.CaptureFixt
         assert printed[row["policy"]] == [shown(row[m]) for m in METRICS]
 
 
+@pytest.mark.slow
 def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
     printed = table(PAGES["docs/policies.md"], "policy")
     by_fleet = [a for a in command_lines("dess") if "tour" in a and a[2].startswith("uavs=")]

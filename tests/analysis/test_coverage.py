@@ -162,7 +162,7 @@ def risk_truth(failures: float) -> float:
 @pytest.mark.parametrize(
     ("failures", "trials"),
     [
-        (0.02, 100),
+        pytest.param(0.02, 100, marks=pytest.mark.slow),
         pytest.param(0.0, 1000, marks=pytest.mark.slow),
         pytest.param(0.02, TRIALS, marks=pytest.mark.slow),
     ],
@@ -225,6 +225,7 @@ def shares(gain: float, loss: float) -> tuple[float, float]:
     return counts @ inside / TRIALS, counts @ [r.p <= 0.05 for r in results] / TRIALS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.01, 0.05, 0.2])
 def test_mcnemar_keeps_its_level_and_the_interval_of_shares_covers(gain):
     # 2, 10 and 40 discordant pairs expected; both are careful where they are few

@@ -46,7 +46,7 @@ def run_with_kills(study, out, workers, missions, kills, generator):
     return moments
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_killed_study_equals_an_undisturbed_one(workers, tmp_path):
     small_study(tmp_path)
     file, generator = tmp_path / "trial.toml", random.Random(workers)

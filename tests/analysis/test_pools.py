@@ -101,6 +101,7 @@ def test_a_killed_worker_is_replaced(plugin, tmp_path):
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
 
 
+@pytest.mark.slow
 def test_a_chunk_that_kills_every_worker_is_given_up(plugin, tmp_path):
     study = small_study(tmp_path, policies=["killed-always", "greedy"])
     failure = failing(study, tmp_path / "out", workers=2)

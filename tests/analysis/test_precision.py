@@ -228,6 +228,7 @@ def covered(rule, metric, mean, draw, trials):
     return hits / trials
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "metric, mean, draw",
     [

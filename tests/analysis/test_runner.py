@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import evaluate, load_results, load_study, run_study, runner
+from analysis import evaluate, jobs, load_results, load_study, run_study, runner
 from analysis.sensitivity import sensitivity
 from analysis.study import CHECK
 from dess import InputError, load_scenario, simulate
@@ -271,6 +271,21 @@ def test_rounds_are_announced_before_their_missions(tmp_path):
     again = []
     run_study(selecting(tmp_path), tmp_path / "out", announce=again.append)
     assert sum(each.present for each in again) == again[-1].missions == told[-1].missions
+
+
+def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
+    """numba makes it a SystemError; the chunk has not failed."""
+
+    def run(*_):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(jobs.MissionsJob, "run", run)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(small_study(tmp_path), tmp_path / "out")
+    assert not [*(tmp_path / "out" / "failures").iterdir()]
+    assert (
+        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")]) == 1
+    )
 
 
 @pytest.mark.parametrize("kind", [precise, selecting])

@@ -236,6 +236,7 @@ def test_the_promise_is_kept_where_missions_seldom_fail(failures, lead):
     assert rate(rule("kn-bounded", indifference=lead, first=20), draw, 500) >= least(500)
 
 
+@pytest.mark.slow
 def test_rare_failures_need_the_bounded_race():
     draw = missions_that_fail(6, 0.01, 0.04)
     fields = {"indifference": 0.04, "first": 20}
@@ -282,6 +283,7 @@ def test_the_probability_of_ocba_by_hand():
     assert choice.probability == pytest.approx(0.96923, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_ocba_beats_equal_shares_of_the_budget():
     k, trials, budget = 10, 200, 600
     by_ocba = by_equal = 0

@@ -291,7 +291,7 @@ def slot(name: str) -> str:
     return f"Number(document.querySelector('#{name} .slider-label').textContent.split(' ')[1])"
 
 
-@pytest.mark.parametrize("width", [1200, 390])
+@pytest.mark.parametrize("width", [pytest.param(1200, marks=pytest.mark.slow), 390])
 def test_a_mission_is_played_and_paused(
     chromium: browser.Page, document: Path, queue: Mission, width: int
 ) -> None:

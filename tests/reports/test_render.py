@@ -224,7 +224,7 @@ def chromium() -> Iterator[browser.Page]:
         yield tab
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.slow), 390])
 def test_pages_fit_the_window_and_ask_for_nothing(
     chromium: browser.Page, pages: dict[str, str], out: Path, width: int
 ) -> None:

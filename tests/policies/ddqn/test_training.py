@@ -46,7 +46,11 @@ def whole() -> Training:
     return _trained(Training(tiny(), CPU), 1000)
 
 
-@pytest.mark.parametrize("stops", [(0,), (1, 10), (25, 79), (80, 81), (120,), (159, 160)])
+@pytest.mark.parametrize(
+    "stops",
+    [(25, 79), (80, 81)]
+    + [pytest.param(s, marks=pytest.mark.slow) for s in ((0,), (1, 10), (120,), (159, 160))],
+)
 def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     stops: tuple[int, ...], whole: Training, tmp_path: Path
 ) -> None:
