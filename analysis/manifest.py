@@ -170,20 +170,8 @@ class Manifest(_Part):
         Raises:
             InputError: If there is none, or it is damaged or of another version.
         """
-        try:
-            data = json.loads(path.read_text("utf-8"))
-        except (FileNotFoundError, NotADirectoryError):
-            raise InputError(
-                f"{path}: no such file; allowed: a results folder, made by dess study run"
-            ) from None
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: cannot be read: {error}; {_ALLOWED}") from None
-        made_by = [data.get(key) for key in _VERSIONS] if isinstance(data, dict) else [None, None]
-        if None not in made_by and made_by != [dess.__version__, SCHEMA_VERSION]:
-            raise InputError(
-                f"{path}: made by dess {made_by[0]} (schema {made_by[1]}), "
-                f"not {dess.__version__} (schema {SCHEMA_VERSION}); {_ALLOWED}"
-            )
+        absent = "allowed: a results folder, made by dess study run"
+        data = read_json(path, SCHEMA_VERSION, absent, _ALLOWED)
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -280,6 +268,33 @@ _ALLOWED = "allowed: another --out, or remove the folder"
 
 def _canonical(data: Any) -> str:
     return json.dumps(data, sort_keys=True)
+
+
+def read_json(path: Path, schema: int, absent: str, allowed: str) -> Any:
+    """The data of a JSON file that tells its ``version`` and ``schema_version``.
+
+    Args:
+        path: The file.
+        schema: The schema that it must be of.
+        absent: What is allowed, if it is not there.
+        allowed: What is allowed otherwise.
+
+    Raises:
+        InputError: If there is none, or it is no JSON or of another version.
+    """
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file; {absent}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {error}; {allowed}") from None
+    made_by = [data.get(key) for key in _VERSIONS] if isinstance(data, dict) else [None]
+    if None not in made_by and made_by != [dess.__version__, schema]:
+        raise InputError(
+            f"{path}: made by dess {made_by[0]} (schema {made_by[1]}), "
+            f"not {dess.__version__} (schema {schema}); {allowed}"
+        )
+    return data
 
 
 def replay_command(

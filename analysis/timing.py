@@ -24,6 +24,7 @@ from analysis.manifest import (
     fingerprint,
     library_versions,
     members_of,
+    read_json,
 )
 from analysis.store import replacing
 from dess import load_scenario, simulate, simulate_batch
@@ -211,19 +212,7 @@ def read(folder: str | Path) -> Timing:
     """
     path = Path(folder) / FILE
     allowed = f"allowed: what is made by: dess timing --out {Path(folder).resolve()}"
-    try:
-        data = json.loads(path.read_text("utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; {allowed}") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {error}; {allowed}") from None
-    versions = ("version", "schema_version")
-    made_by = [data.get(key) for key in versions] if isinstance(data, dict) else [None]
-    if None not in made_by and made_by != [dess.__version__, SCHEMA_VERSION]:
-        raise InputError(
-            f"{path}: made by dess {made_by[0]} (schema {made_by[1]}), "
-            f"not {dess.__version__} (schema {SCHEMA_VERSION}); {allowed}"
-        )
+    data = read_json(path, SCHEMA_VERSION, allowed, allowed)
     try:
         return Timing.model_validate(data)
     except ValidationError as error:

@@ -3,7 +3,7 @@
 import logging
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,7 +90,7 @@ def render(
         files = {report.page: sealed(_page("report.html", **_parts(report))) for report in reports}
         whole = [report for report in reports if not report.failure]
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in whole}
-        files[INDEX] = _index(_pages(out) | files)
+        files[INDEX] = _index(_pages(out, but=files) | files)
         with _writing(out):
             for name, text in files.items():
                 Path(folder, name).write_bytes(text.encode())
@@ -170,10 +170,10 @@ def _body(notebook: NotebookNode) -> str:
     return exporter.from_notebook_node(notebook)[0]
 
 
-def _pages(out: Path) -> dict[str, str]:
-    """The pages of earlier calls; the index leaves out what is not as it was written."""
+def _pages(out: Path, but: Container[str] = ()) -> dict[str, str]:
+    """The pages of earlier calls that stay; the index leaves out what is not as it was written."""
     pages = {}
-    for path in (out / f"{name}.html" for name in NAMES):
+    for path in (out / f"{name}.html" for name in NAMES if f"{name}.html" not in but):
         try:
             html = path.read_bytes().decode()
             if not is_sealed(html):

@@ -2,7 +2,6 @@
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -257,14 +256,6 @@ def test_a_log_without_an_end_is_refused(queue: Mission) -> None:
 
 
 # In a browser
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[browser.Page]:
-    if browser.CHROMIUM is None:
-        pytest.skip("there is no chromium on this machine to open a page in")
-    with browser.page() as page:
-        yield page
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 from base64 import b64decode
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -214,14 +213,6 @@ def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results
                 assert evidence[field] == manifest.data[field]
             assert evidence["policies"] == manifest.data["policies"]
             assert manifest.key in words_of(pages[f"{name}.html"])
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[browser.Page]:
-    if browser.CHROMIUM is None:
-        pytest.skip("there is no chromium on this machine to open a page in")
-    with browser.page() as tab:
-        yield tab
 
 
 @pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.slow), 390])
