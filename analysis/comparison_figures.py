@@ -51,7 +51,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
                 elinewidth=1.8,
                 gid=row.verdict,
             )
-        ax.set(title=_axis(field), ylabel="mean difference [points]")
+        ax.set(title=parameter(field).label, ylabel="mean difference [points]")
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
         ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
@@ -97,7 +97,11 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
         ax.set_yticks(np.arange(len(names)) + 0.5, names)
         ax.invert_yaxis()
         ax.tick_params(length=0)
-        ax.set(xlabel=_axis(second), ylabel=_axis(first), title="Mean difference [points]")
+        ax.set(
+            xlabel=parameter(second).label,
+            ylabel=parameter(first).label,
+            title="Mean difference [points]",
+        )
         sns.despine(ax=ax, left=True, bottom=True)
     return figure
 
@@ -186,11 +190,6 @@ def duration(seconds: float) -> str:
         if seconds >= size:
             return f"{float(f'{seconds / size:.3g}'):g} {unit}"
     return f"{float(f'{seconds / 1e-9:.3g}'):g} ns"
-
-
-def _axis(field: str) -> str:
-    name, _, unit = parameter(field)
-    return f"{name} [{unit}]".removesuffix(" []")
 
 
 def _points(share: float, _: int = 0) -> str:

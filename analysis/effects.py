@@ -4,6 +4,7 @@ For designs that vary one parameter at a time (the paper's Fig. 5). All values o
 the same replications, so they are compared mission by mission.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
@@ -31,6 +32,20 @@ class Parameter(NamedTuple):
     def within(self) -> str:
         """The name inside a sentence."""
         return self.name[0].lower() + self.name[1:]
+
+    @property
+    def label(self) -> str:
+        """The name in a figure, with its unit, and indices as TeX has them."""
+        return _tex(f"{self.name} [{self.unit}]".removesuffix(" []"))
+
+    @property
+    def tick(self) -> str:
+        """The short name in a figure."""
+        return _tex(self.short)
+
+
+def _tex(text: str) -> str:
+    return re.sub(r"\bC_[SC]\b", r"$\g<0>$", text)
 
 
 PARAMETERS = {

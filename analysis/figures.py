@@ -24,6 +24,7 @@ from analysis.slots import Events, battery_levels, duration, residual_data, uav_
 from dess.scenario import Scenario
 
 INK, MUTED, SEA, ZONE = "#22303c", "#7a8791", "#f3f8fb", "#ffe08a"
+UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
 LINES = ("-", "--", ":", "-.")
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
@@ -42,10 +43,8 @@ def node_colours(count: int) -> list[str]:
 
 
 def uav_colours(count: int) -> list[str]:
-    """A dark colour per UAV."""
-    few = ["#1b1b1b", "#b3123f", "#1f5fbf"]
-    many = [to_hex(c) for c in sns.husl_palette(count, l=0.45)]
-    return few[:count] if count <= len(few) else many
+    """A dark colour per UAV, the same in a fleet of any size; they come again after eight."""
+    return [UAVS[uav % len(UAVS)] for uav in range(count)]
 
 
 @contextmanager

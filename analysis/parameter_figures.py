@@ -37,7 +37,6 @@ def effect(
     """
     rows = table[table["field"] == field]
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
-    name, _, unit = parameter(field)
     colours = policy_colours(pd.Series(policies))
     with style():
         figure = Figure(figsize=(5.2, 7.6), dpi=DPI, layout="constrained")
@@ -53,7 +52,7 @@ def effect(
         axes[3].yaxis.set_major_formatter(FuncFormatter(_points))
         axes[3].set_xlim(-0.4, len(values) - 0.6)
         axes[3].set_xticks(range(len(values)), values)
-        axes[3].set_xlabel(f"{name} [{unit}]".removesuffix(" []"))
+        axes[3].set_xlabel(parameter(field).label)
         for ax in axes:
             ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
             ax.grid(axis="x", visible=False)
@@ -135,4 +134,4 @@ def _ends(rows: pd.DataFrame) -> tuple[float, float]:
 
 
 def _tick(name: str) -> str:
-    return "noise of the\nreplication" if name == NOISE else parameter(name).short
+    return "noise of the\nreplication" if name == NOISE else parameter(name).tick

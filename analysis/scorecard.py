@@ -36,7 +36,7 @@ class Row:
         place: Where the paper makes it.
         printed: The paper's figures; empty if it prints none.
         rule: In words, how the verdicts are computed.
-        page: File name of the page that shows the evidence.
+        evidence: The page that shows it, and the section: ``mission.html#fig-4``.
         learned: By the best learned policy of each study.
         papers_network: By the policy with the paper's observation, network and algorithm.
     """
@@ -46,7 +46,7 @@ class Row:
     place: str
     printed: tuple[Quantity, ...]
     rule: str
-    page: str
+    evidence: str
     learned: Finding
     papers_network: Finding
 
@@ -74,7 +74,7 @@ def scorecard(
             c.place,
             c.printed,
             c.rule,
-            c.page,
+            c.evidence,
             *(_judged(c, each) for each in cases),
         )
         for c in section_v(margin(studies))

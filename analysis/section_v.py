@@ -49,7 +49,7 @@ class Claim:
     """A claim, as ``scorecard.Row`` has it, with its judge."""
 
     part: str
-    page: str
+    evidence: str
     text: str
     place: str
     rule: str
@@ -64,14 +64,14 @@ def section_v(margin: float) -> list[Claim]:
         margin: The difference that does not matter.
     """
     parts: list[tuple[str, str, Iterator[tuple]]] = [
-        ("Table IV: random missions", "performance.html", _table_4()),
-        ("Fig. 4: one to three UAVs", "performance.html", _fig_4(margin)),
-        ("Fig. 4: where they fly", "mission.html", _trajectories()),
-        (FIG_5, "parameters.html", _fig_5(margin)),
-        ("Section V-D: the sweet spot", "parameters.html", _sweet_spot()),
-        ("Fig. 3: transfer learning", "learning.html", _fig_3()),
+        ("Table IV: random missions", "performance.html#table-4", _table_4()),
+        ("Fig. 4: one to three UAVs", "performance.html#fig-4", _fig_4(margin)),
+        ("Fig. 4: where they fly", "mission.html#fig-4", _trajectories()),
+        (FIG_5, "parameters.html#fig-5", _fig_5(margin)),
+        ("Section V-D: the sweet spot", "parameters.html#sweet-spot", _sweet_spot()),
+        ("Fig. 3: transfer learning", "learning.html#fig-3", _fig_3()),
     ]
-    return [Claim(part, page, *fields) for part, page, own in parts for fields in own]
+    return [Claim(part, evidence, *fields) for part, evidence, own in parts for fields in own]
 
 
 def _table_4() -> Iterator[tuple]:

@@ -64,6 +64,11 @@ def words(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
+def commands(lines: Iterable[str]) -> str:
+    """Lines for a shell, as Markdown: none is broken, and all can be copied at once."""
+    return "\n".join(["```sh", *lines, "```"])
+
+
 def provenance(studies: Iterable[Results]) -> HTML:
     """Where the results of a page come from: a column per study, and the evidence to check them."""
     return carrying([Evidence.of(results) for results in studies])
@@ -172,4 +177,6 @@ def svg(drawing: Figure) -> bytes:
 def _figure(drawing: Figure, alt: str, caption: str) -> str:
     source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
-    return f'<figure><img alt="{escape(alt)}" src="{source}">{below}</figure>'
+    width, height = drawing.get_size_inches()
+    shape = ' class="tall"' if height > 1.5 * width else ""
+    return f'<figure><img{shape} alt="{escape(alt)}" src="{source}">{below}</figure>'

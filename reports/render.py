@@ -31,6 +31,7 @@ from reports.verify import is_sealed, sealed
 log = logging.getLogger(__name__)
 
 INDEX = "index.html"
+_INDEX_OR_NO_TEXT = re.compile(r"<(code|pre|script|style)\b.*?</\1>|<[^>]*>|\bC_([SC])\b", re.S)
 _IMAGE = re.compile(r"<img [^>]+>")
 _SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
 
@@ -167,7 +168,12 @@ def _body(notebook: NotebookNode) -> str:
         exclude_output_prompt=True,
         exclude_anchor_links=True,
     )
-    return exporter.from_notebook_node(notebook)[0]
+    return _with_indices(exporter.from_notebook_node(notebook)[0])
+
+
+def _with_indices(html: str) -> str:
+    """Text with ``C_S`` as a C with an index; code and attributes stay."""
+    return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], html)
 
 
 def _pages(out: Path, but: Container[str] = ()) -> dict[str, str]:

@@ -1,6 +1,5 @@
 """The replication scorecard as HTML: a table, and on a phone a card per claim."""
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from itertools import groupby
@@ -8,7 +7,7 @@ from typing import Any
 
 from IPython.display import HTML
 from jinja2 import Environment, PackageLoader
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from analysis import paper
 from analysis.case import Finding, Quantity
@@ -51,10 +50,7 @@ def scorecard(
         departures: What of the policy with the paper's network is not the paper's.
     """
     environment = Environment(
-        loader=PackageLoader("reports", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        finalize=_with_subscripts,
+        loader=PackageLoader("reports", "templates"), autoescape=True, trim_blocks=True
     )
     usual = {column: _usual(getattr(row, column) for row in rows) for column in COLUMNS}
     titles = {
@@ -117,10 +113,11 @@ def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) ->
 
 
 def _claim(row: Row, pages: Collection[str] | None, usual: dict[str, str]) -> dict[str, Any]:
+    of = row.evidence.partition("#")[0]
     return {
         "text": row.claim,
         "place": row.place,
-        "page": row.page if pages is None or row.page in pages else "",
+        "evidence": row.evidence if pages is None or of in pages else "",
         "rule": row.rule,
         "printed": [*map(_shown, row.printed)],
         "findings": [_finding(getattr(row, column), usual[column]) for column in COLUMNS],
@@ -177,10 +174,3 @@ def _count(rows: Sequence[Row], column: str, title: str) -> dict[str, Any]:
 def _badge(verdict: str) -> Markup:
     look, sign = _LOOK[verdict]
     return Markup('<span class="verdict {}">{} {}</span>').format(look, sign, verdict)
-
-
-def _with_subscripts(value: Any) -> Any:
-    """Text with ``C_S`` as a C with an index."""
-    if isinstance(value, str) and re.search(r"\bC_[SC]\b", value):
-        return Markup(re.sub(r"\bC_([SC])\b", r"C<sub>\1</sub>", str(escape(value))))
-    return value

@@ -460,7 +460,7 @@ numbers = pd.concat([lowest, lost])["replication"].tolist()
 display(
     Markdown(
         "Each can be flown again:\n\n"
-        + "\n".join(f"- `{study.replay(policy, 0, number)}`" for number in numbers)
+        + page.commands(study.replay(policy, 0, number) for number in numbers)
         + f"\n\nWith `--policy {baseline}` instead, it is the other policy in the same mission."
     )
 )

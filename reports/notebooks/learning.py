@@ -53,7 +53,7 @@ def spread(numbers, form):
 
 
 # %% [markdown]
-# ## With and without transfer learning: the paper's Fig. 3
+# ## <a id="fig-3"></a>With and without transfer learning: the paper's Fig. 3
 
 # %%
 display(
@@ -91,7 +91,8 @@ def captioned(name, metric):
 
 fig3 = ("evaluation_reward", f"evaluation_{PRODUCT}")
 shown = [*pairs][:1] + [*pairs][1:][-1:]
-page.gallery([captioned(name, metric) for name in shown for metric in fig3])
+for name in shown:
+    display(page.gallery([captioned(name, metric) for metric in fig3]))
 
 # %%
 averages = {metric: curves.smoothed(trainings, metric) for metric in fig3}

@@ -92,7 +92,7 @@ page.gallery(
 # colour; bands that stay are nodes that nobody has emptied.
 
 # %% [markdown]
-# ## From one to three UAVs: the paper's Fig. 4
+# ## <a id="fig-4"></a>From one to three UAVs: the paper's Fig. 4
 
 # %%
 best = " the best of the study by" if policy == product["mean"].idxmax() else ""
@@ -210,8 +210,8 @@ command = (
 )
 display(
     Markdown(
-        "Each mission can be flown again:\n"
-        + "".join(f"\n- `{command.format(uavs)}`" for uavs in missions["uavs"])
+        "Each mission can be flown again:\n\n"
+        + page.commands(command.format(uavs) for uavs in missions["uavs"])
     )
 )
 page.provenance([example, study])

@@ -64,7 +64,7 @@ pairs = {
 
 
 # %% [markdown]
-# ## One by one: the paper's Fig. 5
+# ## <a id="fig-5"></a>One by one: the paper's Fig. 5
 
 # %%
 display(
@@ -172,7 +172,7 @@ display(
 )
 
 # %% [markdown]
-# ## All together: the sweet spot
+# ## <a id="sweet-spot"></a>All together: the sweet spot
 
 # %%
 selections = findings.selections(sweet)

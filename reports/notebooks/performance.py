@@ -46,7 +46,7 @@ def shown(row):
 
 
 # %% [markdown]
-# ## Random missions: the paper's Table IV
+# ## <a id="table-4"></a>Random missions: the paper's Table IV
 
 # %%
 rows = overall.set_index(["policy", "metric"])
@@ -143,7 +143,7 @@ page.table(
 )
 
 # %% [markdown]
-# ## One setting: the paper's Fig. 4
+# ## <a id="fig-4"></a>One setting: the paper's Fig. 4
 
 # %%
 setting = fig4.manifest["scenario"]

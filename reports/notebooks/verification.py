@@ -220,7 +220,7 @@ display(
 )
 drawn = [
     (
-        drawings.fit(fit, parameter(field).name, parameter(field).unit or "value"),
+        drawings.fit(fit, parameter(field).label, "value"),
         f"How often each {parameter(field).name} was drawn",
         f"All values should be drawn equally often. n = {fit.n:,} missions. The band holds all "
         f"dots of {page.level(LEVEL)} of such figures.",

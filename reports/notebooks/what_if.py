@@ -322,9 +322,11 @@ def shown_beside(kind, why):
     display(
         Markdown(
             f"Replication {replication}: {why} The variation changes collection ratio and "
-            f"communication by {change} points here. To fly it again:\n"
-            + "".join(
-                f"\n- {what_if.SIDES[p]}: `{study.replay(shown, p, replication)}`" for p in points
+            f"communication by {change} points here. To fly it again:\n\n"
+            + page.commands(
+                line
+                for p in points
+                for line in (f"# {what_if.SIDES[p]}", study.replay(shown, p, replication))
             )
         )
     )
@@ -375,7 +377,7 @@ shown_beside(
 # %%
 display(
     Markdown(
-        f"This page is made by\n\n`{what_if.command(study)}`\n\n"
+        f"This page is made by\n\n{page.commands([what_if.command(study)])}\n\n"
         "The same question asked again reuses its missions; with more `missions` it flies only "
         "the others. `--set` and the parameter `baseline` take every field of the scenario, in "
         "TOML syntax. In Jupyter, the page's notebook asks what its first cell says.\n\n"

@@ -82,7 +82,7 @@ def test_a_cell_says_its_mean_and_shows_its_sign(missions):
             assert (blue > red) == (row.verdict == AHEAD)
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
     assert ax.get_ylabel() == "Number of UAVs"
-    assert ax.get_xlabel() == "Charging start capacity C_S [%]"
+    assert ax.get_xlabel() == "Charging start capacity $C_S$ [%]"
 
 
 def test_a_cell_without_missions_is_left_empty(missions):

@@ -103,7 +103,7 @@ def test_sensitivities_are_bars_with_intervals(indices):
     expected = [indices[[f"{i}_low", f"{i}_high"]].to_numpy() for i in ("first", "total")]
     assert drawn == pytest.approx(np.concatenate(expected))
     names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
-    assert names == ["UAVs", "C_S", "noise of the replication"]
+    assert names == ["UAVs", "$C_S$", "noise of the replication"]
     assert ax.get_ylim() == (2.5, -0.5)  # the first on top
 
 

@@ -19,6 +19,7 @@ from analysis.verdicts import HOLDS, IN_PART, OPEN, REFUTED
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
+NOTEBOOKS = Path(__file__).parents[2] / "reports" / "notebooks"
 POLICIES = ["greedy", "ddqn"]
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
 NONE = pd.DataFrame()
@@ -94,7 +95,8 @@ def test_every_claim_is_told_whole(rows: list[Row]) -> None:
     assert len({row.claim for row in rows}) == len(rows)
     for row in rows:
         assert row.part and row.place and row.rule.count("olds if") >= 1
-        assert row.page.endswith(".html")
+        page, _, section = row.evidence.partition(".html#")
+        assert f'<a id="{section}"></a>' in (NOTEBOOKS / f"{page}.py").read_text()
         assert {row.learned.verdict, row.papers_network.verdict} <= {*VERDICTS}
 
 

@@ -79,11 +79,14 @@ def html_of(pages: dict[str, str]) -> dict[str, str]:
 
 
 def test_pages_load_nothing(pages: dict[str, str]) -> None:
-    for html in html_of(pages).values():
+    for name, html in html_of(pages).items():
         links = Links(html)
         assert not {"link", "iframe", "object"} & links.tags
         for target in links.found:
-            assert target.startswith("data:image/svg+xml;base64,") or target in pages
+            page, _, section = target.partition("#")
+            if not target.startswith("data:image/svg+xml;base64,"):
+                assert page in {"", *pages}
+                assert not section or f'id="{section}"' in pages[page or name]
         drawings = [b64decode(data) for data in EMBEDDED.findall(html)]
         for drawing in drawings:
             assert set(re.findall(rb'href="(.)', drawing)) == {b"#"}
@@ -126,6 +129,13 @@ def test_the_performance_page_tells_the_means(pages: dict[str, str], results: Pa
         shown = f"{row['mean']:.1%}".replace("%", " %")
         text = f"{shown} [{100 * row['low']:.1f}, {100 * row['high']:.1f}]"
         assert text in pages["performance.html"]
+
+
+def test_names_have_their_index_in_text_and_nowhere_else() -> None:
+    html = module._with_indices('<img alt="C_S"><p>C_S, DC_S</p><pre><b>C_C</b></pre>C_C<!-- -->')
+    assert html == (
+        '<img alt="C_S"><p>C<sub>S</sub>, DC_S</p><pre><b>C_C</b></pre>C<sub>C</sub><!-- -->'
+    )
 
 
 def test_progress_counts_the_cells(pages: dict[str, str], progress: list[Any]) -> None:
