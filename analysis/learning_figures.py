@@ -26,8 +26,8 @@ NAMES = {"evaluation_reward": "Cumulative reward", **EVALUATED}
 OFF = 0.5
 
 
-def transfer(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> Figure:
-    """A metric against the training step: Fig. 3.
+def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> Figure:
+    """A metric against the training step, over several trainings: Fig. 3.
 
     A thick line is the mean of the exponential moving averages over the trainings of a variant, a
     band its interval, a thin line one training. A phase before the last is dotted, and a vertical

@@ -89,5 +89,8 @@ def _outside() -> dict[str, EntryPoint]:
 
 
 def _description(folder: Path) -> str:
-    """What the config of a trained policy says that it is for."""
-    return json.loads((folder / CONFIG).read_text("utf-8"))["training"]["description"]
+    """What the config of a trained policy says that it is for, or of what it is a repetition."""
+    training = json.loads((folder / CONFIG).read_text("utf-8"))["training"]
+    if training.get("name", folder.name) == folder.name:
+        return training["description"]
+    return f"{training['name']} trained once more, with seed {training['seed']}"

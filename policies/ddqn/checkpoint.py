@@ -78,6 +78,7 @@ def load_policy(folder: Path) -> DDQN:
         version = content["format"]
         if version == FORMAT:
             layout, training = _layout(content["layout"]), content["training"]
+            name = str(content["name"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{where}: no readable description of a policy: {error!r}") from None
     if version != FORMAT:
@@ -88,7 +89,7 @@ def load_policy(folder: Path) -> DDQN:
     tensors, _ = _read(folder / MODEL)
     _fit(tensors, network.state_dict(), folder / MODEL)
     network.load_state_dict(tensors)
-    policy = DDQN(config.name, observation, network, config.guard, layout)
+    policy = DDQN(name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
     policy.learner = _learner(config)
     policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])

@@ -106,6 +106,14 @@ shown = (
     if len(versus)
     else []
 )
+
+
+def called(learner):
+    """A learner, told from the first of its trainings, which has its name."""
+    trainings = len(members[learner])
+    return learner if trainings == 1 else f"{learner} ({trainings} trainings)"
+
+
 covered = any(members[name] == [policy] and base == baseline for name, base, _ in shown)
 
 
@@ -123,13 +131,13 @@ def told(rows, name, base):
 
 
 own = regions.overall(missions, pair)
-lines = [told(versus[versus["learner"] == name], name, base) for name, base, _ in shown]
+lines = [told(versus[versus["learner"] == name], called(name), base) for name, base, _ in shown]
 if not covered:
     lines.append(told(own, policy, baseline))
 one = [name for name, _, about in shown if about == CHECKPOINT]
 more = [name for name, *_ in shown if name not in one]
 caveats = [
-    f"Of {page.words(one)} there is one training each: the claim is about "
+    f"Of {page.words(one)} there is one training{' each' * (len(one) > 1)}: the claim is about "
     f"{'this checkpoint' if len(one) == 1 else 'these checkpoints'}, and another training of the "
     "same learner may turn out better or worse."
     if one
@@ -179,7 +187,7 @@ how = (
 if len(versus):
     display(
         page.table(
-            by_metric(versus, "learner"),
+            by_metric(versus.assign(learner=versus["learner"].map(called)), "learner"),
             f"Every learner against the best heuristic, n = {versus['n'].min():,} missions: {how} "
             "best heuristic",
         )

@@ -73,7 +73,7 @@ display(
 def captioned(name, metric):
     using, without = pairs[name]
     labels = {using: "with transfer", without: "without"}
-    figure = learning_figures.transfer(trainings, metric, labels)
+    figure = learning_figures.trainings(trainings, metric, labels)
     fewest = seeds[[using, without]].min()
     band = (
         f"Bands: {band_level} by Student's t over n = {seeds[using]} and "
@@ -258,11 +258,38 @@ configs = {
     name: json.loads((path / "config.json").read_text("utf-8"))["training"]
     for name, path in shipped.items()
 }
+learners = {}  # trainings that differ in their seed alone
+for name, config in configs.items():
+    learners.setdefault(json.dumps(config | {"seed": None}), []).append(name)
+repeated = {names[0]: names for names in learners.values() if len(names) > 1}
 
 
+def trained_often(first, metric):
+    names = repeated[first]
+    own = pd.concat(ran[n].assign(variant=first, seed=configs[n]["seed"]) for n in names)
+    band = (
+        f"the band: {band_level} by Student's t"
+        if len(names) >= curves.FEWEST
+        else f"no band, one of {band_level} would be of no use"
+    )
+    caption = (
+        f"{page.words(names)}, n = {len(names)} trainings that differ in their seed alone. Thick: "
+        f"mean of the exponential moving averages (weight of the newest evaluation "
+        f"{curves.ALPHA:g}); thin: single trainings; {band}."
+    )
+    title = learning_figures.NAMES[metric]
+    figure = learning_figures.trainings(own, metric, {first: first})
+    return figure, f"{title} of {page.words(names)} against training step", caption
+
+
+for first in repeated:
+    display(page.gallery([trained_often(first, metric) for metric in fig3]))
+
+
+# %%
 def trained_once(name):
     caption = (
-        f"n = 1 training, of seed {configs[name]['seed']}, so no interval over trainings; every "
+        f"n = 1 training, of seed {configs[name]['seed']}, which has no interval; every "
         f"evaluation is over {configs[name]['evaluation_missions']:,} missions. The star: the "
         "weights that were kept, by the best moving average."
     )
@@ -302,7 +329,10 @@ display(
     Markdown(
         "No study is read: the curves come with the policies, in `policies/trained`. To make them "
         "anew:\n\n- `python benchmarks/learning.py --out runs/learning`"
-        + "".join(f"\n- `dess train {name} --out runs/{name}`" for name in ran)
+        + "".join(
+            f"\n- `dess train {config['name']} --seed {config['seed']} --out runs/{name}`"
+            for name, config in configs.items()
+        )
     )
 )
 page.table(

@@ -28,7 +28,7 @@ def table():
 
 @pytest.fixture(scope="module")
 def panel(table):
-    (ax,) = learning_figures.transfer(table, METRIC, LABELS).axes
+    (ax,) = learning_figures.trainings(table, METRIC, LABELS).axes
     return ax
 
 
@@ -126,5 +126,5 @@ def test_a_training_shows_its_evaluations_and_the_weights_kept():
 
 def test_figures_leave_no_state_behind(table):
     before = dict(mpl.rcParams)
-    learning_figures.transfer(table, METRIC, LABELS)
+    learning_figures.trainings(table, METRIC, LABELS)
     assert dict(mpl.rcParams) == before

@@ -61,3 +61,11 @@ def test_no_name_is_not_the_working_folder(tmp_path: Path, monkeypatch: pytest.M
 def test_what_is_shipped_loads_by_its_own_name_and_says_what_it_is_for(name: str) -> None:
     assert policies.load(name).name == name
     assert registry.descriptions()[name]
+
+
+@pytest.mark.parametrize("name", [n for n in registry.trained_names() if n[-1].isdigit()])
+def test_a_repetition_differs_in_its_seed_alone(name: str) -> None:
+    first, _, seed = name.rpartition("-")
+    assert registry.descriptions()[name] == f"{first} trained once more, with seed {seed}"
+    assert policies.load(name).learner == policies.load(first).learner
+    assert policies.load(name).weights != policies.load(first).weights
