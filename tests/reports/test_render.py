@@ -14,6 +14,7 @@ import pytest
 from nbclient import NotebookClient
 
 from dess.errors import InputError
+from policies.registry import trained_names
 from reports import kernels
 from reports import render as module
 from reports.notebook import NAMES, read
@@ -26,11 +27,15 @@ from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 READS = jupytext.reads
 # Parameters of what would take long: missions of what-if, flights of verification.
 QUICK = {"missions": 40, "again": 4}
+# The width of the text on A4 [px], and what of a page goes beyond a width.
+A4 = 688
+BEYOND = """[...document.querySelectorAll("main *")].filter(
+    e => e.getBoundingClientRect().right > {} + 1).map(e => e.outerHTML.slice(0, 80))"""
 # The drawings of every page, by the small results.
 FIGURES = {
     "mission": 4,
     "performance": 8,
-    "learning": 7,
+    "learning": 7 + len(trained_names()),
     "parameters": 9,
     "comparison": 12,
     "what-if": 9,
@@ -236,6 +241,16 @@ def test_pages_fit_the_window_and_ask_for_nothing(
         assert chromium.evaluate("document.documentElement.scrollWidth") <= width
         assert chromium.requests == [(out / name).as_uri()]
         assert chromium.complaints == []
+
+
+def test_pages_fit_the_paper(chromium: browser.Page, pages: dict[str, str], out: Path) -> None:
+    try:
+        chromium.call("Emulation.setEmulatedMedia", media="print")
+        for name in html_of(pages):
+            chromium.open(out / name, A4)
+            assert chromium.evaluate(BEYOND.format(A4)) == [], name
+    finally:
+        chromium.call("Emulation.setEmulatedMedia", media="")
 
 
 def test_a_mission_is_played_in_its_page(
