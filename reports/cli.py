@@ -4,11 +4,8 @@ Only what the help needs is imported at once; the rest is imported by the comman
 """
 
 import json
-import math
-import os
 import shlex
 import sys
-import tomllib
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
@@ -20,6 +17,7 @@ from typer.exceptions import TyperException
 
 from dess.errors import InputError
 from reports import console, study
+from reports.settings import PARAMETER, from_here, setting
 
 if TYPE_CHECKING:
     import numpy as np
@@ -246,12 +244,12 @@ def report(
     ] = None,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
-    found = (_setting(text, "--parameter", _PARAMETER) for text in parameters or [])
-    values = {name: _from_here(value) for name, value in found}
+    found = (setting(text, "--parameter", PARAMETER) for text in parameters or [])
+    values = {name: from_here(value) for name, value in found}
     if settings:
         if names and WHAT_IF not in names:
             raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
-        values["settings"] = dict(_setting(text) for text in settings)
+        values["settings"] = dict(setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     from reports.render import ReportError, render
 
@@ -358,42 +356,7 @@ def _scenario(name: str, settings: list[str] | None) -> "ScenarioSpace":
     """The scenario with the fields that ``--set`` sets."""
     from dess import load_scenario
 
-    return load_scenario(name, **dict(_setting(text) for text in settings or []))
-
-
-_FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
-_PARAMETER = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
-
-
-def _setting(text: str, option: str = "--set", allowed: str = _FIELD) -> tuple[str, Any]:
-    """``KEY=VALUE`` as key and value."""
-    key, equals, value = text.partition("=")
-    try:
-        parsed = tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError as error:
-        parsed = {"error": error}
-    if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
-        raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
-    return key.strip(), parsed["value"]
-
-
-def _from_here(value: Any) -> Any:
-    """A value of a parameter; paths, also those in a team, from here: a notebook runs elsewhere."""
-    if isinstance(value, list):
-        return [_from_here(each) for each in value]
-    if not isinstance(value, str):
-        return value
-    parts = value.split(",")
-    is_path = [os.sep in part or part.endswith(".toml") for part in parts]
-    found = zip(parts, is_path, strict=True)
-    return ",".join(os.path.abspath(part) if path else part for part, path in found)
-
-
-def _is_plain(value: Any) -> bool:
-    """Whether a value is of those that fields and parameters have: no date, and no nan."""
-    if isinstance(value, list | dict):
-        return all(map(_is_plain, value.values() if isinstance(value, dict) else value))
-    return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
+    return load_scenario(name, **dict(setting(text) for text in settings or []))
 
 
 def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:

@@ -13,6 +13,7 @@ from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.state import END_NAMES
 from policies import load_team
 from reports import cli
+from reports.settings import setting
 from tests.analysis.small import files_of, grid, small_study
 
 
@@ -317,7 +318,7 @@ def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert options[:2] == ["--scenario", "paper"]  # whose file needs not be there
     settings = [value for key, value in zip(options, options[1:], strict=False) if key == "--set"]
-    ours = load_scenario("paper", **dict(cli._setting(text) for text in settings))
+    ours = load_scenario("paper", **dict(setting(text) for text in settings))
     assert ours == results.scenario(1)
     assert ours.max_slots == 99
     assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]

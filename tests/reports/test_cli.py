@@ -13,6 +13,7 @@ import pytest
 from numba import njit
 
 from analysis import load_results
+from policies.registry import trained_names
 from reports import cli, console
 from tests.analysis import troublesome
 from tests.analysis.small import environment, files_of, small_study
@@ -156,7 +157,7 @@ def test_the_event_log_and_the_figure(dess, tmp_path):
 
 def test_what_there_is(dess):
     for command, names in {
-        "policies": ["random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"],
+        "policies": ["random", "nearest", "greedy", "tour", *trained_names()],
         "scenarios": ["fig1", "fig4", "paper"],
         "studies": [
             *("comparison", "fig1", "fig4", "fig5", "sensitivity", "sweet-spot", "table4"),
