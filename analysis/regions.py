@@ -52,8 +52,9 @@ class Pair(NamedTuple):
 def pair_of(results: Results, learned: str | None = None, heuristic: str | None = None) -> Pair:
     """The best learned policy of a study, and the best of the others.
 
-    The best by collection ratio and communication; where all of them have learned, or none has,
-    the best two.
+    The best by collection ratio and communication. A learner of several trainings counts by their
+    mean, and its first training stands for it: the best of several is not the learner. Where all
+    have learned, or none has, the best two.
 
     Args:
         results: The study.
@@ -68,9 +69,9 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
         if given is not None and given not in ranked:
             allowed = ", ".join(ranked)
             raise InputError(f"{name}: {given!r} is not in the study; allowed: {allowed}")
-    trained = {policy for policies in learners(results).values() for policy in policies}
-    taught = [policy for policy in ranked if policy in trained]
-    others = [policy for policy in ranked if policy not in trained]
+    trained = learners(results).values()
+    others = [policy for policy in ranked if not any(policy in own for own in trained)]
+    taught = [own[0] for own in sorted(trained, key=lambda own: -_mean(results, own))]
     if not taught or not others:
         taught = others = ranked
     pairs = [
@@ -310,6 +311,12 @@ def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
 def _ranked(results: Results) -> list[str]:
     means = results.missions.groupby("policy", sort=False)[PRODUCT].mean()
     return [str(p) for p in means.sort_values(ascending=False, kind="stable").index]
+
+
+def _mean(results: Results, policies: Sequence[str]) -> float:
+    """The mean over policies of their collection ratio and communication."""
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    return float(means[[*policies]].mean())
 
 
 def _flown(results: Results, policy: str) -> pd.DataFrame:

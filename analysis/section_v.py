@@ -176,7 +176,7 @@ def _fig_5(margin: float) -> Iterator[tuple]:
         _lowest_at("uavs", LONE),
     )
     yield (
-        f"Charging from {EARLIEST} % on is an extreme, and costs collection ratio",
+        f"Charging at {EARLIEST} % or below is an extreme, and costs collection ratio",
         "Section V-C",
         claims.LOWEST,
         _lowest_at("charge_start", EARLIEST),

@@ -211,11 +211,12 @@ class Selection(BaseModel):
                 f"none: the budget of {self.budget} missions ended with {left} design points left;"
                 " this is the best mean of them"
             )
-        what = "it is the best" if left == 1 else f"the best is one of {left} that tie, as it does"
+        what = "it is the best" if left == 1 else f"the best is among {left} that tie, it included"
+        others = "every other" if left == 1 else "those ruled out"
         least = "at least" if self.procedure == "kn" else "about or above"
         return (
             f"with probability {least} {self.confidence:g} {what}, if the best is better than "
-            f"every other by {self.indifference:g} or more"
+            f"{others} by {self.indifference:g} or more"
         )
 
 

@@ -42,7 +42,7 @@ def descriptions() -> dict[str, str]:
 
 
 def load(name: str | Path) -> Policy:
-    """The policy of that name, or the trained one in that folder.
+    """The policy of that name, or the trained one in that folder, which has that of its config.
 
     Raises:
         InputError: If there is no such policy, or it cannot be loaded.
@@ -51,13 +51,16 @@ def load(name: str | Path) -> Policy:
     if name in SHIPPED:
         module, _, attribute = SHIPPED[name][0].partition(":")
         return getattr(import_module(module), attribute)()
-    if name in trained_names():
+    shipped = name in trained_names()
+    if shipped:
         folder = TRAINED / name
     # Without a name it would be the working folder.
     if name and os.path.exists(folder / CONFIG):
         from policies.ddqn.checkpoint import load_policy  # brings torch
 
-        return load_policy(folder)
+        policy = load_policy(folder)
+        policy.name = name if shipped else policy.name
+        return policy
     outside = _outside()
     if name not in outside:
         raise InputError(

@@ -129,10 +129,14 @@ def _embedded(kind: str, text: str) -> str:
 
 
 def _weights(evidence: Evidence) -> Iterator[str]:
-    """The hashes of the weights of every learned policy of a study."""
-    members = {m.name: m.weights for team in evidence.policies for m in team.members if m.weights}
-    for name, digest in members.items():
-        yield f"{name} {digest[:SHORT]}"
+    """The hashes of the weights of every learned policy of a study, each once."""
+    for name, digest in dict.fromkeys(
+        (team.policy if len(team.members) == 1 else member.name, member.weights)
+        for team in evidence.policies
+        for member in team.members
+    ):
+        if digest:
+            yield f"{name} {digest[:SHORT]}"
 
 
 def _range(ends: tuple[int, int]) -> str:

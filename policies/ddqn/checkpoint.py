@@ -21,7 +21,7 @@ from safetensors.torch import save_file
 from dess.errors import InputError
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
-from policies.ddqn.config import TrainingConfig, config_of
+from policies.ddqn.config import TrainingConfig, config_of, learner_of
 from policies.ddqn.policy import DDQN
 from policies.ddqn.snapshot import Layout, layout_of
 from policies.ddqn.training import OBSERVATIONS, Training, build
@@ -78,7 +78,6 @@ def load_policy(folder: Path) -> DDQN:
         version = content["format"]
         if version == FORMAT:
             layout, training = _layout(content["layout"]), content["training"]
-            name = str(content["name"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{where}: no readable description of a policy: {error!r}") from None
     if version != FORMAT:
@@ -89,9 +88,9 @@ def load_policy(folder: Path) -> DDQN:
     tensors, _ = _read(folder / MODEL)
     _fit(tensors, network.state_dict(), folder / MODEL)
     network.load_state_dict(tensors)
-    policy = DDQN(name, observation, network, config.guard, layout)
+    policy = DDQN(config.name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
-    policy.learner = _learner(config)
+    policy.learner = learner_of(config)
     policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])
     return policy
 
@@ -195,12 +194,6 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
     torch.set_rng_state(tensors["random.torch"])
-
-
-def _learner(config: TrainingConfig) -> str:
-    """The name of a config, and a hash of all that it says but the seed."""
-    settings = config.model_dump(mode="json", exclude={"seed", "description"})
-    return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
 
 
 def _digest(tensors: Tensors, use: list[Any]) -> str:

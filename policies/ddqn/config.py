@@ -1,5 +1,7 @@
 """What a training is told: every setting, documented where it is declared."""
 
+import hashlib
+import json
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -167,6 +169,12 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
         raise InputError(
             validation_line(error, where, Phase if nested else TrainingConfig)
         ) from None
+
+
+def learner_of(config: TrainingConfig) -> str:
+    """What trainings that differ in their seed alone share: the name, and a hash of all else."""
+    settings = config.model_dump(mode="json", exclude={"seed", "description"})
+    return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
 
 
 def _read(path: str) -> str:

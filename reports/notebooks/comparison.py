@@ -41,12 +41,13 @@ pair = regions.pair_of(study, learned, heuristic)
 policy, baseline = pair.policy, pair.baseline
 missions = regions.duels(study, pair)
 seed = study.manifest["seed"]
-level = page.level(LEVEL)
+level, risk = page.level(LEVEL), page.level(1 - LEVEL)
 means = summary(study.missions, by=["policy"])
 ranked = means[means["metric"] == PRODUCT].sort_values("mean", ascending=False, kind="stable")[
     "policy"
 ]
-taught = {name for names in findings.learners(study).values() for name in names}
+members = findings.learners(study)
+taught = {name: names for names in members.values() for name in names}
 
 
 def points(row, mean="mean"):
@@ -64,10 +65,14 @@ def span(numbers):
 
 def role(name):
     """What a policy is in the study."""
-    kind = taught if name in taught else set(ranked) - taught
-    first = next(other for other in ranked if other in kind) == name
-    kind = ("learned policy", "") if name in taught else ("policy", " that has not learned")
-    return f"{'the best' if first else 'a'} {kind[0]} of the study{kind[1]}"
+    if name not in taught:
+        first = next(other for other in ranked if other not in taught) == name
+        return f"{'the best' if first else 'a'} policy of the study that has not learned"
+    own = taught[name]
+    best = "the best" if regions.pair_of(study).policy in own else "a"
+    if len(own) == 1:
+        return f"{best} learned policy of the study"
+    return f"training {own.index(name) + 1} of {len(own)} of {best} learner of the study"
 
 
 def metric_name(metric):
@@ -97,7 +102,6 @@ display(
 
 # %%
 versus = findings.learned_against_heuristic(study)
-members = findings.learners(study)
 shown = (
     [
         (row["learner"], row["baseline"], row["about"])
@@ -127,13 +131,11 @@ def told(rows, name, base):
     parts = [
         f"{verdict} {base} in {page.words(those)}" for verdict, those in groups.items() if those
     ]
-    return f"- **{name}** is {'; '.join(parts)}."
+    return f"**{name}** is {'; '.join(parts)}."
 
 
 own = regions.overall(missions, pair)
 lines = [told(versus[versus["learner"] == name], called(name), base) for name, base, _ in shown]
-if not covered:
-    lines.append(told(own, policy, baseline))
 one = [name for name, _, about in shown if about == CHECKPOINT]
 more = [name for name, *_ in shown if name not in one]
 caveats = [
@@ -148,6 +150,18 @@ caveats = [
     else "",
 ]
 gain = own.set_index("metric").loc[PRODUCT, "variance_reduction"]
+several = len(taught.get(policy, [])) > 1
+alone = (
+    ""
+    if covered
+    else (f"The rest of this page is about {policy} alone" if several else "The pair of this page")
+    + (
+        ", the first training, whatever came of it"
+        if several and taught[policy][0] == policy
+        else ""
+    )
+    + f": {told(own, policy, baseline)}"
+)
 worth = (
     f"The common missions are worth much: with missions of its own for each policy, it would "
     f"take {1 / (1 - gain):.0f} times as many for intervals as narrow."
@@ -156,9 +170,13 @@ worth = (
 )
 display(
     Markdown(
-        f"By the p-values at {level}, after Holm's correction for the number of "
-        "comparisons:\n\n"
-        + "\n\n".join(text for text in ("\n".join(lines), *caveats, worth) if text)
+        f"By the p-values at the {risk} level, after Holm's correction for the number of "
+        f"comparisons; the {level} intervals are of one difference each:\n\n"
+        + "\n\n".join(
+            text
+            for text in ("\n".join(f"- {line}" for line in lines), *caveats, alone, worth)
+            if text
+        )
     )
 )
 
@@ -232,7 +250,7 @@ page.figure(
     f"and communication is at most the value below. The {level} band holds the whole "
     "curve. Where the curve crosses 0 is the share of missions that are lost. Up to "
     f"{page.level(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
-    f"{page.difference(missions['difference'].min(), 0)}, the highest "
+    f"{page.difference(missions['difference'].min(), 0)} points, the highest "
     f"{page.difference(missions['difference'].max(), 0)}.",
 )
 
@@ -249,7 +267,7 @@ verdicts = {v: int((lead["verdict"] == v).sum()) for v in ("ahead", "behind", re
 
 
 def place(row):
-    return f"{parameter(row['field']).within} {row['value']}, {points(row)} points"
+    return f"{parameter(row['field']).within} {row['value']} ({points(row)} points)"
 
 
 def spread(field):
@@ -257,14 +275,14 @@ def spread(field):
     rows = lead[lead["field"] == field]
     low, high = rows.loc[rows["mean"].idxmin()], rows.loc[rows["mean"].idxmax()]
     return (
-        f"{parameter(field).within} ({page.difference(low['mean'], 0)} at {low['value']}, "
+        f"the {parameter(field).within} ({page.difference(low['mean'], 0)} at {low['value']}, "
         f"{page.difference(high['mean'], 0)} at {high['value']})"
     )
 
 
 matters = depends["p_adjusted"] <= 1 - LEVEL
 named = [spread(field) for field in depends.loc[matters, "field"]]
-unnamed = [parameter(field).within for field in depends.loc[~matters, "field"]]
+unnamed = [f"the {parameter(field).within}" for field in depends.loc[~matters, "field"]]
 if len(lead):
     display(
         Markdown(
@@ -272,8 +290,8 @@ if len(lead):
             "the initial data are the mean of a mission's nodes. "
             f"Of these {len(lead)} bins, {policy} is ahead in {verdicts['ahead']} and behind in "
             f"{verdicts['behind']}; of {verdicts[regions.OPEN]} it cannot be told (at "
-            f"{level}, after Holm's correction for all of them). The difference is lowest "
-            f"at {place(order.iloc[0])}, highest at {place(order.iloc[-1])}."
+            f"the {risk} level, after Holm's correction for all of them). The difference is lowest "
+            f"with {place(order.iloc[0])}, highest with {place(order.iloc[-1])}."
             + (f"\n\nIt depends on {page.words(named)}." if named else "")
             + (f" That it depends on {page.words(unnamed)} is not shown." if unnamed else "")
             + " (Alexander and Govern's test of equal means, Holm's correction for the number of "
@@ -355,7 +373,7 @@ elif len(behind):
 else:
     text = (
         f"{policy} is **behind in none** of the {plural(len(found), 'region', 'regions')}, at "
-        f"{level} after Holm's correction. The difference is lowest in "
+        f"the {risk} level after Holm's correction. The difference is lowest in "
         f"{region(found.iloc[0])}"
     )
 if len(unsure):

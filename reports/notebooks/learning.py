@@ -30,6 +30,7 @@ from analysis.findings import PRODUCT
 from analysis.paper import CROSSING, METRICS
 from analysis.section_v import curve_verdict
 from analysis.statistics import LEVEL
+from policies.ddqn.config import config_of, learner_of
 from reports import page
 
 folder = Path(trained or str(files("policies") / "trained"))
@@ -137,7 +138,10 @@ display(
 
 def judged(name):
     using, without = pairs[name]
-    lines = [f"- With {name} (n = {seeds[using]} and {seeds[without]}):"]
+    lines = [
+        f"- With {name} (n = {seeds[using]} and {seeds[without]}"
+        f"{'' if name in shown else ', not drawn'}):"
+    ]
     return lines + [
         f"    - {learning_figures.NAMES[metric]} **{verdicts[name, metric]}**: "
         + told(metric, found[name, metric])
@@ -155,14 +159,20 @@ display(
 
 # %%
 unclear = [f for f in found.values() if f.last.low <= 0 <= f.last.high]
+alike = sum(f.last.low == f.last.high for f in unclear)
 alone = [*pairs][-1]
 ends = {v: 100 * each.loc[v, f"final_{PRODUCT}"].max() for v in pairs[alone]}
 display(
     Markdown(
-        f"In {len(unclear)} of {len(found)} comparisons the interval of the last difference holds "
-        "0: so few trainings cannot tell whether transfer helps or harms there. The paper sees its "
-        f"crossing at {CROSSING:,} steps; the trainings here have {each['updates'].max():,}"
-        + (", and longer ones might say otherwise" if each["updates"].max() < CROSSING else "")
+        (
+            f"The trainings here have {each['updates'].max():,} steps, and the paper sees its "
+            f"crossing at {CROSSING:,}: by the rules they are too short to tell. "
+            if each["updates"].max() < CROSSING
+            else ""
+        )
+        + f"As far as they go, the interval of the last difference holds 0 in {len(unclear)} of "
+        f"{len(found)} comparisons"
+        + (f"; in {alike} of these all trainings end alike" if alike else "")
         + f". With {alone}, the best training with transfer reaches "
         f"{ends[pairs[alone][0]]:.1f} %, the best without {ends[pairs[alone][1]]:.1f} % in "
         "collection ratio and communication."
@@ -260,7 +270,7 @@ configs = {
 }
 learners = {}  # trainings that differ in their seed alone
 for name, config in configs.items():
-    learners.setdefault(json.dumps(config | {"seed": None}), []).append(name)
+    learners.setdefault(learner_of(config_of(config, name)), []).append(name)
 repeated = {names[0]: names for names in learners.values() if len(names) > 1}
 
 
@@ -303,21 +313,24 @@ page.gallery([trained_once(name) for name in ran])
 # %%
 def course(name):
     curve = ran[name]
-    near, end = curves.settled(curve, f"evaluation_{PRODUCT}", claims.MARGIN), curve.iloc[-1]
+    metric = f"evaluation_{PRODUCT}"
+    near, end = curves.settled(curve, metric, claims.MARGIN), curve.iloc[-1]
+    average = curves.smoothed(curve.assign(variant=name, seed=0), metric)["value"].iloc[-1]
     return (
-        f"- **{name}** ends at {page.percent(end[f'evaluation_{PRODUCT}'])} after "
+        f"- **{name}** ends at {page.percent(average)} after "
         f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots and "
         f"{end['seconds'] / 60:.0f} minutes. From update {near['updates']:,} on "
-        f"({near['seconds'] / 60:.0f} minutes) its moving average stays within "
-        f"{claims.margin_in_words(claims.MARGIN)} of its end: the other "
-        f"{page.percent(1 - near['updates'] / end['updates'])} of the updates moved it no further."
+        f"({near['seconds'] / 60:.0f} minutes) it stays within "
+        f"{claims.margin_in_words(claims.MARGIN)} of that: the other "
+        f"{page.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
     )
 
 
 display(
     Markdown(
-        "Where more training stops paying, by the collection ratio and communication of the "
-        "evaluations:\n\n" + "\n".join(map(course, ran))
+        "Where more training stops paying, by the exponential moving average of the collection "
+        "ratio and communication of the evaluations. The minutes passed on a machine that did "
+        "other work as well.\n\n" + "\n".join(map(course, ran))
     )
 )
 

@@ -130,7 +130,9 @@ page.gallery([captioned(point) for point in points])
 # ## Slot by slot
 
 # %%
-display(Markdown(f"The same missions, to play, to pause and to leaf through. {READING}"))
+display(
+    Markdown(f"The same missions, to play, to pause and to leaf through on a screen. {READING}")
+)
 display(library())
 for point in points:
     mission = missions.loc[point]

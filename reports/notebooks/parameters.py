@@ -99,10 +99,10 @@ page.gallery([captioned(field) for field in fields])
 # %% [markdown]
 # ### What one sees
 #
-# Two values differ if they do mission by mission, at 95 % after Holm's correction for the number of
-# pairs. Along the values, a metric *rises* if some values differ and all that do go up, *falls* if
-# all go down, *stays level* if none differ; *rises, then falls* if nothing before a value falls and
-# nothing behind it rises.
+# Two values differ if they do mission by mission, at the 5 % level after Holm's correction for the
+# number of pairs. Along the values, a metric *rises* if some values differ and all that do go up,
+# *falls* if all go down, *stays level* if none differ; *rises, then falls* if nothing before a
+# value falls and nothing behind it rises.
 
 
 # %%
@@ -328,8 +328,8 @@ display(
     Markdown(
         "\n".join(map(weighed, of_product["policy"].unique()))
         + (
-            f"\n\nNo shares can be told of {page.words(silent)}: there it is the same in all the "
-            "missions that they are computed from."
+            f"\n\nNo shares can be told of {page.words(silent)}: it is the same in all missions "
+            "of both base samples, from which the variance is taken."
             if silent
             else ""
         )

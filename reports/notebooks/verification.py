@@ -221,7 +221,7 @@ display(
 drawn = [
     (
         drawings.fit(fit, parameter(field).label, "value"),
-        f"How often each {parameter(field).name} was drawn",
+        f"How often each value of the {parameter(field).within} was drawn",
         f"All values should be drawn equally often. n = {fit.n:,} missions. The band holds all "
         f"dots of {page.level(LEVEL)} of such figures.",
     )

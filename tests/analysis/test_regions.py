@@ -28,10 +28,11 @@ def results(tmp_path_factory):
 
 @pytest.fixture
 def taught(monkeypatch):
-    """Make policies pass for learned ones."""
+    """Make policies pass for learned ones: of every learner its trainings."""
 
-    def teach(*names):
-        monkeypatch.setattr(regions, "learners", lambda results: {"learner": [*names]})
+    def teach(*learners):
+        named = {f"learner {n}": names for n, names in enumerate(learners)}
+        monkeypatch.setattr(regions, "learners", lambda results: named)
 
     return teach
 
@@ -65,10 +66,16 @@ def ranked(results):
 
 def test_the_pair_is_the_best_learned_policy_and_the_best_other(results, taught):
     first, second, third = ranked(results)
-    taught(second)
+    taught([second])
     assert regions.pair_of(results) == Pair(second, first, 2)
-    taught(second, third)
+    taught([third], [second])
     assert regions.pair_of(results) == Pair(second, first, 2)
+
+
+def test_the_first_training_stands_for_its_learner(results, taught):
+    first, second, third = ranked(results)
+    taught([third, second])
+    assert regions.pair_of(results) == Pair(third, first, 1)
 
 
 def test_without_a_learned_policy_the_best_two_are_the_pair(results):
@@ -78,7 +85,7 @@ def test_without_a_learned_policy_the_best_two_are_the_pair(results):
 
 def test_policies_may_be_named(results, taught):
     first, second, third = ranked(results)
-    taught(first)
+    taught([first])
     assert regions.pair_of(results, heuristic=third) == Pair(first, third, 1)
     assert regions.pair_of(results, learned=third) == Pair(third, second, 1)
     assert regions.pair_of(results, third, first) == Pair(third, first, 1)

@@ -306,7 +306,7 @@ def test_points_that_are_alike_tie_and_the_first_wins():
     row = normal(9, [0.8], spread=0.1)[0]
     choice = chosen(rule(indifference=0.05), np.stack([row - 0.5, row, row]))
     assert (choice.best, choice.survivors, choice.stage) == (1, (1, 2), 10)
-    assert "one of 2 that tie" in choice.guarantee
+    assert "the best is among 2 that tie, it included" in choice.guarantee
     choice = chosen(rule("ocba", budget=300), np.stack([row - 0.5, row, row]))
     assert choice.best in (1, 2)
     assert choice.probability == pytest.approx(0.5, abs=0.01)

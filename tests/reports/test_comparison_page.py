@@ -133,6 +133,22 @@ def test_few_missions_and_no_learned_policy_make_a_page(results: Path, tmp_path:
     assert not re.search(r"Traceback|Warning|\bnan\b|NaN|None|\binf\b", text)
 
 
+def test_several_trainings_are_one_learner_and_the_first_is_shown(
+    results: Path, tmp_path: Path
+) -> None:
+    folder = with_studies_of(
+        results, tmp_path / "results", policies=["greedy", "ddqn", "ddqn-2"], missions=60
+    )
+    text = said(folder)
+    assert "ddqn is training 1 of 2 of the best learner of the study, greedy the best" in text
+    assert re.search(r"ddqn \(2 trainings\) is (ahead of|not told apart from) greedy", text)
+    assert "The rest of this page is about ddqn alone, the first training, whatever" in text
+    assert "about the learner, trainings to come included" in text
+    for team in load_results(folder / NAME).store.manifest.policies:
+        for member in team.members:
+            assert not member.weights or f"{team.policy} {member.weights[:12]}" in text
+
+
 def test_a_single_policy_is_refused_in_a_line(results: Path, tmp_path: Path) -> None:
     folder = with_studies_of(results, tmp_path / "results", policies=["greedy"], missions=3)
     with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
