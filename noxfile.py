@@ -43,7 +43,8 @@ def tests(session: nox.Session) -> None:
 def verify(session: nox.Session) -> None:
     """Run the longer proofs: the slow tests, with many more hypothesis examples."""
     install(session, "[test]")
-    session.run("pytest", "-m", "slow", "--hypothesis-profile=verify", *session.posargs)
+    slow = ("-m", "slow", "--hypothesis-profile=verify")
+    session.run("pytest", "-q", *slow, *SIDE_BY_SIDE, *session.posargs)
 
 
 @nox.session
