@@ -22,9 +22,12 @@ from matplotlib.ticker import MaxNLocator, PercentFormatter
 from analysis.paper import METRICS
 from analysis.slots import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
+from policies.registry import SHIPPED
 
 INK, MUTED, SEA, ZONE = "#22303c", "#7a8791", "#f3f8fb", "#ffe08a"
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
+# Policies that look the same in all figures, whichever others are there.
+EVERYWHERE = (*SHIPPED, "ddqn", "ddqn-paper")
 LINES = ("-", "--", ":", "-.")
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
@@ -276,10 +279,13 @@ def by_fleet(
 
 
 def policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
-    """Colour and marker of every policy."""
+    """Colour and marker of every policy; those of ``EVERYWHERE`` always have their own."""
     names = list(dict.fromkeys(policies))
-    palette = sns.color_palette("colorblind", len(names)).as_hex()
-    return {name: (palette[n], "os^vPX*"[n % 7]) for n, name in enumerate(names)}
+    numbers = {name: EVERYWHERE.index(name) for name in names if name in EVERYWHERE}
+    free = [n for n in range(len(names)) if n not in numbers.values()]
+    numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
+    palette = sns.color_palette("colorblind").as_hex()
+    return {name: (palette[numbers[name] % 10], "os^vPX*"[numbers[name] % 7]) for name in names}
 
 
 def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:

@@ -185,3 +185,12 @@ def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
         assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
     (printed,) = (line for line in ax.lines if line.get_label() == "paper")
     assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
+
+
+def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> None:
+    everywhere = figures.policy_colours(pd.Series(figures.EVERYWHERE))
+    for names in (["ddqn", "mine", "greedy", "ddqn"], ["a", "b", "ddqn-paper"], ["b", "a"]):
+        looks = figures.policy_colours(pd.Series(names))
+        assert [*looks] == [*dict.fromkeys(names)]
+        assert len({*looks.values()}) == len(looks)
+        assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)
