@@ -59,7 +59,8 @@ def load(name: str | Path) -> Policy:
         from policies.ddqn.checkpoint import load_policy  # brings torch
 
         policy = load_policy(folder)
-        policy.name = name if shipped else policy.name
+        if shipped:
+            policy.name = name
         return policy
     outside = _outside()
     if name not in outside:

@@ -329,8 +329,8 @@ def course(name):
 display(
     Markdown(
         "Where more training stops paying, by the exponential moving average of the collection "
-        "ratio and communication of the evaluations. The minutes passed on a machine that did "
-        "other work as well.\n\n" + "\n".join(map(course, ran))
+        "ratio and communication of the evaluations. Minutes are those of the clock, whatever "
+        "else the machine did.\n\n" + "\n".join(map(course, ran))
     )
 )
 
