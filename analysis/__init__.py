@@ -7,19 +7,19 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "Study": "study",
-    "load_study": "study",
-    "study_names": "study",
-    "run_study": "runner",
-    "evaluate": "runner",
-    "Results": "results",
-    "load_results": "results",
-    "fly": "replay",
-    "summary": "statistics",
-    "distribution": "statistics",
-    "bootstrap_interval": "statistics",
-    "compare": "comparison",
-    "compare_learners": "comparison",
+    "Study": "study.study",
+    "load_study": "study.study",
+    "study_names": "study.study",
+    "run_study": "execution.runner",
+    "evaluate": "execution.runner",
+    "Results": "results.tables",
+    "load_results": "results.tables",
+    "fly": "results.resimulate",
+    "summary": "stats.intervals",
+    "distribution": "stats.intervals",
+    "bootstrap_interval": "stats.intervals",
+    "compare": "stats.paired",
+    "compare_learners": "stats.paired",
 }
 
 __all__ = [*_HOME]

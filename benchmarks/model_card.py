@@ -15,8 +15,8 @@ import numpy as np
 import pandas as pd
 
 import policies
-from analysis import paper
-from analysis.statistics import mean_interval, wilson
+from analysis.replication import paper
+from analysis.stats.intervals import mean_interval, wilson
 from dess import load_scenario, simulate_batch
 from policies.ddqn.config import MISSION_SEED, config_of, load_config
 from policies.registry import SHIPPED

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from analysis import jobs, load_study, run_study
-from analysis.results import Results
-from analysis.study import Study
+from analysis import load_study, run_study
+from analysis.execution import jobs
+from analysis.results.tables import Results
+from analysis.study.study import Study
 from dess import simulate_batch
 
 ROUNDS = 5

@@ -14,8 +14,8 @@ _HOME = {
     "scenario_names": "scenario",
     "simulate": "mission",
     "simulate_batch": "batch",
-    "parallel_env": "env",
-    "batch_env": "env",
+    "parallel_env": "env.parallel",
+    "batch_env": "env.batch",
 }
 
 __all__ = ["__version__", *_HOME]

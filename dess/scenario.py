@@ -1,7 +1,5 @@
 """Scenarios: every constant of the model, and the ranges that a mission draws its own from."""
 
-import tomllib
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -16,8 +14,11 @@ from pydantic import (
 )
 
 from dess.errors import InputError
+from dess.files import Shipped
 
 Cell = tuple[int, int]
+
+_SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
 # Section VI-A: all combinations of five columns and five rows.
 PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
@@ -246,32 +247,13 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     Raises:
         InputError: If there is no such scenario, or it is not valid.
     """
-    text = str(name_or_path)
-    if text in scenario_names():
-        where = f"scenario {text}"
-        content = resources.files("dess").joinpath(f"scenarios/{text}.toml").read_text("utf-8")
-    else:
-        where = text
-        content = _read_file(text)
-    return _validated(ScenarioSpace, parse_toml(content, where) | overrides, where)
+    where, values = _SCENARIOS.load(name_or_path)
+    return _validated(ScenarioSpace, values | overrides, where)
 
 
 def scenario_names() -> list[str]:
     """The names of the shipped scenarios."""
-    folder = resources.files("dess").joinpath("scenarios")
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
-
-
-def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """TOML text as a dictionary.
-
-    Raises:
-        InputError: If the text is no TOML; ``where`` says where it came from.
-    """
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where}: not valid TOML: {error}") from None
+    return _SCENARIOS.names()
 
 
 def validation_line(
@@ -308,17 +290,6 @@ def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> An
         return model.model_validate(values)
     except ValidationError as error:
         raise InputError(validation_line(error, where)) from None
-
-
-def _read_file(path: str) -> str:
-    try:
-        return Path(path).read_text("utf-8")
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such scenario; allowed: {', '.join(scenario_names())}, or a TOML file"
-        ) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None
 
 
 def _tuples(value: Any) -> Any:

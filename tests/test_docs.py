@@ -15,7 +15,8 @@ import typer.main
 
 import dess
 import policies
-from analysis import load_study, paper
+from analysis import load_study
+from analysis.replication import paper
 from benchmarks import learning
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli

@@ -81,7 +81,7 @@ def test_the_wheel_holds_the_packages_with_all_their_files_and_nothing_else(whee
     for kind in (
         "dess/scenarios/*.toml",
         "policies/ddqn/configs/*.toml",
-        "analysis/studies/*.toml",
+        "analysis/study/shipped/*.toml",
         "reports/notebooks/*.py",
     ):
         assert any(Path(name).match(kind) for name in held), kind

@@ -8,7 +8,6 @@ header, as JSON, all that is no array.
 import copy
 import hashlib
 import json
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,11 +18,12 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from dess.errors import InputError
+from dess.files import replacing, writable
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 from policies.ddqn.config import TrainingConfig, config_of, learner_of
+from policies.ddqn.observations.states import Layout, layout_of
 from policies.ddqn.policy import DDQN
-from policies.ddqn.snapshot import Layout, layout_of
 from policies.ddqn.training import OBSERVATIONS, Training, build
 
 FORMAT = 1
@@ -277,12 +277,13 @@ def _layout(values: dict[str, Any]) -> Layout:
 
 
 def replace(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write a file beside its place, then put it there: it is never half there."""
-    new = path.with_name(path.name + ".new")
-    try:
-        write(new)
-        os.replace(new, path)
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"{path}: cannot be written: {error}; allowed: another folder") from None
-    finally:
-        new.unlink(missing_ok=True)
+    """Write a file of a training whole or not at all.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    with replacing(path) as temporary, writable(path):
+        try:
+            write(temporary)
+        except SafetensorError as error:
+            raise OSError(error) from None

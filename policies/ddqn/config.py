@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,7 +15,10 @@ from pydantic import (
 )
 
 from dess.errors import InputError
-from dess.scenario import load_scenario, parse_toml, validation_line
+from dess.files import Shipped
+from dess.scenario import load_scenario, validation_line
+
+_CONFIGS = Shipped("config", "policies.ddqn", "configs")
 
 # Training missions have this seed + that of the training.
 MISSION_SEED = 500_000_000
@@ -130,8 +132,7 @@ class TrainingConfig(_Settings):
 
 def config_names() -> list[str]:
     """The names of the shipped configs."""
-    folder = resources.files("policies.ddqn").joinpath("configs")
-    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return _CONFIGS.names()
 
 
 def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig:
@@ -140,15 +141,8 @@ def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig
     Raises:
         InputError: If there is no such config, or it or its scenario is not valid.
     """
-    text = str(name_or_path)
-    if text in config_names():
-        where = f"config {text}"
-        content = (
-            resources.files("policies.ddqn").joinpath(f"configs/{text}.toml").read_text("utf-8")
-        )
-    else:
-        where, content = text, _read(text)
-    config = config_of(parse_toml(content, where) | overrides, where)
+    where, values = _CONFIGS.load(name_or_path)
+    config = config_of(values | overrides, where)
     try:
         load_scenario(config.scenario)
     except InputError as error:
@@ -175,13 +169,3 @@ def learner_of(config: TrainingConfig) -> str:
     """What trainings that differ in their seed alone share: the name, and a hash of all else."""
     settings = config.model_dump(mode="json", exclude={"seed", "description"})
     return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
-
-
-def _read(path: str) -> str:
-    try:
-        return Path(path).read_text("utf-8")
-    except FileNotFoundError:
-        allowed = ", ".join(config_names())
-        raise InputError(f"{path}: no such config; allowed: {allowed}, or a TOML file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}") from None

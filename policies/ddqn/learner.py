@@ -8,8 +8,8 @@ import torch
 from torch import nn
 
 from policies.ddqn.config import TrainingConfig
+from policies.ddqn.observations.states import Snapshots, masks
 from policies.ddqn.replay import Batch
-from policies.ddqn.snapshot import Snapshots, masks
 
 
 def double_dqn_target(

@@ -9,7 +9,7 @@ from torch import nn
 
 from dess.errors import InputError
 from dess.view import View
-from policies.ddqn.snapshot import Layout, masks, snapshot
+from policies.ddqn.observations.states import Layout, masks, snapshot
 
 # The rounding of sums depends on how many rows are evaluated together, and must decide nothing:
 # where the two best values are closer than this, they are computed again in double precision and

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.compiled import kernel
-from policies.ddqn.snapshot import Snapshots, empty_snapshots
+from policies.ddqn.observations.states import Snapshots, empty_snapshots
 
 
 class Batch(NamedTuple):

@@ -15,18 +15,16 @@ from torch import nn
 
 from dess.batch import simulate_batch
 from dess.compiled import kernel
+from dess.env.stepper import Lanes
 from dess.errors import InputError
-from dess.lanes import Lanes
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
-from policies.ddqn.maps import POOL, Maps
 from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
-from policies.ddqn.policy import DDQN
-from policies.ddqn.relations import Relations
-from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.snapshot import (
+from policies.ddqn.observations.maps import POOL, Maps
+from policies.ddqn.observations.nodes import Relations
+from policies.ddqn.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGE_START,
@@ -41,7 +39,9 @@ from policies.ddqn.snapshot import (
     masks,
     snapshot,
 )
-from policies.ddqn.vector import Vector
+from policies.ddqn.observations.vector import Vector
+from policies.ddqn.policy import DDQN
+from policies.ddqn.replay import ReplayMemory
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28

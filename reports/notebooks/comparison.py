@@ -26,13 +26,16 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import comparison_figures as drawings
-from analysis import figures, findings, fly, load_results, paper, regions, summary, timing
-from analysis.comparison import CHECKPOINT
-from analysis.effects import parameter
-from analysis.findings import PRODUCT
-from analysis.statistics import LEVEL
-from reports import page
+from analysis import fly, load_results, summary
+from analysis.execution import decision_time as timing
+from analysis.figures import comparison as drawings
+from analysis.figures import missions as figures
+from analysis.names import METRICS, PRODUCT, parameter
+from analysis.questions import head_to_head as regions
+from analysis.questions import summary as findings
+from analysis.stats.intervals import LEVEL
+from analysis.stats.paired import CHECKPOINT
+from reports.pages import html as page
 
 study = load_results(Path(results) / "comparison")
 times = timing.read(Path(results) / "timing")
@@ -76,7 +79,7 @@ def role(name):
 
 
 def metric_name(metric):
-    return paper.METRICS[metric].lower()
+    return METRICS[metric].lower()
 
 
 # %% [markdown]
@@ -185,10 +188,10 @@ display(
 def by_metric(rows, name):
     """A row per policy, with its differences and p-values in all metrics."""
     head = [("", "Difference")]
-    head += [(m, what) for m in paper.METRICS.values() for what in ("points", "p, adjusted")]
+    head += [(m, what) for m in METRICS.values() for what in ("points", "p, adjusted")]
     lines = []
     for who, own in rows.groupby(name, sort=False):
-        own = own.set_index("metric").loc[[*paper.METRICS]]
+        own = own.set_index("metric").loc[[*METRICS]]
         cells = [
             (points(row, "difference"), page.p_value(row["p_adjusted"]))
             for _, row in own.iterrows()

@@ -25,13 +25,15 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import claims, curves, learning_figures
-from analysis.findings import PRODUCT
-from analysis.paper import CROSSING, METRICS
-from analysis.section_v import curve_verdict
-from analysis.statistics import LEVEL
+from analysis.figures import learning as learning_figures
+from analysis.names import METRICS, PRODUCT
+from analysis.questions import learning as curves
+from analysis.replication import rules as claims
+from analysis.replication.claims import curve_verdict
+from analysis.replication.paper import CROSSING
+from analysis.stats.intervals import LEVEL
 from policies.ddqn.config import config_of, learner_of
-from reports import page
+from reports.pages import html as page
 
 folder = Path(trained or str(files("policies") / "trained"))
 trainings = pd.read_parquet(folder / "curves.parquet")

@@ -25,9 +25,11 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import figures, load_results, paper, summary
+from analysis import load_results, summary
+from analysis.figures import missions as figures
+from analysis.replication import paper
 from dess.scenario import SAMPLED
-from reports import page
+from reports.pages import html as page
 from reports.player import READING, library, player
 
 example, study = (load_results(Path(results) / name) for name in ("fig1", "fig4"))

@@ -26,15 +26,19 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import effects, figures, findings, load_results, paper, parameter_figures, summary
-from analysis.claims import NO_RESULTS, VERDICTS, margin_in_words
-from analysis.design import NOISE
-from analysis.effects import parameter
-from analysis.findings import PRODUCT
-from analysis.scorecard import margin, of_policy
-from analysis.section_v import FIG_5
-from analysis.statistics import LEVEL
-from reports import page
+from analysis import load_results, summary
+from analysis.figures import missions as figures
+from analysis.figures import parameters as parameter_figures
+from analysis.names import METRICS, PRODUCT, parameter, value_text
+from analysis.questions import main_effects as effects
+from analysis.questions import summary as findings
+from analysis.replication import paper
+from analysis.replication.claims import FIG_5
+from analysis.replication.rules import NO_RESULTS, VERDICTS, margin_in_words
+from analysis.replication.scorecard import margin, of_policy
+from analysis.stats.intervals import LEVEL
+from analysis.study.design import NOISE
+from reports.pages import html as page
 
 folder = Path(results)
 level = page.level(LEVEL)
@@ -184,7 +188,7 @@ marks = {paper.ABOVE: "▲", paper.LEVEL: "≈", paper.BELOW: "▼"}
 display(
     Markdown(
         f"Of {len(designs):,} settings, the one with the highest mean of "
-        f"{paper.METRICS[rule['metric']].lower()} was selected for every policy, by `"
+        f"{METRICS[rule['metric']].lower()} was selected for every policy, by `"
         f"{rule['procedure']}`"
         + (f" with an indifference of {too_little}" if rule["indifference"] else "")
         + ". A winner's mean is too high, because it won for it; so it flew "
@@ -201,7 +205,7 @@ page.gallery(
             f"The check: n = {checks['n'].min():,} missions per policy, bars are {level} "
             "intervals. Dashed: the paper.",
         )
-        for metric, name in paper.METRICS.items()
+        for metric, name in METRICS.items()
     ]
     if len(checks)
     else []
@@ -216,19 +220,19 @@ def beside(policy, metric):
 
 
 def setting_of(point):
-    return [effects.words(value) for value in designs[point]["values"].values()]
+    return [value_text(value) for value in designs[point]["values"].values()]
 
 
 swept = [*designs[0]["values"]]
 printed = ["paper", *[""] * len(swept), *map(page.percent, paper.SWEET_SPOT.values()), "", ""]
 lines = [
     [row.policy, *setting_of(row.point)]
-    + ([beside(row.policy, m) for m in paper.METRICS] if len(checks) else [""] * len(paper.METRICS))
+    + ([beside(row.policy, m) for m in METRICS] if len(checks) else [""] * len(METRICS))
     + [f"{row.missions:,}", row.left]
     for row in selections.itertuples()
 ]
 shorts = [parameter(field).short for field in swept]
-head = ["Policy", *shorts, *paper.METRICS.values(), "Missions", "Settings left"]
+head = ["Policy", *shorts, *METRICS.values(), "Missions", "Settings left"]
 page.table(
     pd.DataFrame([printed, *lines], columns=head),
     f"The setting selected, and its check: means with {level} intervals, ▲ wholly above "
@@ -273,7 +277,7 @@ of_product = told[told["metric"] == PRODUCT]
 display(
     Markdown(
         "Here all parameters are drawn together: "
-        + page.words([f"{parameter(f).within} {effects.words(ends)}" for f, ends in ranges.items()])
+        + page.words([f"{parameter(f).within} {value_text(ends)}" for f, ends in ranges.items()])
         + ". A Sobol index is the share of a metric's variance that a parameter accounts for: "
         "*alone*, or *with all interactions* that it takes part in. The replication, which is the "
         "sea, the arrivals and the start, is a parameter too: what it accounts for, no setting "
@@ -285,7 +289,7 @@ page.gallery(
         (
             parameter_figures.sensitivity(rows, policy),
             f"Sobol indices of {policy}",
-            f"{paper.METRICS[PRODUCT]} of {policy}. n = {rows['n'].min():,} missions; lines: "
+            f"{METRICS[PRODUCT]} of {policy}. n = {rows['n'].min():,} missions; lines: "
             f"{level} intervals by bootstrap. Estimates are not cut: that of a small "
             "share may be negative, an interval may go beyond 100 %. Below the dotted line: noise.",
         )
@@ -321,7 +325,7 @@ def share(row, index):
 margin_of_share = 0.05
 flat = indices[indices["first"].isna()]
 silent = [
-    f"{paper.METRICS[metric].lower()} of {page.words(rows['policy'].unique().tolist())}"
+    f"{METRICS[metric].lower()} of {page.words(rows['policy'].unique().tolist())}"
     for metric, rows in flat.groupby("metric", sort=False)
 ]
 display(
@@ -342,7 +346,7 @@ page.table(
         [
             [
                 row["policy"],
-                paper.METRICS[row["metric"]],
+                METRICS[row["metric"]],
                 "noise" if row["parameter"] == NOISE else parameter(row["parameter"]).name,
                 share(row, "first"),
                 share(row, "total"),

@@ -23,9 +23,12 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import figures, findings, load_results, paper, summary
-from analysis.statistics import wilson
-from reports import page
+from analysis import load_results, summary
+from analysis.figures import missions as figures
+from analysis.names import METRICS, PRODUCT
+from analysis.replication import paper
+from analysis.stats.intervals import wilson
+from reports.pages import html as page
 
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
 policies = table4.manifest["study"]["policies"]
@@ -65,17 +68,17 @@ page.gallery(
             f"n = {overall['n'].min():,} missions per policy, bars are 95 % intervals. Dashed: the "
             "paper.",
         )
-        for metric, name in paper.METRICS.items()
+        for metric, name in METRICS.items()
     ]
 )
 
 # %%
 printed = ["paper", *(c for p in paper.TABLE_IV.values() for c in (page.percent(p), ""))]
 lines = [
-    [p, *(c for m in paper.METRICS for c in beside(rows.loc[(p, m)], paper.TABLE_IV[m]))]
+    [p, *(c for m in METRICS for c in beside(rows.loc[(p, m)], paper.TABLE_IV[m]))]
     for p in policies
 ]
-head = [("", "Policy"), *((n, c) for n in paper.METRICS.values() for c in ("mean", "to paper"))]
+head = [("", "Policy"), *((n, c) for n in METRICS.values() for c in ("mean", "to paper"))]
 page.table(
     pd.DataFrame([printed, *lines], columns=pd.MultiIndex.from_tuples(head)),
     "Means with 95 % intervals, and the difference to the paper in percentage points. "
@@ -91,11 +94,11 @@ def sorted_out(metric):
         low, high = rows.loc[(p, metric), ["low", "high"]]
         groups[paper.verdict(low, high, paper.TABLE_IV[metric])].append(p)
     found = (f"{verdict}: {page.words(those)}" for verdict, those in groups.items() if those)
-    name, figure = paper.METRICS[metric], page.percent(paper.TABLE_IV[metric])
+    name, figure = METRICS[metric], page.percent(paper.TABLE_IV[metric])
     return f"- **{name}** (paper {figure}), {'; '.join(found)}."
 
 
-product = findings.PRODUCT
+product = PRODUCT
 best = rows.xs(product, level="metric")["mean"].idxmax()
 spread = wilson(round(paper.TABLE_IV["success"] * paper.TABLE_IV_MISSIONS), paper.TABLE_IV_MISSIONS)
 display(
@@ -103,7 +106,7 @@ display(
         f"The best policy by collection ratio and communication is **{best}**: "
         f"{shown(rows.loc[(best, product)])}, with success {shown(rows.loc[(best, 'success')])}. "
         "Against the paper's figures, by the whole interval:\n\n"
-        + "\n".join(sorted_out(metric) for metric in paper.METRICS)
+        + "\n".join(sorted_out(metric) for metric in METRICS)
         + "\n\nThe paper prints no intervals. Its figures are themselves means of "
         f"{paper.TABLE_IV_MISSIONS:,} missions: a success of that size alone has a 95 % interval "
         f"of {page.interval(*spread)}. And where the paper is silent, such as on the place of the "
@@ -125,7 +128,7 @@ page.gallery(
             f"n = {by_fleet['n'].min():,} to {by_fleet['n'].max():,} missions per policy and size, "
             "bars are 95 % intervals.",
         )
-        for metric, name in paper.METRICS.items()
+        for metric, name in METRICS.items()
     ]
 )
 
@@ -133,12 +136,12 @@ page.gallery(
 fleets = by_fleet.set_index(["policy", "uavs", "metric"])
 lines = [
     [p, uavs, f"{fleets.loc[(p, uavs, product), 'n']:,}"]
-    + [shown(fleets.loc[(p, uavs, m)]) for m in paper.METRICS]
+    + [shown(fleets.loc[(p, uavs, m)]) for m in METRICS]
     for p in policies
     for uavs in sorted(by_fleet["uavs"].unique())
 ]
 page.table(
-    pd.DataFrame(lines, columns=["Policy", "UAVs", "Missions", *paper.METRICS.values()]),
+    pd.DataFrame(lines, columns=["Policy", "UAVs", "Missions", *METRICS.values()]),
     "Means with 95 % intervals",
 )
 
@@ -155,7 +158,7 @@ display(
         "fleet size. The paper does not say over how many missions its figures are means."
     )
 )
-printed_metrics = {m: paper.METRICS[m] for m in paper.FIG_4[1]}
+printed_metrics = {m: METRICS[m] for m in paper.FIG_4[1]}
 page.gallery(
     [
         (

@@ -26,9 +26,9 @@ from pathlib import Path
 import pandas as pd
 
 from analysis import load_results
-from analysis.scorecard import PAPERS_NETWORK, departures, scorecard
-from reports import page
-from reports import scorecard as layout
+from analysis.replication.scorecard import PAPERS_NETWORK, departures, scorecard
+from reports.pages import html as page
+from reports.pages import scorecard as layout
 
 folder = Path(trained or str(files("policies") / "trained"))
 names = ("table4", "fig4", "fig5", "sweet-spot")

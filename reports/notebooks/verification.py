@@ -27,12 +27,19 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import audits, closed_forms, findings, fits, hover, load_results, paper
-from analysis import verification_figures as drawings
-from analysis.checks import ALPHA, judge
-from analysis.effects import HOLDS, OPEN, REFUTED, parameter
-from analysis.statistics import LEVEL
-from reports import page, stress
+from analysis import load_results
+from analysis.figures import verification as drawings
+from analysis.names import METRICS, parameter
+from analysis.questions import summary as findings
+from analysis.questions.main_effects import HOLDS, OPEN, REFUTED
+from analysis.stats.intervals import LEVEL
+from analysis.verification import chance as fits
+from analysis.verification import closed_forms
+from analysis.verification import exact as audits
+from analysis.verification import lone_uav as hover
+from analysis.verification.checks import ALPHA, judge
+from reports.pages import html as page
+from reports.pages import stress
 
 study = load_results(Path(results) / "verification")
 others, damaged = audits.studies_in(Path(results), but="verification")
@@ -68,7 +75,7 @@ table = judge(
         fits.start_check(cells, space),
         *(
             fits.coverage_check(name, of_best[metric].to_numpy(), block, metric == "success")
-            for metric, name in paper.METRICS.items()
+            for metric, name in METRICS.items()
         ),
     ]
 )
@@ -249,7 +256,7 @@ page.gallery(drawn)
 # %%
 blocks = {
     metric: fits.blocks(of_best[metric].to_numpy(), block, metric == "success")
-    for metric in paper.METRICS
+    for metric in METRICS
 }
 held = {metric: f"{rows['holds'].sum():,} of {len(rows):,}" for metric, rows in blocks.items()}
 display(
@@ -272,7 +279,7 @@ page.gallery(
             f"mean of all missions. Of all blocks {held[metric]} hold it. n = {block:,} missions "
             f"per interval, at {page.level(LEVEL)}.",
         )
-        for metric, name in paper.METRICS.items()
+        for metric, name in METRICS.items()
         if len(rows := blocks[metric])
     ]
 )

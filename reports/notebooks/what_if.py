@@ -29,15 +29,20 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import figures, findings, fly, paper, what_if, what_if_figures
-from analysis.statistics import LEVEL
-from reports import page
+from analysis import fly
+from analysis.figures import missions as figures
+from analysis.figures import what_if as what_if_figures
+from analysis.names import METRICS, PRODUCT
+from analysis.questions import summary as findings
+from analysis.questions import what_if
+from analysis.stats.intervals import LEVEL
+from reports.pages import html as page
 
 asked = what_if.question(settings, baseline, scenario, policies, missions, seed)
 what_if.check_policy(asked, shown or asked.policies[0])
 study = what_if.ask(asked, results, workers)
 
-product = findings.PRODUCT
+product = PRODUCT
 changes = what_if.changes(study)
 means, answers = what_if.means(study), what_if.answers(study)
 told = answers.set_index(["policy", "metric"])
@@ -174,7 +179,7 @@ sides = [
 
 
 def beside(metric):
-    name = paper.METRICS[metric]
+    name = METRICS[metric]
     found = [f"{p} {gain(p, metric)} points" for p in study.policies]
     caption = (
         f"{name}, from the baseline to the variation: {'; '.join(found)}. n = {n:,} missions per "
@@ -184,7 +189,7 @@ def beside(metric):
     return what_if_figures.means(means, metric, sides), f"{name}, baseline and variation", caption
 
 
-page.gallery([beside(metric) for metric in paper.METRICS])
+page.gallery([beside(metric) for metric in METRICS])
 
 # %%
 gaps = {policy: what_if.differences(study, policy) for policy in study.policies}
@@ -280,7 +285,7 @@ display(
 )
 page.table(
     pd.DataFrame(
-        [paired(policy, metric) for policy in study.policies for metric in paper.METRICS],
+        [paired(policy, metric) for policy in study.policies for metric in METRICS],
         columns=["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"],
     ),
     f"The differences of n = {n:,} pairs beside those of missions on seas of their own: the "

@@ -12,7 +12,7 @@ from IPython.display import HTML
 from plotly.io import to_html
 from plotly.offline import get_plotlyjs
 
-from analysis.slots import Events
+from analysis.results.event_log import Events
 from dess.scenario import Scenario
 from reports.player import chart, layout, panels
 from reports.player.mission import Mission

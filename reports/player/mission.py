@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from analysis.figures import node_colours, uav_colours
-from analysis.slots import battery_levels, residual_data, uav_slots
+from analysis.figures.missions import node_colours, uav_colours
+from analysis.results.event_log import battery_levels, residual_data, uav_slots
 from dess.errors import InputError
 from dess.scenario import Scenario
 

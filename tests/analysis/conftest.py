@@ -1,6 +1,6 @@
 import pytest
 
-from analysis import runner
+from analysis.execution import runner
 
 
 @pytest.fixture(autouse=True)

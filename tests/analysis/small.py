@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
-from analysis.study import Study
+from analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
     "grid": 8,

@@ -13,8 +13,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.comparison import adjust, crossed, paired
-from analysis.statistics import (
+from analysis.stats.intervals import (
     Interval,
     bootstrap_interval,
     distribution,
@@ -22,6 +21,7 @@ from analysis.statistics import (
     quantile_interval,
     wilson,
 )
+from analysis.stats.paired import adjust, crossed, paired
 
 TRIALS = 2000
 QUICK = [300, pytest.param(TRIALS, marks=pytest.mark.slow)]

@@ -11,12 +11,12 @@ from pydantic import ValidationError
 from dess import streams
 from dess.channel import world_of
 from dess.errors import InputError
+from dess.files import parse_toml
 from dess.scenario import (
     SAMPLED,
     Scenario,
     ScenarioSpace,
     load_scenario,
-    parse_toml,
     scenario_names,
 )
 from dess.state import check_seed, constants_of, sample_scenario, spaces_of

@@ -14,7 +14,7 @@ from policies import registry
 from policies.base import Policy
 from policies.ddqn.checkpoint import save_policy
 from policies.ddqn.config import config_of
-from policies.ddqn.snapshot import layout_of
+from policies.ddqn.observations.states import layout_of
 from policies.ddqn.training import build
 from policies.registry import SHIPPED, trained_names
 

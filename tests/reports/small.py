@@ -10,9 +10,10 @@ from typing import Any
 import IPython.display
 import pytest
 
-from analysis import load_study, run_study, timing
-from reports import page
-from reports.notebook import read
+from analysis import load_study, run_study
+from analysis.execution import decision_time as timing
+from reports.pages import html as page
+from reports.pages.notebook import read
 from reports.player import library
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")

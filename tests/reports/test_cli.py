@@ -14,7 +14,8 @@ from numba import njit
 
 from analysis import load_results
 from policies.registry import trained_names
-from reports import cli, console
+from reports import cli
+from reports.cli import console
 from tests.analysis import troublesome
 from tests.analysis.small import environment, files_of, small_study
 

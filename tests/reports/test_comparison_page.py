@@ -7,11 +7,14 @@ from typing import Any
 
 import pytest
 
-from analysis import findings, load_results, load_study, regions, run_study, timing
-from analysis.comparison_figures import duration
-from analysis.effects import parameter
+from analysis import load_results, load_study, run_study
+from analysis.execution import decision_time as timing
+from analysis.figures.comparison import duration
+from analysis.names import parameter
+from analysis.questions import head_to_head as regions
+from analysis.questions import summary as findings
 from dess import InputError
-from reports import page
+from reports.pages import html as page
 from tests.reports.small import said_by
 
 NAME = "comparison"

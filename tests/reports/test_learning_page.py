@@ -6,11 +6,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis import curves, paper
-from analysis.findings import PRODUCT
-from analysis.verdicts import HOLDS, OPEN
+from analysis.names import PRODUCT
+from analysis.questions import learning as curves
+from analysis.replication import paper
+from analysis.stats.verdict import HOLDS, OPEN
 from policies.registry import TRAINED
-from reports import page
+from reports.pages import html as page
 from tests.reports.small import said_by
 
 

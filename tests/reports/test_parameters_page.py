@@ -5,13 +5,14 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis import effects, findings, load_results, load_study, run_study
-from analysis.claims import NO_RESULTS
-from analysis.findings import PRODUCT
-from analysis.paper import METRICS
-from analysis.scorecard import scorecard
-from analysis.section_v import FIG_5
-from reports import page
+from analysis import load_results, load_study, run_study
+from analysis.names import METRICS, PRODUCT
+from analysis.questions import main_effects as effects
+from analysis.questions import summary as findings
+from analysis.replication.claims import FIG_5
+from analysis.replication.rules import NO_RESULTS
+from analysis.replication.scorecard import scorecard
+from reports.pages import html as page
 from tests.reports.small import run_small_studies, said_by
 
 

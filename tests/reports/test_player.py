@@ -12,8 +12,8 @@ from plotly import graph_objects
 
 import dess
 import policies
-from analysis.figures import node_colours
-from analysis.slots import battery_levels, duration, residual_data, uav_slots
+from analysis.figures.missions import node_colours
+from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
 from dess.errors import InputError
 from dess.state import sample_scenario
 from reports.player import chart, library, player

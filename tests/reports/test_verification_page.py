@@ -6,11 +6,12 @@ from typing import Any
 
 import pytest
 
-from analysis import jobs, load_results, load_study, run_study
-from analysis.effects import HOLDS, REFUTED
+from analysis import load_results, load_study, run_study
+from analysis.execution import jobs
+from analysis.questions.main_effects import HOLDS, REFUTED
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports import stress
+from reports.pages import stress
 from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"

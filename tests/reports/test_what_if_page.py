@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from analysis import load_results, what_if
-from analysis.findings import PRODUCT
-from analysis.paper import METRICS
-from reports import page
+from analysis import load_results
+from analysis.names import METRICS, PRODUCT
+from analysis.questions import what_if
+from reports.pages import html as page
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
 

@@ -7,8 +7,8 @@ import torch
 from torch import nn
 
 from policies.ddqn.learner import Learner, double_dqn_target, soft_update
+from policies.ddqn.observations.states import masks
 from policies.ddqn.replay import Batch
-from policies.ddqn.snapshot import masks
 from policies.ddqn.training import Training
 from tests.policies.ddqn.tiny import CPU, PHASES, tiny
 

@@ -16,11 +16,11 @@ from dess.mission import simulate
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.view import View
 from policies.base import Policy
-from policies.ddqn.maps import Maps
 from policies.ddqn.network import DuelingNetwork, PaperNetwork
+from policies.ddqn.observations.maps import Maps
+from policies.ddqn.observations.states import Layout, layout_of
+from policies.ddqn.observations.vector import Vector
 from policies.ddqn.policy import DDQN
-from policies.ddqn.snapshot import Layout, layout_of
-from policies.ddqn.vector import Vector
 from policies.guard import guard
 from tests.drawn import Recorder, Wanderer, replications, seeds, spaces
 

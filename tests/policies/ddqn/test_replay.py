@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from policies.ddqn.observations.states import empty_snapshots
 from policies.ddqn.replay import Batch, ReplayMemory
-from policies.ddqn.snapshot import empty_snapshots
 
 SLOT, LANE = 0, 1  # what the columns of the missions hold here
 

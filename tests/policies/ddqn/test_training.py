@@ -13,8 +13,8 @@ from dess.record import empty_records
 from dess.scenario import ScenarioSpace
 from policies.ddqn import training as module
 from policies.ddqn.checkpoint import load_training, save_training
+from policies.ddqn.observations.states import ACTIVE, CHARGING, masks, snapshot
 from policies.ddqn.replay import Batch
-from policies.ddqn.snapshot import ACTIVE, CHARGING, masks, snapshot
 from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
 from tests.policies.ddqn.tiny import (
     CPU,

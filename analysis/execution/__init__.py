@@ -1,0 +1,1 @@
+"""Running a study: rounds of jobs, workers, and what it would cost."""

@@ -1,0 +1,330 @@
+"""What a decision costs in time: measured by a command and kept, for whoever tells of it.
+
+A time is another one whenever it is taken, so no report takes any.
+"""
+
+import json
+import os
+import platform
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path, PurePath
+from time import perf_counter
+from typing import Any, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from threadpoolctl import threadpool_limits
+
+import dess
+from analysis.results.manifest import (
+    Manifest,
+    Member,
+    commit_of_source,
+    fingerprint,
+    library_versions,
+    members_of,
+    read_json,
+)
+from dess import load_scenario, simulate, simulate_batch
+from dess.errors import InputError
+from dess.files import replacing
+from dess.scenario import ScenarioSpace, validation_line
+from dess.state import check_seed
+from dess.view import View
+from policies import load_team
+
+FILE = "timing.json"
+SCHEMA_VERSION = 1
+SLOW = 0.95  # the quantile of the slow calls
+ROUNDS = 3  # of the batch; the middle one counts
+THREADS = 1  # of the libraries that compute: a UAV has one core to spare, if that
+
+Clock = Callable[[], float]
+# Called with the steps done and the steps in all.
+Progress = Callable[[int, int], None]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Cost(_Part):
+    """What the decisions of a policy cost [s].
+
+    A call of ``Policy.act`` decides for all UAVs of a mission that must act, with all that the
+    policy derives from the view; not the work of the engine before and after it.
+
+    Attributes:
+        policy: The team.
+        members: The identities of its policies.
+        calls: In the SimPy engine, each with the rows of one mission.
+        rows: In these calls: UAVs that were decided for.
+        median: Of the calls.
+        slow: Their ``SLOW`` quantile.
+        batch_rows: UAVs that were decided for in a round of the batch engine.
+        batch: Time in calls per row, of the middle one of ``ROUNDS`` rounds.
+    """
+
+    policy: str
+    members: list[Member]
+    calls: int = Field(ge=1)
+    rows: int = Field(ge=1)
+    median: float = Field(gt=0)
+    slow: float = Field(gt=0)
+    batch_rows: int = Field(ge=1)
+    batch: float = Field(gt=0)
+
+
+class Timing(_Part):
+    """What decisions cost, and on what they were measured.
+
+    Attributes:
+        version: Of dess, as ``code`` (a hash of its sources) and ``commit``.
+        libraries: And their versions, Python among them.
+        processor: Its model, as the system calls it.
+        cores: That the process might use.
+        threads: That the libraries were allowed.
+        scenario: The name of the scenario.
+        constants: What it says.
+        missions: Flown by every policy: replications 0, 1, ... of the seed.
+    """
+
+    schema_version: int
+    version: str
+    code: str
+    commit: str | None
+    libraries: dict[str, str]
+    processor: str
+    cores: int = Field(ge=1)
+    threads: int = Field(ge=1)
+    scenario: str
+    constants: dict[str, Any]
+    seed: int
+    missions: int = Field(ge=1)
+    costs: list[Cost] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        names = [cost.policy for cost in self.costs]
+        if len({*names}) < len(names):
+            raise ValueError("costs: a policy is there twice")
+        ScenarioSpace.of(**self.constants)
+        return self
+
+    @property
+    def text(self) -> str:
+        """The timing as JSON."""
+        return json.dumps(self.model_dump(mode="json", by_alias=True), indent=1) + "\n"
+
+    @property
+    def space(self) -> ScenarioSpace:
+        """The scenario of the missions."""
+        return ScenarioSpace.of(**self.constants)
+
+
+def measure(
+    policies: Sequence[str],
+    scenario: str | Path = "paper",
+    seed: int = 0,
+    missions: int = 100,
+    clock: Clock = perf_counter,
+    progress: Progress | None = None,
+) -> Timing:
+    """Measure what the decisions of policies cost, on ``THREADS`` threads.
+
+    One mission at a time in the SimPy engine, then all at once in the batch engine. The policies
+    take turns, so that a machine that slows down for a while slows down all of them. The first
+    mission, and the first round of the batch, are flown once before to warm up.
+
+    Args:
+        policies: The teams, by name.
+        scenario: Name or file of the scenario.
+        seed: Of the missions.
+        missions: How many every policy flies.
+        clock: Tells the time [s].
+        progress: Called after every step.
+
+    Raises:
+        InputError: If there is no such policy or scenario, or a number is out of range.
+    """
+    if not policies or missions < 1:
+        raise InputError(
+            f"policies, missions: {len(policies)} and {missions}; allowed: at least one of each"
+        )
+    check_seed(seed, missions - 1)
+    space = load_scenario(scenario)
+    teams = {name: _Team(name, clock) for name in dict.fromkeys(policies)}
+    steps = len(teams) * (1 + missions + 1 + ROUNDS)
+    with threadpool_limits(THREADS):
+        for done, _ in enumerate(_flights(teams.values(), space, seed, missions), 1):
+            if progress:
+                progress(done, steps)
+    return Timing(
+        schema_version=SCHEMA_VERSION,
+        version=dess.__version__,
+        code=fingerprint("dess"),
+        commit=commit_of_source(),
+        libraries=library_versions(),
+        processor=_processor(),
+        cores=_cores(),
+        threads=THREADS,
+        scenario=PurePath(scenario).name,
+        constants=space.model_dump(mode="json"),
+        seed=seed,
+        missions=missions,
+        costs=[team.cost() for team in teams.values()],
+    )
+
+
+@contextmanager
+def writing(folder: str | Path) -> Iterator[Path]:
+    """Where to write a timing: a file that takes its place in the folder in the end.
+
+    Raises:
+        InputError: At once, if none can be written there.
+    """
+    path = Path(folder) / FILE
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    with replacing(path) as temporary:
+        yield temporary
+
+
+def write(timing: Timing, folder: str | Path) -> Path:
+    """Write a timing into a folder, over the one that is there; returns its file.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    with writing(folder) as path:
+        path.write_text(timing.text, "utf-8")
+    return Path(folder) / FILE
+
+
+def read(folder: str | Path) -> Timing:
+    """Read the timing in a folder.
+
+    Raises:
+        InputError: If there is none, or it is damaged or of another version.
+    """
+    path = Path(folder) / FILE
+    allowed = f"allowed: what is made by: dess timing --out {Path(folder).resolve()}"
+    data = read_json(path, SCHEMA_VERSION, allowed, allowed)
+    try:
+        return Timing.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{validation_line(error, str(path), Timing)}; {allowed}") from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}; {allowed}") from None
+
+
+def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bool:
+    """Whether a folder holds a timing of these policies, by the code and on the processor at hand.
+
+    Raises:
+        InputError: If there is no such policy.
+    """
+    try:
+        kept = read(folder)
+    except InputError:
+        return False
+    timed = {cost.policy: cost.members for cost in kept.costs}
+    wanted = {policy: members_of(policy) for policy in policies}
+    here = (fingerprint("dess"), _processor(), library_versions(), missions)
+    return timed == wanted and (kept.code, kept.processor, kept.libraries, kept.missions) == here
+
+
+def unlike(timing: Timing, manifest: Manifest) -> list[str]:
+    """The policies of a study that were not timed as they flew it: with other code or weights."""
+    timed = {cost.policy: cost.members for cost in timing.costs}
+    if timing.code != manifest.code:
+        return [team.policy for team in manifest.policies if team.policy in timed]
+    return [t.policy for t in manifest.policies if timed.get(t.policy, t.members) != t.members]
+
+
+class _Timed:
+    """A policy, and the time [s] and the rows of each of its calls."""
+
+    def __init__(self, policy: Any, clock: Clock):
+        self.name, self.policy, self.clock = policy.name, policy, clock
+        self.seconds: list[float] = []
+        self.rows: list[int] = []
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose as the policy does."""
+        start = self.clock()
+        actions = self.policy.act(view)
+        self.seconds.append(self.clock() - start)
+        self.rows.append(len(view))
+        return actions
+
+
+class _Team:
+    """A team that is timed."""
+
+    def __init__(self, name: str, clock: Clock):
+        self.name = name
+        self.policies = [_Timed(policy, clock) for policy in load_team(name)]
+        self.single: list[tuple[float, int]] = []  # (time, rows) of every call
+        self.rounds: list[tuple[float, int]] = []  # of every round of the batch
+
+    def taken(self) -> list[tuple[float, int]]:
+        """The calls since the last time, as (time, rows)."""
+        calls: list[tuple[float, int]] = []
+        for timed in self.policies:
+            calls += zip(timed.seconds, timed.rows, strict=True)
+            timed.seconds, timed.rows = [], []
+        return calls
+
+    def cost(self) -> Cost:
+        """What it has cost."""
+        seconds, rows = zip(*self.single, strict=True)
+        median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
+        return Cost(
+            policy=self.name,
+            members=members_of(self.name),
+            calls=len(rows),
+            rows=sum(rows),
+            median=median,
+            slow=slow,
+            batch_rows=self.rounds[0][1],
+            batch=float(np.median([time / rows for time, rows in self.rounds])),
+        )
+
+
+def _flights(
+    teams: Iterable[_Team], space: ScenarioSpace, seed: int, missions: int
+) -> Iterator[None]:
+    """Fly all that is measured, step by step."""
+    for number, replication in enumerate([0, *range(missions)]):
+        for team in teams:
+            simulate(space, team.policies, seed, replication)
+            calls = team.taken()
+            team.single += calls if number else []
+            yield
+    for number in range(1 + ROUNDS):
+        for team in teams:
+            simulate_batch(space, team.policies, seed, missions)
+            times, rows = zip(*team.taken(), strict=True)
+            team.rounds += [(sum(times), sum(rows))] if number else []
+            yield
+
+
+def _processor() -> str:
+    """The model of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+    except OSError:
+        lines = []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine() or "unknown"
+
+
+def _cores() -> int:
+    """The cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,126 @@
+"""What a run of a study would do: its missions, those that are there already, and the time."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.execution.runner import CHUNK, check_workers
+from analysis.results.chunks import Part, split
+from analysis.results.store import Store
+from analysis.results.tables import parts_of
+from analysis.study.study import CHECK, Study
+from dess import simulate, simulate_batch
+from policies import load_team
+
+# Missions that are timed to estimate the time of all; more, as long as they take no time.
+TRIAL, LONG_TRIAL, ENOUGH = 48, 240, 0.2  # the last in seconds
+TRIAL_SEED = 400_000_000
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What a run would do for a policy.
+
+    Attributes:
+        policy: The team.
+        missions: Missions wanted; by a rule, at least that many.
+        present: Those that are there already.
+        seconds: Estimated time of the others [s].
+    """
+
+    policy: str
+    missions: int
+    present: int
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run of a study would do.
+
+    Attributes:
+        policies: What it would do for every policy.
+        points: Number of design points.
+        at_most: Missions that a rule may ask for, over all policies; nothing without a rule.
+        seconds: Estimated time of what is missing, by all workers [s].
+    """
+
+    policies: tuple[Planned, ...]
+    points: int
+    at_most: int | None
+    seconds: float
+
+    @property
+    def missions(self) -> int:
+        """Missions wanted of all policies, without those that a rule adds."""
+        return sum(planned.missions for planned in self.policies)
+
+
+def plan_study(
+    study: Study,
+    out: str | Path,
+    workers: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Plan:
+    """Plan a run; nothing is written.
+
+    Args:
+        study: The study.
+        out: The results folder, which need not exist.
+        workers: Processes.
+        clock: Tells the time [s].
+
+    Raises:
+        InputError: If the folder holds something else, or there is no worker.
+    """
+    check_workers(workers)
+    store = Store.peek(study, out)
+    rows = []
+    for team in range(len(study.policies)):
+        missing, total = _missing(study, store, team)
+        seconds = missing * _seconds_per_mission(study, team, clock) if missing else 0.0
+        rows.append(Planned(study.policies[team], total, total - missing, seconds))
+    at_most = len(study.policies) * _budget(study) if study.rule else None
+    seconds = sum(planned.seconds for planned in rows) / workers
+    return Plan(tuple(rows), len(study.points), at_most, seconds)
+
+
+def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
+    """Missions of a team that are not there, and all that are wanted for now."""
+    manifest = store.manifest
+    parts = parts_of(manifest.cells[team], manifest.missions[team])
+    if (point := manifest.selected[team]) is not None and study.selection:
+        checks = range(CHECK, CHECK + study.selection.check)
+        parts.append(Part(manifest.cells[team][point], checks))
+    missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
+    wanted = sum(len(part.replications) for part in parts)
+    return sum(chunk.missions for chunk in missing if chunk), wanted
+
+
+def _budget(study: Study) -> int:
+    """Missions of a policy that the rule of a study may ask for."""
+    if study.selection:
+        return study.selection.budget + study.selection.check
+    assert study.precision
+    return study.precision.budget * len(study.points)
+
+
+def _seconds_per_mission(study: Study, team: int, clock: Callable[[], float]) -> float:
+    """The time of a mission, from a trial of some, spread over the design points [s]."""
+    policies = load_team(study.policies[team])
+
+    def trial(missions: int) -> float:
+        numbers = [(n * len(study.points)) // missions for n in range(missions)]
+        spaces = [study.points[number].scenario for number in numbers]
+        begin = clock()
+        if study.engine == "batch":
+            simulate_batch(spaces, policies, TRIAL_SEED, missions)
+        else:
+            for replication, space in enumerate(spaces):
+                simulate(space, policies, TRIAL_SEED, replication)
+        return (clock() - begin) / missions
+
+    trial(1)  # compiles
+    seconds = trial(TRIAL)
+    return trial(LONG_TRIAL) if seconds * TRIAL < ENOUGH else seconds

@@ -1,0 +1,330 @@
+"""Runs studies: splits them into jobs and has a pool do these; evaluates single teams.
+
+A job depends on nothing but its fields, so the result is the same wherever and in whatever order
+the jobs are run. Where a rule decides how many missions there are, they come in rounds; what a
+round asks for depends on the missions of the rounds before it alone.
+"""
+
+import shlex
+import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
+from analysis.execution.workers import Cluster, Here, Pool
+from analysis.results.chunks import Chunk, Part, gaps, split
+from analysis.results.manifest import Cell
+from analysis.results.store import Failure, Store
+from analysis.results.tables import Results, parts_of, results_of
+from analysis.study.study import CHECK, Study, load_study
+from dess import simulate_batch
+from dess.errors import InputError
+from dess.record import Records
+from dess.scenario import ScenarioSpace
+from policies import load_team
+
+# Missions of a chunk, by engine: enough to fill the batch, few enough to lose little.
+CHUNK = {"batch": 500, "events": 50}
+
+Counts = list[list[int]]  # missions of every team and design point
+
+
+class Round(NamedTuple):
+    """A round of a study.
+
+    Attributes:
+        number: Which, from 0.
+        missions: Wanted of all rounds up to this one.
+        present: Of these, missions that are there already.
+    """
+
+    number: int
+    missions: int
+    present: int
+
+
+class ChunkError(Exception):
+    """Some chunks of a study could not be computed, all others are there.
+
+    Attributes:
+        failures: What went wrong, by the file that tells it.
+    """
+
+    def __init__(self, failures: dict[Path, Failure]):
+        super().__init__(f"{len(failures)} chunks failed")
+        self.failures = failures
+
+
+def run_study(
+    study: Study | str | Path,
+    out: str | Path,
+    workers: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+    announce: Callable[[Round], object] | None = None,
+) -> Results:
+    """Run a study into a results folder; what is there already is kept.
+
+    Results are written as they come in, so after an interruption the same call completes them.
+
+    Args:
+        study: The study, its name or its file.
+        out: The results folder.
+        workers: Processes.
+        scheduler: Address of a ``dask.distributed`` scheduler to run on instead.
+        progress: Called with the number of missions done since its last call, first in every round
+            with those that are there already.
+        announce: Called before each round.
+
+    Raises:
+        InputError: If the study is not valid, the folder cannot be written, is in use or holds
+            something else, or the scheduler cannot be used.
+        ChunkError: If something could not be computed; after all that could.
+    """
+    if not isinstance(study, Study):
+        study = load_study(study)
+    with pool_of(workers, scheduler) as pool, Store.open(study, out) as store:
+        _Run(study, store, pool, progress, announce).complete()
+        return results_of(store)
+
+
+def pool_of(workers: int, scheduler: str | None = None) -> Pool:
+    """Who does the jobs: this process, processes of this machine, or a cluster.
+
+    Raises:
+        InputError: If there is no worker, or the scheduler cannot be used.
+    """
+    check_workers(workers)
+    return Cluster(scheduler) if scheduler else Here(workers)
+
+
+def check_workers(workers: int) -> None:
+    """Refuse a number of workers that is none.
+
+    Raises:
+        InputError: If it is below 1.
+    """
+    if workers < 1:
+        raise InputError(f"workers: {workers} is out of range; allowed: 1 or more")
+
+
+class _Run:
+    """A study on its way into its folder."""
+
+    def __init__(
+        self,
+        study: Study,
+        store: Store,
+        pool: Pool,
+        progress: Progress | None,
+        announce: Callable[[Round], object] | None,
+    ):
+        self.study, self.store, self.pool = study, store, pool
+        self.progress, self.announce = progress, announce
+        self.rounds = self.asked = 0  # so far; missions of all rounds
+
+    def complete(self) -> None:
+        """Do what is missing, round by round.
+
+        Raises:
+            ChunkError: If some of a round could not be computed, after the rest of it.
+        """
+        teams, points = range(len(self.study.policies)), range(len(self.study.points))
+        before: Counts = [[0 for _ in points] for _ in teams]
+        wanted: Counts = [[self.study.first for _ in points] for _ in teams]
+        logs = self._log_jobs()
+        while wanted != before:
+            self._round(new_parts(self.store, before, wanted), logs)
+            before, logs = wanted, []
+            wanted = [self._more(team, wanted[team]) for team in teams]
+        selected = [self._select(team, wanted[team]) for team in teams]
+        checks = [self._check(team, best) for team, best in enumerate(selected) if best is not None]
+        if any(part.replications for part in checks):
+            self._round(checks, [])
+        self.store.finish(wanted, selected)
+
+    def _more(self, team: int, counts: list[int]) -> list[int]:
+        """How many missions the rule wants of a team's points, now that these are there."""
+        rule = self.study.rule
+        return rule.wanted(self._samples(team, counts)) if rule else counts
+
+    def _select(self, team: int, counts: list[int]) -> int | None:
+        """The design point that is selected for a team, if the study selects."""
+        rule = self.study.selection
+        return rule.choice(self._samples(team, counts)).best if rule else None
+
+    def _check(self, team: int, best: int) -> Part:
+        """The missions that check what is selected, none of which selected it."""
+        assert self.study.selection
+        cell = self.store.manifest.cells[team][best]
+        return Part(cell, range(CHECK, CHECK + self.study.selection.check))
+
+    def _samples(self, team: int, counts: list[int]) -> list[dict[str, np.ndarray]]:
+        return self.store.samples(parts_of(self.store.manifest.cells[team], counts))
+
+    def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
+        """Do what is missing of the parts, all of a round that is new, and the logs."""
+        jobs, present = [*logs], 0
+        for chunk in split(parts, CHUNK[self.study.engine]):
+            missing = self.store.missing(chunk)
+            present += chunk.missions - (missing.missions if missing else 0)
+            if missing:
+                jobs.append(self._missions_job(missing))
+        self.asked += sum(len(part.replications) for part in parts)
+        if self.announce:
+            self.announce(Round(self.rounds, self.asked, present))
+        self.rounds += 1
+        if self.progress:
+            self.progress(present)
+        self._do(jobs)
+
+    def _log_jobs(self) -> list[Job]:
+        """The missions to fly anew whose event logs are wanted and not there."""
+        return [
+            LogJob(
+                Chunk(cell.team, (Part(cell, range(replication, replication + 1)),)),
+                self.study.points[cell.point].scenario,
+                self.study.policies[cell.team],
+                self.study.seed,
+            )
+            for cells in self.store.manifest.cells
+            for cell in cells
+            for replication in self.store.missing_logs(cell, self.study.logged)
+        ]
+
+    def _missions_job(self, chunk: Chunk) -> MissionsJob:
+        return MissionsJob(
+            chunk,
+            tuple(self.study.points[part.cell.point].scenario for part in chunk.parts),
+            self.study.policies[chunk.team],
+            self.study.seed,
+            self.study.engine,
+        )
+
+    def _do(self, jobs: Sequence[Job]) -> None:
+        """Do the jobs and keep what comes of them."""
+        failures = {}
+        with closing(self.pool.run(jobs, self.progress)) as results:
+            for number, result in results:
+                job = jobs[number]
+                problem = result if isinstance(result, Problem) else self._save(job, result)
+                if problem:
+                    failure = self._failure(job, problem)
+                    failures[self.store.write_failure(job.chunk, failure)] = failure
+        if failures:
+            raise ChunkError(failures)
+
+    def _save(self, job: Job, result: Any) -> Problem | None:
+        """Keep what came of a job; what the store refuses at its door is a problem of the job."""
+        try:
+            job.save(self.store, result)
+        except ValueError as error:
+            return Problem.of(error)
+        return None
+
+    def _failure(self, job: Job, problem: Problem) -> Failure:
+        """What is told of a job that failed; without a culprit, the same study does it again."""
+        replay = shlex.join([*self.study.command, "--out", str(self.store.folder)])
+        if mission := problem.mission:
+            replay = self.store.manifest.replay(mission.cell, mission.replications[0])
+        policy = self.study.policies[job.chunk.team]
+        return Failure(policy, job.missions, problem.error, replay, problem.traceback)
+
+
+def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
+    """What is wanted beyond what was, each mission once, in the order of the study."""
+    parts: list[Part] = []
+    asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
+    for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True):
+        for cell, begin, end in zip(cells, begins, ends, strict=True):
+            earlier = asked[cell.team, cell.key]
+            new = gaps(range(cell.first + begin, cell.first + end), earlier)
+            parts += [Part(cell, gap) for gap in new]
+            earlier += new
+    return parts
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Many missions of one team.
+
+    Attributes:
+        policy: The team.
+        records: What the missions left.
+        seconds: Time of their simulation alone, compilation and start of workers apart [s].
+    """
+
+    policy: str
+    records: Records
+    seconds: float
+
+    @property
+    def uav_slots(self) -> int:
+        """Mission slots flown or charged, summed over the UAVs of all missions."""
+        return int(self.records.missions["uav_slots"].sum())
+
+
+def evaluate(
+    scenario: ScenarioSpace,
+    team: str,
+    missions: int = 1000,
+    seed: int = 0,
+    engine: str = "batch",
+    workers: int = 1,
+    progress: Progress | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> Evaluation:
+    """Simulate replications 0, 1, ... of a team, and time it.
+
+    Args:
+        scenario: The scenario space that the missions are drawn from.
+        team: ``"P"`` or ``"P,P,..."``.
+        missions: How many.
+        seed: Their seed.
+        engine: ``batch`` or ``events``.
+        workers: Threads of the batch engine, processes of the event engine.
+        progress: Called with the number of missions done since its last call.
+        clock: Tells the time [s].
+
+    Raises:
+        InputError: If a policy is unknown or a number out of range.
+    """
+    check_workers(workers)
+    policies = load_team(team)
+    if engine == "batch":
+        simulate_batch(scenario, policies, seed, 1)  # compiles
+        begin = clock()
+        records = simulate_batch(
+            scenario, policies, seed, missions, workers=workers, progress=progress
+        )
+        return Evaluation(team, records, clock() - begin)
+    pool, one = Here(workers), Part(Cell(0, 0, "", 0), range(missions))
+    jobs = [
+        MissionsJob(chunk, (scenario,) * len(chunk.parts), team, seed, engine)
+        for chunk in split([one], CHUNK[engine])
+    ]
+    _results(pool, [next(jobs[0].alone())] * (1 if workers == 1 else 2 * workers))  # warms up
+    begin = clock()
+    chunks = _results(pool, jobs, progress)
+    seconds = clock() - begin
+    records = Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))
+    return Evaluation(team, records, seconds)
+
+
+def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
+    """What comes of all jobs, in their order.
+
+    Raises:
+        RuntimeError: If one failed.
+    """
+    done = dict(pool.run(jobs, progress))
+    for result in done.values():
+        if isinstance(result, Problem):
+            raise RuntimeError(f"{result.error}\n{result.traceback}")
+    return [done[number] for number in range(len(jobs))]

@@ -1,0 +1,224 @@
+"""Who does the jobs: this process, joblib workers, or a dask.distributed cluster.
+
+A job that raises has a ``Problem`` for a result. A worker that is killed is replaced and its job
+done again; a job that kills its worker each time has a ``Problem`` too.
+"""
+
+import os
+import signal
+import time
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from threading import Thread
+from typing import Any, Protocol, Self
+
+from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
+from analysis.results.chunks import Part
+from analysis.results.manifest import Member, fingerprint, members_of
+from dess.errors import InputError
+
+DEATHS = 2  # of workers that a job was alone with, after which it is given up
+
+
+class Pool(Protocol):
+    """Does jobs, in a ``with`` block."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def run(
+        self, jobs: Sequence[Job], progress: Progress | None = None
+    ) -> Generator[tuple[int, Any], None, None]:
+        """Do the jobs; their numbers and results as they come in."""
+        ...
+
+
+class Here:
+    """This machine: this process, or joblib workers."""
+
+    def __init__(self, workers: int):
+        self.workers = workers
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def run(
+        self, jobs: Sequence[Job], progress: Progress | None = None
+    ) -> Generator[tuple[int, Any], None, None]:
+        """Do the jobs; their numbers and results as they come in."""
+        if self.workers == 1:
+            for number, job in enumerate(jobs):
+                yield number, _in_turn(job, progress)
+            return
+        _compile(jobs)
+        waiting = dict(enumerate(jobs))
+        while waiting:
+            started: set[int] = set()
+            for number, result in self._finished(waiting, started):
+                yield number, _told(waiting.pop(number), result, progress)
+            # Only if a worker died: one of those that were under way did it.
+            for number in sorted(started & waiting.keys()):
+                yield number, _told(waiting[number], self._alone(waiting.pop(number)), progress)
+
+    def _alone(self, job: Job) -> Any:
+        """Do a job that may have killed its worker, with nothing else under way."""
+        for _ in range(DEATHS):
+            for _, result in self._finished({0: job}, set()):
+                return result
+        line = f"its worker died {DEATHS} times: killed, out of memory, or crashed"
+        return Problem(line, mission=self._deadly(job))
+
+    def _deadly(self, job: Job) -> Part | None:
+        """The first mission of a job that kills its worker alone."""
+        for single in job.alone():
+            if not [*self._finished({0: single}, set())]:
+                return single.chunk.parts[0]
+        return None
+
+    def _finished(self, jobs: dict[int, Job], started: set[int]) -> Iterator[tuple[int, Any]]:
+        """Results by number as they come in, until a worker dies; who was ``started`` by then."""
+        from joblib import Parallel, delayed
+        from joblib.externals.loky.process_executor import BrokenProcessPool
+
+        parallel = Parallel(
+            self.workers,
+            return_as="generator_unordered",
+            batch_size=1,
+            initializer=_live_and_die_with,
+            initargs=(os.getpid(),),
+        )
+
+        def tasks() -> Iterator[Any]:
+            for number, job in [*jobs.items()]:
+                started.add(number)
+                yield delayed(_numbered)(number, job)
+
+        try:
+            with closing(parallel(tasks())) as results:
+                yield from results
+        except BrokenProcessPool:
+            return
+
+
+def _in_turn(job: Job, progress: Progress | None) -> Any:
+    """Do a job in this process, with progress in the middle of it."""
+    done = 0
+
+    def tell(missions: int) -> None:
+        nonlocal done
+        done += missions
+        if progress:
+            progress(missions)
+
+    result = attempt(job, tell)
+    if done < job.missions:
+        tell(job.missions - done)
+    return result
+
+
+def _told(job: Job, result: Any, progress: Progress | None) -> Any:
+    """A result, once progress knows of it."""
+    if progress and job.missions:
+        progress(job.missions)
+    return result
+
+
+def _compile(jobs: Sequence[Job]) -> None:
+    """Compile the engine, once, so that the workers only load it.
+
+    With a policy of our own: what others do in this process is not known.
+    """
+    for job in [job for job in jobs if isinstance(job, MissionsJob)][:1]:
+        replace(next(job.alone()), policy="random").run()
+
+
+def _numbered(number: int, job: Job) -> tuple[int, Any]:
+    return number, attempt(job)
+
+
+def _live_and_die_with(parent: int) -> None:
+    """Leave interrupts to the parent process, and go when it has been killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1)
+        os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
+
+
+class Cluster:
+    """A dask.distributed cluster, whose workers must have this code."""
+
+    def __init__(self, address: str):
+        try:
+            from distributed import Client
+            from distributed.comm import get_address_host_port
+        except ModuleNotFoundError:
+            raise InputError(
+                "scheduler: needs the package distributed: pip install dess[distributed]"
+            ) from None
+        try:
+            get_address_host_port(address)  # a Client that fails on it would hang when it is closed
+            self.client = Client(address, timeout="10s", set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise InputError(
+                f"scheduler: {address} cannot be reached: {error}; allowed: tcp://HOST:PORT"
+            ) from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.client.close()
+
+    def run(
+        self, jobs: Sequence[Job], progress: Progress | None = None
+    ) -> Generator[tuple[int, Any], None, None]:
+        """Do the jobs; their numbers and results as they come in."""
+        from distributed import as_completed
+
+        code = fingerprint("dess")
+        teams = {policy: members_of(policy) for policy in {job.policy for job in jobs}}
+        futures = [
+            self.client.submit(_checked, job, code, teams[job.policy], pure=False) for job in jobs
+        ]
+        numbers = {future.key: number for number, future in enumerate(futures)}
+        finished = as_completed(
+            futures, loop=self.client.loop, with_results=True, raise_errors=False
+        )
+        try:
+            for future, result in finished:
+                number = numbers[future.key]
+                if future.status == "error":  # its exception, with its type and traceback
+                    result = _problem(result[1])
+                yield number, _told(jobs[number], result, progress)
+                future.release()
+        finally:
+            self.client.cancel(futures)
+
+
+def _checked(job: Job, code: str, members: list[Member]) -> Any:
+    other = "code of dess" if fingerprint("dess") != code else ""
+    if members_of(job.policy) != members:
+        other = f"code or weights of {job.policy}"
+    if other:
+        raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
+    return attempt(job)
+
+
+def _problem(error: Exception) -> Problem:
+    """What dask says of a job whose workers died; other errors are raised."""
+    from distributed import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return replace(
+            Problem.of(error), error="its workers died: killed, out of memory, or crashed"
+        )
+    raise error

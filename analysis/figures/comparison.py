@@ -1,0 +1,205 @@
+"""Figures of one policy against another on the same missions, and of what decisions cost.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, PercentFormatter
+
+from analysis.execution.decision_time import Cost
+from analysis.figures.missions import DPI, INK, MUTED, policy_colours, style
+from analysis.names import parameter
+from analysis.questions.head_to_head import AHEAD, BEHIND, OPEN, Pair
+from analysis.stats.intervals import LEVEL
+
+# Blue is ahead, orange behind, on all figures; a mean that cannot be told is hollow.
+COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", OPEN: MUTED}
+EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
+
+
+def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
+    """The mean difference along a parameter, a dot with its interval per bin.
+
+    Args:
+        table: Rows of ``questions.head_to_head.along``: all of them, for the same axis everywhere.
+        field: The parameter.
+        overall: The mean difference of all missions, drawn as a dashed line.
+    """
+    rows = table[table["field"] == field].sort_values("position")
+    with style():
+        figure = Figure(figsize=(5.2, 3.5), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        ax.axhline(0, color=INK, linewidth=1.2, zorder=1)
+        ax.axhline(overall, color=MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall")
+        for row in rows.itertuples():
+            colour = COLOURS[row.verdict]
+            ax.errorbar(
+                row.position,
+                row.mean,
+                yerr=[[row.mean - row.low], [row.high - row.mean]],
+                fmt="o",
+                markersize=6,
+                color=colour,
+                markerfacecolor="white" if row.verdict == OPEN else colour,
+                capsize=4,
+                elinewidth=1.8,
+                gid=row.verdict,
+            )
+        ax.set(title=parameter(field).label, ylabel="mean difference [points]")
+        ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
+        ax.set_xticks(rows["position"], rows["value"])
+        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+        ax.yaxis.set_major_formatter(FuncFormatter(_points))
+        ax.grid(axis="x", visible=False)
+        sns.despine(ax=ax)
+    return figure
+
+
+def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
+    """The mean difference over two parameters: blue where it is ahead, orange where behind.
+
+    Args:
+        table: Rows of ``questions.head_to_head.across``. Means that cannot be told are in brackets.
+        first: The parameter of the rows.
+        second: The parameter of the columns.
+    """
+    names = table.drop_duplicates("position").sort_values("position")["value"].tolist()
+    names_2 = table.drop_duplicates("position_2").sort_values("position_2")["value_2"].tolist()
+    grid = np.full((len(names), len(names_2)), np.nan)
+    grid[table["position"], table["position_2"]] = table["mean"]
+    widest = max(float(np.nanmax(np.abs(grid))), 0.01)
+    with style():
+        height = 1.5 + 0.55 * len(names)
+        figure = Figure(figsize=(5.2, height), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        ax.grid(False)
+        colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
+        ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
+                      edgecolors="white", linewidth=2)  # fmt: skip
+        for row in table.itertuples():
+            text = f"{100 * row.mean:+.1f}".replace("-", "−")
+            ax.annotate(
+                f"({text})" if row.verdict == OPEN else text,
+                (row.position_2 + 0.5, row.position + 0.5),
+                ha="center",
+                va="center",
+                fontsize=10,
+                gid=row.verdict,
+                path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            )
+        ax.set_xticks(np.arange(len(names_2)) + 0.5, names_2)
+        ax.set_yticks(np.arange(len(names)) + 0.5, names)
+        ax.invert_yaxis()
+        ax.tick_params(length=0)
+        ax.set(
+            xlabel=parameter(second).label,
+            ylabel=parameter(first).label,
+            title="Mean difference [points]",
+        )
+        sns.despine(ax=ax, left=True, bottom=True)
+    return figure
+
+
+def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
+    """In what share of the missions the difference is no larger than a value.
+
+    The band holds the whole curve at 95 % (Dvoretzky, Kiefer and Wolfowitz). The axis ends where
+    ``EDGE`` of the missions lie beyond.
+
+    Args:
+        missions: Rows of ``analysis.questions.head_to_head.duels``.
+        pair: Of whom.
+    """
+    values = np.sort(missions["difference"].to_numpy(float))
+    shares = np.arange(1, len(values) + 1) / len(values)
+    half = float(np.sqrt(np.log(2 / (1 - LEVEL)) / (2 * len(values))))
+    low, high = np.quantile(values, [EDGE, 1 - EDGE])
+    low, high = min(low, -0.01), max(high, 0.01)
+    room = 0.04 * (high - low)
+    x = np.concatenate([[min(values[0], low) - 1], values, [max(values[-1], high) + 1]])
+    y = np.concatenate([[0], shares, [1]])
+    with style():
+        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        ax.axvspan(x[0], 0, color=COLOURS[BEHIND], alpha=0.12, linewidth=0, zorder=0)
+        ax.axvspan(0, x[-1], color=COLOURS[AHEAD], alpha=0.10, linewidth=0, zorder=0)
+        band = np.clip([y - half, y + half], 0, 1)
+        ax.fill_between(
+            x, band[0], band[1], step="post", color=INK, alpha=0.2, linewidth=0, gid="band"
+        )
+        ax.step(x, y, where="post", color=INK, linewidth=1.8, gid="shares")
+        for x_text, side, outcome in ((0, "left", BEHIND), (1, "right", AHEAD)):
+            share = (values < 0).mean() if outcome == BEHIND else (values > 0).mean()
+            ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (x_text, 1.03), ha=side,
+                        xycoords="axes fraction", color=COLOURS[outcome], gid=outcome)  # fmt: skip
+        ax.set_title("Difference in every mission", pad=22)
+        ax.set(xlim=(low - room, high + room), ylim=(0, 1), ylabel="share of the missions")
+        ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
+        ax.xaxis.set_major_formatter(FuncFormatter(_points))
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        sns.despine(ax=ax)
+    return figure
+
+
+def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
+    """What a decision costs, by policy: of one mission at a time, and in the batch.
+
+    A dot is the median of the calls with the UAVs of one mission, its line goes to the quantile
+    that 95 % of them keep below; a diamond is a UAV's share of a call with those of many missions.
+
+    Args:
+        costs: Of a ``analysis.execution.decision_time.Timing``.
+        policies: All policies of the study: they give every policy its colour on all pages.
+    """
+    colours = policy_colours(pd.Series([*policies, *(cost.policy for cost in costs)]))
+    with style():
+        figure = Figure(figsize=(5.2, 1.5 + 0.45 * len(costs)), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        for y, cost in enumerate(costs):
+            colour, _ = colours[cost.policy]
+            first = not y
+            ax.plot([cost.median, cost.slow], [y, y], color=colour, linewidth=2.4, zorder=2)
+            ax.plot(cost.slow, y, "|", color=colour, markersize=10, markeredgewidth=2.4)
+            ax.plot(cost.median, y, "o", color=colour, markersize=7, gid="median",
+                    label="one mission: median, and line to the 95 % quantile" * first)  # fmt: skip
+            ax.plot(cost.batch, y, "D", color=colour, markerfacecolor="white", markersize=6,
+                    gid="batch", label="many missions at once, per UAV" * first)  # fmt: skip
+        ends = [end for cost in costs for end in (cost.median, cost.slow, cost.batch)]
+        ax.set_xscale("log")
+        ax.set_xlim(min(ends) / 2, max(ends) * 2)
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: duration(x)))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.set_yticks(range(len(costs)), [cost.policy for cost in costs])
+        ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
+        ax.grid(axis="y", visible=False)
+        sns.despine(ax=ax, left=True)
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+    return figure
+
+
+def duration(seconds: float) -> str:
+    """A time with three digits at most, as ``2.35 µs`` or ``1.1 ms``."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{float(f'{seconds / size:.3g}'):g} {unit}"
+    return f"{float(f'{seconds / 1e-9:.3g}'):g} ns"
+
+
+def _points(share: float, _: int = 0) -> str:
+    """``0.025`` as ``+2.5``."""
+    points = round(100 * share, 1) or 0.0
+    return f"{points:+.3g}".replace("-", "−") if points else "0"
+
+
+def _ends(table: pd.DataFrame) -> tuple[float, float]:
+    """An axis for all intervals, and 0."""
+    low, high = min(table["low"].min(), 0.0), max(table["high"].max(), 0.0)
+    room = max(0.06 * (high - low), 0.002)
+    return low - room, high + room

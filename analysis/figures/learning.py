@@ -1,0 +1,186 @@
+"""Figures of trainings: the paper's Fig. 3, the ablation, and the curve of one training.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+import textwrap
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+
+from analysis.figures.missions import DPI, INK, LINES, MUTED, style
+from analysis.names import METRICS
+from analysis.questions.learning import bands, smoothed
+
+EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
+# What is evaluated while training, and its name.
+NAMES = {"evaluation_reward": "Cumulative reward", **EVALUATED}
+
+# A variant whose trainings all reach less than this share of the baseline lies off the axis.
+OFF = 0.5
+
+
+def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> Figure:
+    """A metric against the training step, over several trainings: Fig. 3.
+
+    A thick line is the mean of the exponential moving averages over the trainings of a variant, a
+    band its interval, a thin line one training. A phase before the last is dotted, and a vertical
+    line stands where the last begins.
+
+    Args:
+        curves: Curves, as of ``analysis.questions.learning``.
+        metric: One of ``NAMES``.
+        labels: The variants to draw, with their names in the legend.
+    """
+    averages = smoothed(curves[curves["variant"].isin(labels)], metric)
+    colours = dict(zip(labels, sns.color_palette("colorblind").as_hex(), strict=False))
+    with style():
+        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        for number, (variant, label) in enumerate(labels.items()):
+            own = averages[averages["variant"] == variant]
+            _trainings(own, colours[variant], ax)
+            _mean(own, colours[variant], LINES[number], label, ax)
+        low, high = averages["value"].min(), averages["value"].max()
+        room = 0.12 * (high - low) or 0.1
+        ax.set(title=NAMES[metric], ylim=(low - room, high + room))
+        if metric in EVALUATED:
+            ax.set_ylim(max(low - room, -0.02), min(high + room, 1.02))
+            ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        _steps_axis(averages["updates"].max(), ax)
+        _legend_below(ax)
+    return figure
+
+
+def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str) -> Figure:
+    """What every variant reaches: its trainings as dots, their mean with interval as a diamond.
+
+    Args:
+        table: Rows of ``analysis.questions.learning.ablation``.
+        last: Rows of ``analysis.questions.learning.finals``.
+        metric: The column of the final metric, ``final_`` and one of ``METRICS``.
+        baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
+            ``OFF`` times as much are an arrow at the edge.
+    """
+    values = last.groupby("variant")[metric]
+    level = table.loc[table["variant"] == baseline, "mean"].item()
+    left, right = _ends(table, last[metric], OFF * level)
+    with style():
+        figure = Figure(figsize=(5.2, 0.9 + 0.42 * len(table)), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        ax.axvline(level, color=INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
+        for y, row in table.reset_index(drop=True).iterrows():
+            own = values.get_group(row["variant"])
+            if own.max() < left:
+                ax.plot(left, y, "<", color=INK, markersize=7, clip_on=False, gid=row["variant"])
+            else:
+                _seeds(own, row, y, ax)
+            note = f"{row['mean']:.1%}, n = {row['n']}"
+            ax.annotate(note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
+                        textcoords="offset points", va="center", fontsize=9)  # fmt: skip
+        names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
+        ax.set_yticks(range(len(table)), names)
+        ax.set(title=METRICS[metric.removeprefix("final_")], ylim=(len(table) - 0.4, -0.6))
+        ax.set_xlim(left, right)
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+        ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        ax.grid(axis="y", visible=False)
+        sns.despine(ax=ax, left=True)
+    return figure
+
+
+def training(curve: pd.DataFrame, name: str) -> Figure:
+    """What one training reached in its evaluations, by training step, and the weights kept.
+
+    Args:
+        curve: The curve of the training, with ``is_best`` where weights were kept.
+        name: Of the policy.
+    """
+    kept = curve[curve["is_best"]].iloc[-1]
+    with style():
+        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        colours = sns.color_palette("colorblind").as_hex()
+        for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
+            for n, (_, own) in enumerate(curve.groupby("phase", sort=False)):
+                ax.plot(own["updates"], own[metric], line, color=colour, linewidth=1.5,
+                        label="" if n else EVALUATED[metric])  # fmt: skip
+        ax.plot(kept["updates"], kept[metric], "*", color=INK, markersize=13, zorder=5,
+                label=f"weights kept: {kept[metric]:.1%}")  # fmt: skip
+        _phases(curve, ax)
+        ax.set(title=name, ylim=(-0.02, 1.04))
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        _steps_axis(curve["updates"].max(), ax)
+        _legend_below(ax)
+    return figure
+
+
+def _ends(table: pd.DataFrame, values: pd.Series, floor: float) -> tuple[float, float]:
+    """The ends of the axis: all that is not below the floor, intervals included."""
+    seen = pd.concat([values, table["low"], table["high"]])
+    seen = seen[seen >= floor]
+    room = 0.06 * (seen.max() - seen.min()) or 0.01
+    return max(seen.min() - room, 0.0), min(seen.max() + room, 1.02)
+
+
+def _seeds(own: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
+    """The trainings of a variant, and above them their mean with its interval."""
+    colour = sns.color_palette("colorblind").as_hex()[0]
+    if row["n"] > 1:
+        arms = [[row["mean"] - row["low"]], [row["high"] - row["mean"]]]
+        ax.errorbar(row["mean"], y - 0.14, xerr=arms, marker="D", markersize=5, color=colour,
+                    capsize=4, elinewidth=1.8, zorder=2)  # fmt: skip
+    spots = np.full(len(own), y + 0.18 * (row["n"] > 1))
+    ax.scatter(own, spots, color=MUTED, s=18, zorder=3, gid=row["variant"])
+
+
+def _trainings(own: pd.DataFrame, colour: str, ax: Axes) -> None:
+    for _, one in own.groupby(["seed", "phase"], sort=False):
+        ax.plot(one["updates"], one["value"], color=colour, linewidth=0.7, alpha=0.55)
+
+
+def _mean(own: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> None:
+    """The mean of the trainings with its band; its last phase in full."""
+    rows = bands(own)
+    last = rows["phase"].iloc[-1]
+    for phase, part in rows.groupby("phase", sort=False):
+        n = part["n"].iloc[-1]
+        named = f"{label}, n = {n}" if phase == last else ""
+        look = line if phase == last else ":"
+        ax.plot(part["updates"], part["mean"], look, color=colour, linewidth=2.2, label=named)
+        if part["low"].notna().all():
+            ax.fill_between(part["updates"], part["low"], part["high"], color=colour, alpha=0.16,
+                            linewidth=0, gid=f"band-{phase}")  # fmt: skip
+    _phases(own, ax)
+
+
+def _phases(curve: pd.DataFrame, ax: Axes) -> None:
+    """A line where the last phase begins, if there is one before it."""
+    before = curve.loc[curve["phase"] != curve["phase"].iloc[-1], "updates"]
+    if before.empty:
+        return
+    ax.axvline(before.max(), color=MUTED, linewidth=1, zorder=1, gid="last phase")
+    ax.annotate(
+        "phase II", (before.max(), 0), xycoords=("data", "axes fraction"), xytext=(4, 12),
+        textcoords="offset points", fontsize=8.5, color=INK,
+        path_effects=[withStroke(linewidth=3, foreground="white")],
+    )  # fmt: skip
+
+
+def _steps_axis(last: int, ax: Axes) -> None:
+    ax.set(xlim=(0, last * 1.02), xlabel="training step [1000 updates]")
+    ax.xaxis.set_major_locator(MaxNLocator(nbins=7))
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:g}"))
+    ax.grid(axis="x", visible=False)
+    sns.despine(ax=ax)
+
+
+def _legend_below(ax: Axes) -> None:
+    ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=2, columnspacing=1.2,
+              handletextpad=0.5)  # fmt: skip

@@ -1,0 +1,136 @@
+"""Figures of scenario parameters: the paper's Fig. 5, and what the metrics are sensitive to.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+
+from analysis.figures.missions import DPI, INK, MUTED, arms, dot, policy_colours, style
+from analysis.names import METRICS, parameter
+from analysis.study.design import NOISE
+
+# How far the policies stand apart at a value, of the width of the axis.
+APART = 0.02
+
+
+def effect(
+    table: pd.DataFrame, field: str, changes: Mapping[str, pd.DataFrame], policies: list[str]
+) -> Figure:
+    """The metrics against a parameter: a part of Fig. 5.
+
+    A panel per metric, with the same axis for every parameter of the table, and one with the
+    changes from the first value, on an axis of its own.
+
+    Args:
+        table: Rows of ``questions.main_effects.effects``, of the policies to draw.
+        field: The parameter.
+        changes: Per policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
+        policies: All policies of the study: they give every policy its colour on all pages.
+    """
+    rows = table[table["field"] == field]
+    values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
+    colours = policy_colours(pd.Series(policies))
+    with style():
+        figure = Figure(figsize=(5.2, 7.6), dpi=DPI, layout="constrained")
+        axes = figure.subplots(4, sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
+        for ax, metric in zip(axes, METRICS, strict=False):
+            _means(rows[rows["metric"] == metric], [*changes], colours, ax)
+            ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
+            ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        for policy, shift in _shifts([*changes], len(values)).items():
+            _changes(changes[policy], shift, dot(policy, colours), axes[3])
+        axes[3].set_title(f"Change of the last, from {values[0]} on")
+        axes[3].set_ylabel("points")
+        axes[3].yaxis.set_major_formatter(FuncFormatter(_points))
+        axes[3].set_xlim(-0.4, len(values) - 0.6)
+        axes[3].set_xticks(range(len(values)), values)
+        axes[3].set_xlabel(parameter(field).label)
+        for ax in axes:
+            ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+            ax.grid(axis="x", visible=False)
+            sns.despine(ax=ax)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
+    """Sobol indices of every parameter as bars with intervals, the noise in a row of its own.
+
+    Args:
+        rows: Rows of ``analysis.questions.summary.sensitivities`` of a policy and a metric.
+        title: Of the figure.
+    """
+    rows = rows.reset_index(drop=True)
+    colour = sns.color_palette("colorblind").as_hex()[0]
+    with style():
+        figure = Figure(figsize=(5.2, 1.5 + 0.52 * len(rows)), dpi=DPI, layout="constrained")
+        ax = figure.subplots()
+        for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
+            name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
+            spots = np.arange(len(rows)) + shift
+            arms = [rows[index] - rows[f"{index}_low"], rows[f"{index}_high"] - rows[index]]
+            ax.barh(spots, rows[index], 0.32, color=face, edgecolor=colour, label=name, zorder=2)
+            ax.errorbar(rows[index], spots, xerr=arms, fmt="none", ecolor=INK, capsize=3,
+                        elinewidth=1.3, zorder=3)  # fmt: skip
+        ax.axvline(0, color=INK, linewidth=0.8, zorder=1)
+        for y in rows.index[rows["parameter"] == NOISE]:
+            ax.axhline(y - 0.5, color=MUTED, linewidth=0.9, linestyle=":")
+        ax.set_yticks(range(len(rows)), [_tick(name) for name in rows["parameter"]])
+        ax.set(title=title, ylim=(len(rows) - 0.5, -0.5), xlabel="share of the variance")
+        ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        ax.grid(axis="y", visible=False)
+        sns.despine(ax=ax, left=True)
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def _means(
+    rows: pd.DataFrame, drawn: list[str], colours: dict[str, tuple[str, str]], ax: Axes
+) -> None:
+    for policy, shift in _shifts(drawn, rows["position"].nunique()).items():
+        own = rows[rows["policy"] == policy].sort_values("position")
+        ax.errorbar(
+            own["position"] + shift,
+            own["mean"],
+            yerr=arms(own),
+            **dot(policy, colours),
+            linewidth=1,
+            label=policy,
+        )
+
+
+def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
+    """Differences to the first value, which is where they begin: at 0."""
+    own = pairs[pairs["first"] == 0].rename(columns={"difference": "mean"}).sort_values("second")
+    bars = np.concatenate([np.zeros((2, 1)), arms(own)], axis=1)
+    spots = np.array([0, *own["second"]]) + shift
+    ax.errorbar(spots, [0, *own["mean"]], yerr=bars, **look, linewidth=1)
+    ax.axhline(0, color=MUTED, linewidth=0.9, zorder=1)
+
+
+def _shifts(drawn: list[str], values: int) -> dict[str, float]:
+    ends = APART * values * (len(drawn) > 1)
+    return dict(zip(drawn, np.linspace(-ends, ends, len(drawn)), strict=True))
+
+
+def _points(share: float, _: int) -> str:
+    """``0.025`` as ``+2.5``."""
+    return f"{100 * share:+.3g}".replace("-", "−") if round(share, 9) else "0"
+
+
+def _ends(rows: pd.DataFrame) -> tuple[float, float]:
+    """An axis for all intervals of a metric, and no shorter than ten points."""
+    low, high = rows["low"].min(), rows["high"].max()
+    room = max(0.06 * (high - low), 0.005)
+    return min(low - room, high - 0.1), high + room
+
+
+def _tick(name: str) -> str:
+    return "noise of the\nreplication" if name == NOISE else parameter(name).tick

@@ -1,0 +1,1 @@
+"""What people ask of results, answered in tidy tables."""

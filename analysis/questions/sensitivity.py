@@ -1,0 +1,109 @@
+"""What a mission depends on: Sobol indices of a Saltelli design, by SALib."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.names import MEANS, SHARES
+from analysis.stats.intervals import LEVEL
+from analysis.study.design import Saltelli
+from dess.errors import InputError
+
+METRICS = (*SHARES, *MEANS)
+
+
+def sensitivity(
+    design: Saltelli,
+    missions: pd.DataFrame,
+    metrics: Sequence[str] = METRICS,
+    level: float = LEVEL,
+    resamples: int = 1000,
+    seed: int = 0,
+) -> pd.DataFrame:
+    """First-order and total Sobol indices of each metric to each parameter and to the noise.
+
+    A metric of a mission is a function of the parameters, each uniform on its range, and of the
+    replication; an index is a share of its variance over the design.
+
+    Of a parameter, ``first`` is the share that falls away, on average, when it is fixed: how far
+    it alone moves the mean; large ones are worth setting with care. ``total`` is the share that
+    stays when all else, the replication included, is fixed: near 0, the parameter does not touch
+    any mission and may stay anywhere in its range. ``total`` above ``first`` means interaction,
+    with other parameters or with the noise; a parameter of high total and no first changes which
+    missions go well, not how many, unless others are set with it.
+
+    Of the noise, ``total`` is the share that is left when all parameters are fixed: averaged over
+    the settings, no setting can remove it, and only more missions average it out. The rest is all
+    that the parameters explain together. ``first`` is the luck that all settings share, which
+    common random numbers take out of comparisons; ``total`` above ``first`` is luck that depends
+    on the setting. What the scenario itself draws from ranges that are not in the design belongs
+    to the noise.
+
+    Args:
+        design: The design of the missions.
+        missions: The missions of one policy, a row per design point in order: columns ``point``,
+            ``replication`` and the metrics.
+        metrics: Columns to analyse.
+        level: Confidence level.
+        resamples: Bootstrap resamples of the blocks of the design.
+        seed: Of the resamples; every metric has the same.
+
+    Returns:
+        A row per metric and parameter, the noise last: ``metric``, ``parameter``, ``first``,
+        ``first_low``, ``first_high``, ``total``, ``total_low``, ``total_high`` and ``n``, the
+        number of missions. Intervals are normal, with the bootstrap's standard error: as wide as
+        claimed where the noise rules, wider than need be where the parameters do, because the
+        design is more even than the resamples know. Estimates are not cut: that of a small index
+        may be negative. A metric that is the same in all of A and B has no shares: nan.
+
+    Raises:
+        InputError: If the missions are not one per point of the design, in order.
+    """
+    _check(design, missions)
+    parameters = design.problem["names"]
+    rows = [
+        (metric, parameter, *indices, len(missions))
+        for metric in metrics
+        for parameter, indices in zip(
+            parameters,
+            _indices(design, missions[metric].to_numpy(float), level, resamples, seed),
+            strict=True,
+        )
+    ]
+    ends = [f"{index}{end}" for index in ("first", "total") for end in ("", "_low", "_high")]
+    return pd.DataFrame(rows, columns=["metric", "parameter", *ends, "n"])
+
+
+def _indices(
+    design: Saltelli, values: np.ndarray, level: float, resamples: int, seed: int
+) -> np.ndarray:
+    """(D, 6) first-order and total indices, each with the ends of its interval."""
+    from SALib.analyze import sobol
+
+    factors = design.problem["num_vars"]
+    samples = values.reshape(design.base, factors + 2)[:, [0, -1]]  # A and B
+    if np.ptp(samples) <= np.finfo(float).eps * np.ptp(values):
+        return np.full((factors, 6), np.nan)
+    found = sobol.analyze(
+        design.problem,
+        values,
+        calc_second_order=False,
+        num_resamples=resamples,
+        conf_level=level,
+        seed=np.random.default_rng(seed),  # not the seed itself: SALib takes 0 for none
+    )
+    pairs = [(found[index], found[f"{index}_conf"]) for index in ("S1", "ST")]
+    return np.column_stack(
+        [v for index, half in pairs for v in (index, index - half, index + half)]
+    )
+
+
+def _check(design: Saltelli, missions: pd.DataFrame) -> None:
+    wanted = [(number, point.replication) for number, point in enumerate(design.points)]
+    found = list(missions[["point", "replication"]].itertuples(index=False, name=None))
+    if found != wanted:
+        raise InputError(
+            f"missions: {len(found)} that are not those of the design; "
+            f"allowed: one for each of its {len(wanted)} points, in order, of one policy"
+        )

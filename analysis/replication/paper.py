@@ -1,0 +1,58 @@
+"""The figures that the paper prints, to set ours beside, and how the two compare.
+
+The paper: the learned policy of its Section V on a 32 x 32 map.
+"""
+
+from analysis.stats.intervals import Interval, wilson
+
+# Table IV: means over that many random missions of the scenario space of Table II.
+TABLE_IV_MISSIONS = 1000
+TABLE_IV = {
+    "success": 0.901,
+    "collection_ratio": 0.798,
+    "collection_ratio_and_communication": 0.719,
+}
+
+# Fig. 4 (a), (b), (c) by number of UAVs: C_S 30, C_C 80, 12.5 data units per node, flying time 80.
+# Over how many missions is not said; the product is not printed.
+FIG_4 = {
+    1: {"success": 0.996, "collection_ratio": 0.634},
+    2: {"success": 0.996, "collection_ratio": 0.894},
+    3: {"success": 0.990, "collection_ratio": 0.938},
+}
+
+# Section V-D: means over that many missions with every parameter at its best value.
+SWEET_SPOT_MISSIONS = 300
+SWEET_SPOT = {
+    "success": 0.99,
+    "collection_ratio": 0.936,
+    "collection_ratio_and_communication": 0.93,
+}
+
+# By the shipped study that does the same.
+PRINTED = {"table4": TABLE_IV, "sweet-spot": SWEET_SPOT}
+
+# The best number of UAVs (Section V-D); extremes of two parameters (V-C); values of C_S [%] that
+# are adventurous (Fig. 5b); initial data per node that is the best, and what comes next (Fig. 5d).
+BEST_UAVS = 3
+LONE_UAV, EARLIEST_CHARGE = 1, 10
+ADVENTUROUS = (10, 20)
+TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
+
+# Training steps at which the curve with transfer learning passes that without, and from which on
+# that without stays level (Fig. 3b, Section V-B).
+CROSSING, LEVEL_FROM = 800_000, 500_000
+
+ABOVE, LEVEL, BELOW = "above", "not distinguishable", "below"
+
+
+def verdict(low: float, high: float, printed: float) -> str:
+    """How an interval lies to a printed figure: wholly above, wholly below, or around it."""
+    if low > printed:
+        return ABOVE
+    return BELOW if high < printed else LEVEL
+
+
+def spread(share: float, missions: int) -> Interval:
+    """A printed share of missions with the interval that it does not print (Wilson)."""
+    return Interval(share, *wilson(round(share * missions), missions)[1:])

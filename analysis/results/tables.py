@@ -1,0 +1,168 @@
+"""What a study found: a results folder as tables, loaded whole."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.results.chunks import Part
+from analysis.results.manifest import Cell, Manifest
+from analysis.results.store import Store
+from analysis.study.selection import Choice, Selection
+from analysis.study.study import CHECK
+from dess.errors import InputError
+from dess.record import MISSION_RECORD
+from dess.scenario import ScenarioSpace
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """The results of a study.
+
+    Attributes:
+        store: The folder that they come from.
+        missions: A row per mission: ``policy``, ``point`` (number of the design point), the fields
+            that the design sets and no record has, and those of ``MISSION_RECORD``; in the order
+            of policy (as the study names them), point and replication.
+        uavs: A row per UAV of each: ``policy``, ``point``, ``replication``, ``uav`` and the fields
+            of ``UAV_RECORD``, with the name of its ``end``.
+        checks: Missions, as above, of the design points that were selected; others than those that
+            selected them. Empty if the study selects none.
+    """
+
+    store: Store
+    missions: pd.DataFrame
+    uavs: pd.DataFrame
+    checks: pd.DataFrame
+
+    @property
+    def manifest(self) -> dict[str, Any]:
+        """What the results are about, as plain data."""
+        return self.store.manifest.data
+
+    @cached_property
+    def policies(self) -> list[str]:
+        """The teams, as the study names them."""
+        return [team.policy for team in self.store.manifest.policies]
+
+    def scenario(self, point: int = 0) -> ScenarioSpace:
+        """The scenario of a design point."""
+        return self.store.manifest.scenarios[point]
+
+    def events(self, policy: str, point: int = 0, replication: int = 0) -> pd.DataFrame:
+        """The event log of a mission, with the columns of ``dess.record.EventLog``.
+
+        Raises:
+            InputError: If it has not been kept.
+        """
+        cell = self._cell(policy, point)
+        log = self.store.load_log(cell, replication)
+        if log is None:
+            logged = self.store.manifest.study["logged"]
+            raise InputError(
+                f"{self.store.folder}: no event log of {policy}, point {point}, replication "
+                f"{replication}; allowed: 0..logged - 1, logged = {logged}"
+            )
+        return log.to_pandas()
+
+    def replay(self, policy: str, point: int, replication: int) -> str:
+        """The command that simulates a mission of the study again."""
+        return self.store.manifest.replay(self._cell(policy, point), replication)
+
+    def choice(self, policy: str) -> Choice | None:
+        """The design point that was selected for a policy, and what is known of it."""
+        manifest = self.store.manifest
+        if manifest.study["selection"] is None:
+            return None
+        rule = Selection.model_validate_json(json.dumps(manifest.study["selection"]))
+        return rule.choice(self.store.samples(_parts(manifest, self.policies.index(policy))))
+
+    def _cell(self, policy: str, point: int) -> Cell:
+        if policy not in self.policies:
+            allowed = ", ".join(self.policies)
+            raise InputError(f"policy: {policy!r} is not in the study; allowed: {allowed}")
+        points = len(self.store.manifest.points)
+        if not 0 <= point < points:
+            raise InputError(f"point: {point} is not in the study; allowed: 0..{points - 1}")
+        return self.store.manifest.cells[self.policies.index(policy)][point]
+
+
+def load_results(out: str | Path) -> Results:
+    """Load the results of a study.
+
+    Raises:
+        InputError: If the folder holds none, or they are incomplete, damaged or of another version.
+    """
+    return results_of(Store.read(out))
+
+
+def results_of(store: Store) -> Results:
+    """The results in an open folder.
+
+    Raises:
+        InputError: If they are incomplete or damaged.
+    """
+    manifest = store.manifest
+    loaded, checks = [], []
+    for team in range(len(manifest.policies)):
+        loaded.append((team, *store.load(_parts(manifest, team))))
+        if (point := manifest.selected[team]) is not None:
+            cell, n = manifest.cells[team][point], manifest.study["selection"]["check"]
+            part = Part(cell, range(CHECK, CHECK + n))
+            checks.append((team, store.load([part])[0]))
+    if not manifest.complete:
+        raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
+    missions = [_labelled(manifest, team, frame) for team, frame, _ in loaded]
+    uavs = [
+        pd.concat(
+            [pd.DataFrame({"policy": manifest.policies[t].policy}, frame.index), frame], axis=1
+        )
+        for t, _, frame in loaded
+    ]
+    checked = [_labelled(manifest, team, frame) for team, frame in checks]
+    return Results(
+        store, _stacked(missions), _stacked(uavs), _stacked(checked or [missions[0][:0]])
+    )
+
+
+def parts_of(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
+    """The first missions of every cell, that many."""
+    return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
+
+
+def _parts(manifest: Manifest, team: int) -> list[Part]:
+    """The missions of a team, those that check a selection aside."""
+    return parts_of(manifest.cells[team], manifest.missions[team])
+
+
+def _labelled(manifest: Manifest, team: int, missions: pd.DataFrame) -> pd.DataFrame:
+    """Missions with their policy, and what the design sets that no record has."""
+    swept = {
+        field: missions["point"].map(dict(enumerate(values)))
+        for field, values in _swept(manifest).items()
+    }
+    front = pd.DataFrame({"policy": manifest.policies[team].policy, "point": missions["point"]})
+    return pd.concat([front.assign(**swept), missions.drop(columns="point")], axis="columns")
+
+
+def _swept(manifest: Manifest) -> dict[str, list[Any]]:
+    """The fields that the design sets and no record has, by design point.
+
+    As JSON text where some are lists; none where a design point does not set it.
+    """
+    designs = [point.values for point in manifest.points]
+    fields = dict.fromkeys(field for design in designs for field in design)
+    swept = {}
+    for field in [field for field in fields if field not in (MISSION_RECORD.names or ())]:
+        values = [design.get(field) for design in designs]
+        listed = any(isinstance(value, list) for value in values)
+        swept[field] = [json.dumps(v) if listed and v is not None else v for v in values]
+    return swept
+
+
+def _stacked(frames: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    return pd.concat(frames, ignore_index=True)

@@ -1,0 +1,246 @@
+"""Designs: which points of the parameter space a study visits.
+
+A design is a table ``[design]`` of a study's TOML file, of one of six kinds: ``grid``,
+``one-at-a-time``, ``table``, ``latin-hypercube``, ``sobol``, ``saltelli``. It is data: its points
+are a pure function of its fields, in their written order.
+"""
+
+import sys
+from collections.abc import Iterable
+from functools import cached_property
+from itertools import product
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from dess.scenario import Integer, Scenario, validation_line
+from dess.streams import MAX_REPLICATION, MAX_SEED
+
+# The factor of a Saltelli design that is no field of the scenario: which replication is run.
+NOISE = "replication (noise)"
+
+MAX_SIZE = 2**20
+
+# Fields that take integers only. What is no field of a scenario is refused when it is loaded.
+_INTEGERS = {
+    name
+    for name, field in Scenario.model_fields.items()
+    if field.annotation in (int, Integer | None)
+}
+
+
+class DesignPoint(NamedTuple):
+    """A design point: values of fields of the scenario, and the first of its replications."""
+
+    values: dict[str, Any]
+    replication: int = 0
+
+
+def _tuples(value: Any) -> Any:
+    """Lists, as TOML gives them, to tuples, at any depth."""
+    if isinstance(value, dict):
+        return {key: _tuples(item) for key, item in value.items()}
+    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
+    for field, values in fields.items():
+        if not values:
+            raise ValueError(f"{field} has no values; allowed: one or more")
+    return fields
+
+
+def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
+    for field, ends in ranges.items():
+        if not _is_range(field, ends):
+            numbers = "integers" if field in _INTEGERS else "numbers"
+            shown = list(ends) if isinstance(ends, tuple) else repr(ends)
+            raise ValueError(
+                f"{field}: {shown} is no range; allowed: [low, high], {numbers} with low <= high"
+            )
+    return ranges
+
+
+def _is_range(field: str, ends: Any) -> bool:
+    kinds = (int,) if field in _INTEGERS else (int, float)
+    return (
+        isinstance(ends, tuple)
+        and len(ends) == 2
+        # Neither true nor nan nor inf is the end of a range.
+        and all(type(end) in kinds and abs(end) <= sys.float_info.max for end in ends)
+        and ends[0] <= ends[1]
+    )
+
+
+def _is_power_of_two(number: int) -> int:
+    if number & (number - 1):
+        raise ValueError(f"{number} is no power of two; allowed: 1, 2, 4, 8, ...")
+    return number
+
+
+Values = Annotated[
+    dict[str, tuple[Any, ...]], BeforeValidator(_tuples), AfterValidator(_have_values)
+]
+Rows = Annotated[tuple[dict[str, Any], ...], BeforeValidator(_tuples)]
+Ranges = Annotated[dict[str, Any], BeforeValidator(_tuples), AfterValidator(_are_ranges)]
+PowerOfTwo = Annotated[Integer, AfterValidator(_is_power_of_two)]
+
+
+class _Design(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Grid(_Design):
+    """Every combination of the values, the last field varying fastest."""
+
+    kind: Literal["grid"] = "grid"
+    values: Values = Field(
+        {}, description="field -> values; without any, the one point is the scenario as it is"
+    )
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, in order."""
+        combinations = product(*self.values.values())
+        return tuple(DesignPoint(dict(zip(self.values, c, strict=True))) for c in combinations)
+
+
+class OneAtATime(_Design):
+    """Each point fixes one field; all others stay as the scenario has them, ranges included.
+
+    So a point averages over the other parameters, as in the paper's Fig. 5.
+    """
+
+    kind: Literal["one-at-a-time"] = "one-at-a-time"
+    values: Values = Field(min_length=1, description="field -> values")
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, by field and value, in order."""
+        return tuple(
+            DesignPoint({field: value}) for field, values in self.values.items() for value in values
+        )
+
+
+class Table(_Design):
+    """The points that are listed."""
+
+    kind: Literal["table"] = "table"
+    rows: Rows = Field(min_length=1, description="tables of field -> value, one per point")
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, in order."""
+        return tuple(DesignPoint(row) for row in self.rows)
+
+
+class _Sampled(_Design):
+    """Points drawn uniformly from the ranges; integer fields take each integer equally often."""
+
+    ranges: Ranges = Field(
+        min_length=1, description="field -> [low, high], both ends included for integers"
+    )
+    seed: Integer = Field(0, ge=0, le=MAX_SEED, description="of the sample, not of the missions")
+
+    def _point(self, unit: Iterable[float], replication: int = 0) -> DesignPoint:
+        """The point at a place in the unit cube."""
+        places = zip(self.ranges.items(), unit, strict=True)
+        values = {field: _scaled(u, ends, field in _INTEGERS) for (field, ends), u in places}
+        return DesignPoint(values, replication)
+
+
+class LatinHypercube(_Sampled):
+    """A Latin hypercube: cut into ``size`` equal strata, each field has one point in each."""
+
+    kind: Literal["latin-hypercube"] = "latin-hypercube"
+    size: Integer = Field(ge=1, le=MAX_SIZE, description="number of points")
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, in the order of their draws."""
+        from scipy.stats import qmc
+
+        sample = qmc.LatinHypercube(len(self.ranges), rng=self.seed).random(self.size)
+        return tuple(self._point(unit) for unit in sample)
+
+
+class Sobol(_Sampled):
+    """The first points of a scrambled Sobol sequence: evenly spread in many dimensions at once."""
+
+    kind: Literal["sobol"] = "sobol"
+    size: PowerOfTwo = Field(ge=1, le=MAX_SIZE, description="number of points, a power of two")
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, in the order of the sequence."""
+        from scipy.stats import qmc
+
+        sample = qmc.Sobol(len(self.ranges), rng=self.seed).random(self.size)
+        return tuple(self._point(unit) for unit in sample)
+
+
+class Saltelli(_Sampled):
+    """The design of a global sensitivity analysis (Saltelli et al. 2010), noise included.
+
+    A mission is a deterministic function of its parameters and its replication, so the noise is an
+    input like any other: one more factor, uniform over ``replications``. Each point is one mission.
+    Points come in ``base`` blocks of D + 2 for D factors (the fields and the replication): a point
+    of the sample A; D that differ from it in one factor each, taken from B; the point of B.
+    ``analysis.questions.sensitivity.sensitivity`` makes Sobol indices of the missions.
+    """
+
+    kind: Literal["saltelli"] = "saltelli"
+    base: PowerOfTwo = Field(
+        ge=2, le=MAX_SIZE, description="size of the samples A and B, a power of two"
+    )
+    replications: Integer = Field(
+        1_000_000,
+        ge=1,
+        le=MAX_REPLICATION + 1,
+        description="number of replications that the noise is drawn from",
+    )
+
+    @property
+    def problem(self) -> dict[str, Any]:
+        """The factors on the unit cube, as SALib wants them; the noise is the last."""
+        names = [*self.ranges, NOISE]
+        return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, block by block."""
+        from SALib.sample import sobol
+
+        sample = sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
+        last = self.replications - 1
+        return tuple(self._point(unit, _scaled(noise, (0, last), True)) for *unit, noise in sample)
+
+
+def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
+    """A place in [0, 1] as a value of a range."""
+    low, high = ends
+    if is_integer:
+        return min(high, low + int(u * (high - low + 1)))
+    return min(float(high), float(low + u * (high - low)))
+
+
+_AnyDesign = Grid | OneAtATime | Table | LatinHypercube | Sobol | Saltelli
+_KINDS: dict[str, type[_Design]] = {
+    kind.model_fields["kind"].default: kind for kind in get_args(_AnyDesign)
+}
+
+
+def _of_its_kind(value: Any) -> Any:
+    """A table as the design of its kind, or one line that speaks of this kind alone."""
+    if not isinstance(value, dict):
+        return value
+    kind = value.get("kind")
+    if not isinstance(kind, str) or kind not in _KINDS:
+        raise ValueError(f"kind: {kind!r} is unknown; allowed: {', '.join(_KINDS)}")
+    try:
+        return _KINDS[kind].model_validate(value)
+    except ValidationError as error:
+        raise ValueError(validation_line(error, kind, _KINDS[kind])) from None
+
+
+Design = Annotated[_AnyDesign, Field(discriminator="kind"), BeforeValidator(_of_its_kind)]

@@ -1,0 +1,469 @@
+"""Select the best of many design points, with missions where they tell the points apart.
+
+Procedures for the largest mean of a metric over k points; ties go to the lowest number.
+
+``kn``, the fully sequential procedure of Kim and Nelson, finds the best with a promised probability
+if it is better than every other by the indifference or more. Let delta be the indifference,
+1 - alpha the confidence, n0 = ``first``, c = 1, X_i(r) the mean of the first r missions of point i,
+and S2_il the sample variance of the differences between the first n0 missions of i and l:
+    eta = ((2 alpha / (k - 1))^(-2 / (n0 - 1)) - 1) / 2,    h2 = 2 c eta (n0 - 1)
+    W_il(r) = max(0, delta / (2 c r) (h2 S2_il / delta^2 - r))
+At every stage r = n0, n0 + 1, ... point i leaves the race if X_i(r) < X_l(r) - W_il(r) for a point
+l that was in the race before the stage. The race ends when one point is left, or when r is more
+than h2 S2_il / delta^2 for all pairs that are left. The variances are those of differences, and the
+errors add up by Bonferroni: it holds under common random numbers, and gains by them. It assumes
+normal values. Where missions fail now and then, the first ones may all have succeeded and tell
+nothing of the spread; then the promise is not kept.
+
+``kn-bounded`` is the same race for metrics between 0 and 1 with rare failures. The variances are
+those of all missions so far, taken anew whenever r has grown by half (as in Kim and Nelson's KN++,
+whose promise is asymptotic), and the margin W_il(r) is as if Bernstein's inequality added
+    2 ln((k - 1) / alpha) / (3 r)
+to the errors of the means, for what has not happened yet: no difference is further than 2 from its
+mean. It takes more missions: a point that lags by g stays for some 2 ln((k - 1) / alpha) / (3 g).
+
+``ocba``, the optimal computing budget allocation of Chen et al., spends a fixed budget so that the
+best is found most probably, and promises nothing. With b the point of the best mean, gap_i its
+lead over i and s2_i the sample variances, the numbers of missions n_i approach
+    n_i : n_j = s2_i / gap_i^2 : s2_j / gap_j^2,    n_b = s_b sqrt(sum over i of n_i^2 / s2_i)
+and the approximate probability that b is the best is, by Bonferroni's inequality,
+    1 - sum over i of Phi(-gap_i / sqrt(s2_b / n_b + s2_i / n_i)).
+
+Sources:
+    S.-H. Kim, B. L. Nelson, A fully sequential procedure for indifference-zone selection in
+    simulation, ACM TOMACS 11 (2001) 251-273.
+    S.-H. Kim, B. L. Nelson, On the asymptotic validity of fully sequential selection procedures
+    for steady-state simulation, Oper. Res. 54 (2006) 475-488.
+    S. Boucheron, G. Lugosi, P. Massart, Concentration inequalities, Oxford 2013, section 2.8.
+    C.-H. Chen, J. Lin, E. Yucesan, S. E. Chick, Simulation budget allocation for further enhancing
+    the efficiency of ordinal optimization, Discrete Event Dyn. Syst. 10 (2000) 251-270.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.special import ndtr
+
+from analysis.study.stopping import MOST, Metric
+from dess.scenario import Integer, Number
+
+# Stages of the race that are summed at once; their number changes no result.
+_BLOCK = 128
+# Leads below this share of the largest count as that: ties do not divide by zero.
+_LEAST_LEAD = 1e-6
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a selection came to.
+
+    Attributes:
+        best: Number of the selected design point.
+        survivors: The points that were not ruled out, the best among them.
+        counts: Missions per point that the selection rests on.
+        means: Means of the metric over these missions. That of the selected point is likely to be
+            too high: it was selected for it.
+        procedure: ``kn``, ``kn-bounded`` or ``ocba``.
+        guarantee: What can be said of the selection, in plain words.
+        guaranteed: Whether that is a promised probability.
+        done: Whether the procedure has all missions that it wants.
+        stage: Missions of the selected point that decided.
+        rounds: Rounds of simulation.
+        missions: All missions.
+        probability: The approximate probability of correct selection, of ``ocba`` alone.
+    """
+
+    best: int
+    survivors: tuple[int, ...]
+    counts: tuple[int, ...]
+    means: tuple[float, ...]
+    procedure: str
+    guarantee: str
+    guaranteed: bool
+    done: bool
+    stage: int
+    rounds: int
+    missions: int
+    probability: float | None = None
+
+
+class Selection(BaseModel):
+    """The rule that missions are spent to find the best of the design points.
+
+    The missions come in rounds that grow. What is wanted is a function of the values in the order
+    of their replications, found by replaying all rounds, so the counts are the same however a run
+    was interrupted; and ``kn`` decides as if missions came one by one.
+
+    Raises:
+        pydantic.ValidationError: If a field is not valid.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    procedure: Literal["kn", "kn-bounded", "ocba"] = Field(
+        description="kn, kn-bounded: a promised probability; ocba: the most of a fixed budget"
+    )
+    metric: Metric = Field(
+        "collection_ratio_and_communication", description="the best has its largest mean"
+    )
+    first: Integer = Field(
+        20, ge=2, le=MOST, description="missions of every design point in round one"
+    )
+    indifference: Number | None = Field(
+        None, gt=0, description="of kn: the least lead of the best that matters"
+    )
+    confidence: Number = Field(0.95, gt=0.5, lt=1, description="of kn: probability of finding it")
+    budget: Integer = Field(
+        100_000,
+        ge=2,
+        le=MOST,
+        description="missions over all design points: of kn at most, of ocba exactly",
+    )
+    check: Integer = Field(
+        300, ge=0, le=MOST, description="further, independent missions of the selected design point"
+    )
+
+    @model_validator(mode="after")
+    def _fits_the_procedure(self) -> Self:
+        if self.procedure == "ocba":
+            for key in ("indifference", "confidence"):
+                if getattr(self, key) != type(self).model_fields[key].default:
+                    raise ValueError(f"{key}: belongs to kn; allowed: none with ocba")
+        elif self.indifference is None:
+            raise ValueError("indifference: is missing; allowed: a number above 0")
+        if self.procedure == "kn-bounded" and self.metric == "reward":
+            raise ValueError("metric: reward is not bounded; allowed: procedure kn or ocba with it")
+        return self
+
+    def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
+        """How many missions every design point is to have.
+
+        Args:
+            samples: Per design point: metric -> (n,) values of replications 0..n-1.
+
+        Returns:
+            The numbers, no less than there are; all as there are: done.
+        """
+        values = self._values(samples)
+        return [
+            max(len(own), int(count))
+            for own, count in zip(values, self._play(values).counts, strict=True)
+        ]
+
+    def choice(self, samples: Sequence[Mapping[str, np.ndarray]]) -> Choice:
+        """The selected design point, and what can be said of it.
+
+        Args:
+            samples: As of ``wanted``.
+
+        Raises:
+            ValueError: If there is no point, or one has not the missions of round one.
+        """
+        values = self._values(samples)
+        if not values or min(map(len, values)) < self.first:
+            raise ValueError(f"choice: needs points, with {self.first} or more missions each")
+        played = self._play(values)
+        counts = [min(n, len(own)) for n, own in zip(played.counts, values, strict=True)]
+        means = [own[:n].mean() for n, own in zip(counts, values, strict=True)]
+        guaranteed = played.decided and (self.procedure != "ocba" or len(values) == 1)
+        return Choice(
+            best=played.best,
+            survivors=tuple(map(int, played.alive)),
+            counts=tuple(map(int, counts)),
+            means=tuple(map(float, means)),
+            procedure=self.procedure,
+            guarantee=self._guarantee(played),
+            guaranteed=guaranteed,
+            done=played.done,
+            stage=played.stage,
+            rounds=played.rounds,
+            missions=int(sum(counts)),
+            probability=played.probability,
+        )
+
+    def _values(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray]:
+        return [np.asarray(sample[self.metric], float) for sample in samples]
+
+    def _play(self, values: list[np.ndarray]) -> "_Played":
+        if self.procedure == "ocba":
+            return _ocba(values, self.first, self.budget)
+        assert self.indifference is not None
+        alpha, bounded = 1 - self.confidence, self.procedure == "kn-bounded"
+        margins = _Margins(len(values), self.first, self.indifference, alpha, bounded)
+        return _kn(values, margins, self.budget)
+
+    def _guarantee(self, played: "_Played") -> str:
+        if len(played.counts) == 1:
+            return "it is the only design point"
+        if not played.done:
+            return "none yet: the procedure wants more missions"
+        if self.procedure == "ocba":
+            return (
+                "none; the probability that it is the best is about "
+                f"{played.probability:.3g} or more (normal approximation)"
+            )
+        left = len(played.alive)
+        if not played.decided:
+            return (
+                f"none: the budget of {self.budget} missions ended with {left} design points left;"
+                " this is the best mean of them"
+            )
+        what = "it is the best" if left == 1 else f"the best is among {left} that tie, it included"
+        others = "every other" if left == 1 else "those ruled out"
+        least = "at least" if self.procedure == "kn" else "about or above"
+        return (
+            f"with probability {least} {self.confidence:g} {what}, if the best is better than "
+            f"{others} by {self.indifference:g} or more"
+        )
+
+
+@dataclass
+class _Played:
+    """Where the rounds led: the counts wanted so far, and who is left.
+
+    Attributes:
+        counts: (k,) missions wanted.
+        alive: Points not ruled out, in order.
+        best: The best of them.
+        stage: Missions of it that this rests on.
+        rounds: Rounds played.
+        done: No more missions are wanted.
+        decided: The race ended before the budget.
+        probability: Approximate probability of correct selection.
+    """
+
+    counts: np.ndarray
+    alive: np.ndarray
+    best: int = 0
+    stage: int = 0
+    rounds: int = 1
+    done: bool = False
+    decided: bool = False
+    probability: float | None = None
+
+    def covered_by(self, values: list[np.ndarray]) -> bool:
+        """Whether all missions of the round are there."""
+        return all(len(own) >= count for own, count in zip(values, self.counts, strict=True))
+
+
+@dataclass(frozen=True)
+class _Margins:
+    """By how much a mean must fall behind another one to leave the race.
+
+    Attributes:
+        points: k.
+        first: n0.
+        indifference: delta.
+        alpha: Probability of error.
+        bounded: Whether this is ``kn-bounded``.
+    """
+
+    points: int
+    first: int
+    indifference: float
+    alpha: float
+    bounded: bool
+
+    def reach(self, values: np.ndarray) -> np.ndarray:
+        """The stages from which the margins of all pairs are zero: h2 S2_il / delta^2.
+
+        Args:
+            values: (s, n) values of the points in the race.
+
+        Returns:
+            (s, s) stages, of no meaning on the diagonal.
+        """
+        if self.points == 1:
+            return np.zeros((1, 1))
+        odds = (self.points - 1) / self.alpha
+        h2 = ((odds / 2) ** (2 / (self.first - 1)) - 1) * (self.first - 1)
+        reach = h2 * _variances_of_differences(values) / self.indifference**2
+        return reach + 4 * np.log(odds) / (3 * self.indifference) if self.bounded else reach
+
+    def at(self, reach: np.ndarray, stage: int) -> np.ndarray:
+        """W at a stage."""
+        return np.maximum(0.0, self.indifference / (2 * stage) * (reach - stage))
+
+    def renewed(self, stage: int) -> float:
+        """The stage after which the variances are taken anew."""
+        return _grown(stage) if self.bounded else np.inf
+
+
+def _grown(count: int) -> int:
+    return count + max(count // 2, 1)
+
+
+def _variances_of_differences(values: np.ndarray) -> np.ndarray:
+    """(s, s) sample variances of the differences between the rows of (s, n) values."""
+    centred = values - values.mean(axis=1, keepdims=True)
+    # Not a matrix product: its last bits would depend on the number of threads.
+    covariances = np.einsum("in,ln->il", centred, centred) / (values.shape[1] - 1)
+    own = np.diagonal(covariances)
+    return np.maximum(own[:, None] + own - 2 * covariances, 0.0)
+
+
+def _kn(values: list[np.ndarray], margins: _Margins, budget: int) -> _Played:
+    """Play the race as far as the values reach."""
+    played = _Played(np.full(len(values), margins.first), np.arange(len(values)))
+    race = _Race(values, margins) if played.covered_by(values) else None
+    while race and played.covered_by(values):
+        target = int(played.counts.max())
+        race.run(target)
+        played.alive, played.best, played.stage = race.alive, race.best, race.stage
+        step = min(
+            _grown(target) - target,
+            max(race.horizon - target, 1),
+            (budget - int(played.counts.sum())) // len(race.alive),
+        )
+        if race.over or step < 1:
+            played.done, played.decided = True, race.over
+            break
+        played.counts[race.alive] += step
+        played.rounds += 1
+    return played
+
+
+class _Race:
+    """The stages of the procedure of Kim and Nelson."""
+
+    def __init__(self, values: list[np.ndarray], margins: _Margins):
+        self.values = values
+        self.margins = margins
+        self.alive = np.arange(len(values))
+        self.stage = margins.first - 1  # the last one played
+        self.over = False
+        # Sums are taken mission by mission: no result depends on the rounds.
+        starts = self._values(0, margins.first)
+        self.sums = np.cumsum(starts, axis=1)[:, -2]
+        self.reach = margins.reach(starts)
+        self.renewal = margins.renewed(margins.first)
+
+    @property
+    def best(self) -> int:
+        """The point of the best mean."""
+        return int(self.alive[np.argmax(self.sums)])
+
+    @property
+    def horizon(self) -> int:
+        """The stage that ends the race at the latest, by the variances known."""
+        return int(self.reach.max()) + 1
+
+    def run(self, target: int) -> None:
+        """Play the stages up to a number of missions that all who are left have."""
+        while self.stage < target and not self.over:
+            self._run_block(int(min(self.stage + _BLOCK, target, self.renewal)))
+            if self.stage == self.renewal:
+                self.reach = self.margins.reach(self._values(0, self.stage))
+                self.renewal = self.margins.renewed(self.stage)
+
+    def _values(self, begin: int, end: int) -> np.ndarray:
+        return np.array([self.values[i][begin:end] for i in self.alive])
+
+    def _run_block(self, end: int) -> None:
+        begin = self.stage
+        block = np.column_stack([self.sums, self._values(begin, end)])
+        sums = np.cumsum(block, axis=1)[:, 1:]
+        itself = np.eye(len(self.alive), dtype=bool)
+        tightest = np.where(itself, np.inf, self.reach).min(axis=1)
+        left = np.ones(len(self.alive), bool)
+        for stage in range(begin + 1, end + 1):
+            means = np.where(left, sums[:, stage - begin - 1] / stage, -np.inf)
+            # Only those are compared whom the best could beat by their narrowest margin.
+            close = means.max() - self.margins.at(tightest, stage)
+            behind = np.flatnonzero(left & (means < close))
+            if behind.size:
+                bars = means - self.margins.at(self.reach[behind], stage)
+                left[behind] = means[behind] >= bars.max(axis=1)
+            self.stage = stage
+            if self._ends(means, left):
+                self.over = True
+                break
+        self.alive, self.sums = self.alive[left], sums[left, self.stage - begin - 1]
+        self.reach = self.reach[np.ix_(left, left)]
+
+    def _ends(self, means: np.ndarray, left: np.ndarray) -> bool:
+        """Whether one is left, or several that no later stage tells apart."""
+        if np.count_nonzero(left) == 1:
+            return True
+        if np.ptp(means[left]) > 0:  # then the margin between them is above zero
+            return False
+        return bool(self.reach[np.ix_(left, left)].max() < self.stage)
+
+
+def _ocba(values: list[np.ndarray], first: int, budget: int) -> _Played:
+    """Spend the budget as far as the values reach."""
+    k = len(values)
+    played = _Played(np.full(k, first), np.arange(k))
+    known = np.zeros(k, int)
+    means, variances = np.zeros(k), np.zeros(k)
+    while played.covered_by(values):
+        for i in np.flatnonzero(played.counts > known):
+            own = values[i][: played.counts[i]]
+            means[i], variances[i] = own.mean(), own.var(ddof=1)
+        known = played.counts
+        # A sample without spread says little about the spread: it gets a mission's share of that
+        # of the others.
+        spread = np.maximum(variances, variances.mean() / known)
+        played.best = int(np.argmax(means))
+        played.stage = int(known[played.best])
+        played.probability = _probability(means, spread, known)
+        total = int(known.sum())
+        if total >= budget or k == 1:
+            played.done, played.decided = True, k == 1
+            break
+        total = min(total + max(total // 5, 1), budget)
+        played.counts = _filled(known, _ratios(means, spread), total)
+        played.rounds += 1
+    return played
+
+
+def _leads(means: np.ndarray) -> tuple[int, np.ndarray]:
+    """The best point, and its lead over every point."""
+    best = int(np.argmax(means))
+    return best, means[best] - means
+
+
+def _ratios(means: np.ndarray, variances: np.ndarray) -> np.ndarray:
+    """(k,) numbers to which the missions are to be proportional."""
+    if not variances.any():
+        return np.ones(len(means))
+    best, leads = _leads(means)
+    leads = np.maximum(leads / (leads.max() or 1.0), _LEAST_LEAD)
+    leads[best] = np.inf
+    ratios = variances / leads**2
+    ratios[best] = np.sqrt(variances[best] * np.sum(variances / leads**4))
+    return ratios
+
+
+def _filled(counts: np.ndarray, ratios: np.ndarray, total: int) -> np.ndarray:
+    """Counts of a sum that come nearest to the ratios, none below what it is.
+
+    Args:
+        counts: (k,) what there is.
+        ratios: (k,) zero or above, not all zero.
+        total: The sum, no less than that of the counts.
+    """
+    with np.errstate(divide="ignore"):
+        levels = counts / ratios
+    order = np.argsort(levels, kind="stable")
+    # With the first j points of the order filled up to a level, the others as they are:
+    filled = total - counts.sum() + np.cumsum(counts[order])
+    common = filled / np.cumsum(ratios[order])
+    last = np.flatnonzero(common >= levels[order])[-1]
+    shares = np.maximum(counts, common[last] * ratios)
+    whole = np.floor(shares).astype(int)
+    by_remainder = np.argsort(whole - shares, kind="stable")
+    whole[by_remainder[: total - whole.sum()]] += 1
+    return whole
+
+
+def _probability(means: np.ndarray, variances: np.ndarray, counts: np.ndarray) -> float:
+    """The approximate probability that the best mean is that of the best point."""
+    best, leads = _leads(means)
+    errors = np.sqrt(variances[best] / counts[best] + variances / counts)
+    certain = np.where(leads > 0, np.inf, 0.0)
+    scores = np.delete(np.divide(leads, errors, out=certain, where=errors > 0), best)
+    return max(0.0, 1.0 - float(ndtr(-scores).sum()))

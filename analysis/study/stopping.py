@@ -1,0 +1,214 @@
+"""Replicate until the intervals are narrow enough."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.special import ndtri, stdtrit
+
+from dess.scenario import Integer, Number
+
+Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
+
+# Missions that a rule may ask for.
+MOST = 1_000_000_000
+# The level of ``stats.intervals``, which is not imported: studies load without scipy.stats.
+_LEVEL = 0.95
+# No round multiplies the missions of a cell by more.
+_GROWTH = 2.0
+
+
+class Target(BaseModel):
+    """How narrow an interval is to be: met if either half-width is."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    absolute: Number | None = Field(None, gt=0, description="half-width in units of the metric")
+    relative: Number | None = Field(None, gt=0, description="half-width as a share of |mean|")
+
+    @model_validator(mode="after")
+    def _is_given(self) -> Self:
+        if self.absolute is None and self.relative is None:
+            raise ValueError("no target is given; allowed: absolute, relative, or both")
+        return self
+
+    def width(self, means: np.ndarray) -> np.ndarray:
+        """The half-widths that meet the target, for these means."""
+        return np.maximum(self.absolute or 0.0, (self.relative or 0.0) * np.abs(means))
+
+
+class Reached(NamedTuple):
+    """What one metric of a design point came to.
+
+    Attributes:
+        point: Number of the design point.
+        metric: The metric.
+        missions: How many the estimate rests on.
+        mean: The estimate.
+        half_width: Half the length of its 95 % interval.
+        target: The half-width that meets the target at this mean.
+        met: Whether the target held in the look-ahead: that of the stopping point, or, without
+            one, the last missions.
+        stop: The stopping point of the cell; None if the missions ended before.
+    """
+
+    point: int
+    metric: str
+    missions: int
+    mean: float
+    half_width: float
+    target: float
+    met: bool
+    stop: int | None
+
+
+class Precision(BaseModel):
+    """The rule that a cell is replicated until its 95 % intervals are narrow enough.
+
+    The half-widths are those of ``stats.intervals``: half the Wilson interval of ``success``,
+    Student's t for the others. The *stopping point* is the first n >= ``first`` at which all
+    targets hold at n, n + 1, ..., n + ``look_ahead``: without the look-ahead, a sample that is
+    narrow by luck would stop too early. The cell keeps the missions of the look-ahead.
+
+    The stopping point depends on the values alone, not on the rounds. These grow as far as the
+    intervals ask for, but cautiously, so that a cell seldom ends with more than ``look_ahead``
+    missions beyond it; where it does (a mean that moves under a relative target), they are kept
+    as well. Everything is a function of a cell's values in the order of their replications, so
+    the counts are the same however a run was interrupted.
+
+    After stopping, the intervals cover what they promise as well as with a fixed number. Where a
+    rare event (a failed mission) moves a metric a lot, that is less: Student's interval is narrow
+    until it happens. A larger ``first`` helps.
+
+    Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
+    a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644; here with |mean|, because
+    a relative half-width of a negative mean is negative, and met at once.
+
+    Raises:
+        pydantic.ValidationError: If a field is not valid.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    first: Integer = Field(
+        30, ge=2, le=MOST, description="missions of a cell before the first check"
+    )
+    look_ahead: Integer = Field(
+        50, ge=0, le=MOST, description="further missions in which the targets must hold as well"
+    )
+    budget: Integer = Field(5000, ge=2, le=MOST, description="missions of a cell at most")
+    targets: dict[Metric, Target] = Field(
+        min_length=1, description="metric -> { absolute = ..., relative = ... }"
+    )
+
+    @model_validator(mode="after")
+    def _is_affordable(self) -> Self:
+        if (least := self.first + self.look_ahead) > self.budget:
+            raise ValueError(
+                f"budget: {self.budget} is less than first + look_ahead; allowed: {least} or more"
+            )
+        return self
+
+    def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
+        """How many missions every design point is to have.
+
+        Args:
+            samples: Per design point: metric -> (n,) values of replications 0..n-1.
+
+        Returns:
+            The numbers, no less than there are; all as there are: done.
+        """
+        return [self._wanted(sample) for sample in samples]
+
+    def reached(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[Reached]:
+        """What came of the targets: a row per design point and metric.
+
+        Args:
+            samples: As of ``wanted``, with at least one mission per point.
+        """
+        return [row for point, sample in enumerate(samples) for row in self._rows(point, sample)]
+
+    def _wanted(self, sample: Mapping[str, np.ndarray]) -> int:
+        excess = np.max([self._excess(metric, sample) for metric in self.targets], axis=0)
+        last_miss = self._last_miss(excess)
+        stop = self._stop(last_miss)
+        enough = self.budget if stop is None else min(stop, self.budget)
+        count = self.first
+        while count < enough and count <= len(excess):
+            # It takes some count * excess^2 missions. Sums of squares can only grow, so that
+            # count * excess, less, does not lead past an absolute target.
+            ahead = int(count * min(excess[count - 1], _GROWTH))
+            certain = int(last_miss[count - 1]) + 1 + self.look_ahead
+            count = min(max(ahead, certain), self.budget)
+        return max(count, len(excess))
+
+    def _rows(self, point: int, sample: Mapping[str, np.ndarray]) -> list[Reached]:
+        ratios = {metric: self._excess(metric, sample) for metric in self.targets}
+        stop = self._stop(self._last_miss(np.max(list(ratios.values()), axis=0)))
+        rows = []
+        for metric, target in self.targets.items():
+            means, widths = running_interval(metric, sample[metric])
+            held = len(means) - int(self._last_miss(ratios[metric])[-1]) > self.look_ahead
+            mean, width, allowed = (float(of[-1]) for of in (means, widths, target.width(means)))
+            met = stop is not None or held
+            rows.append(Reached(point, metric, len(means), mean, width, allowed, met, stop))
+        return rows
+
+    def _excess(self, metric: Metric, sample: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Half-width / target after 1..n missions: at most 1 where the target holds."""
+        means, widths = running_interval(metric, sample[metric])
+        allowed = self.targets[metric].width(means)
+        never = np.where(widths > 0, np.inf, 0.0)
+        return np.divide(widths, allowed, out=never, where=allowed > 0)
+
+    def _last_miss(self, excess: np.ndarray) -> np.ndarray:
+        """The last number of missions up to 1..n at which a target was missed, or not checked."""
+        counts = np.arange(1, len(excess) + 1)
+        missed = (excess > 1) | (counts < self.first)
+        return np.maximum.accumulate(np.where(missed, counts, 0))
+
+    def _stop(self, last_miss: np.ndarray) -> int | None:
+        counts = np.arange(1, len(last_miss) + 1)
+        complete = np.flatnonzero(counts - last_miss > self.look_ahead)
+        return int(counts[complete[0]]) - self.look_ahead if complete.size else None
+
+
+def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the first 1..n values, and half the lengths of their 95 % intervals.
+
+    Args:
+        metric: ``success`` has Wilson's interval, every other Student's t.
+        values: (n,) values.
+
+    Returns:
+        (n,) means and (n,) half-widths; that of a single value is infinite by Student's t.
+    """
+    sample = np.asarray(values, float)
+    counts = np.arange(1, len(sample) + 1)
+    if metric == "success":
+        successes = np.cumsum(sample)
+        z = ndtri((1 + _LEVEL) / 2)
+        spread = successes * (counts - successes) / counts
+        return successes / counts, z * np.sqrt(spread + z**2 / 4) / (counts + z**2)
+    # Shifted by the first value, a constant has no rounding errors: its interval is a point.
+    shifted = sample - sample[:1]
+    means = np.cumsum(shifted) / counts
+    before = np.concatenate([[0.0], means[:-1]])[: len(sample)]
+    squares = np.cumsum((counts - 1) / counts * (shifted - before) ** 2)  # Welford
+    freedom = np.maximum(counts - 1, 1)
+    widths = _student(len(sample)) * np.sqrt(squares / freedom / counts)
+    widths[:1] = np.inf
+    return sample[:1] + means, widths
+
+
+def _student(n: int) -> np.ndarray:
+    """(n,) quantiles of Student's t for samples of 1..n values."""
+    return _student_table(1 << n.bit_length())[:n]
+
+
+@cache
+def _student_table(n: int) -> np.ndarray:
+    freedom = np.maximum(np.arange(n), 1)
+    return stdtrit(freedom, (1 + _LEVEL) / 2)

@@ -1,0 +1,219 @@
+"""Studies: policies x design points x replications, as data."""
+
+from collections import Counter
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from analysis.study.design import Design, DesignPoint, Saltelli
+from analysis.study.selection import Selection
+from analysis.study.stopping import MOST, Precision
+from dess.errors import InputError
+from dess.files import Shipped
+from dess.scenario import (
+    Integer,
+    ScenarioSpace,
+    load_scenario,
+    scenario_names,
+    validation_line,
+)
+from dess.streams import MAX_SEED
+from policies import load_team
+
+_STUDIES = Shipped("study", "analysis.study", "shipped")
+
+# The first replication of the missions that check a selected setting: none that selected it.
+CHECK = MOST
+
+
+class Point(NamedTuple):
+    """A design point: what the design sets, the scenario that this makes, its first replication."""
+
+    values: dict[str, Any]
+    scenario: ScenarioSpace
+    replication: int = 0
+
+
+class Study(BaseModel):
+    """Policies x design points x replications.
+
+    Every policy meets the same replications, and so does every design point (common random
+    numbers). How many replications a design point gets is ``missions``, or decided on the way by
+    ``precision`` or ``selection``. ``load_study`` makes one from a file, with one-line errors.
+
+    Raises:
+        pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    name: str = Field(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="names the folder of results"
+    )
+    description: str = Field("", description="what the study is about, in a line")
+    scenario: str = Field("paper", description="a shipped scenario or a TOML file")
+    set: dict[str, Any] = Field({}, description="fields of the scenario, the same everywhere")
+    design: Design | None = Field(
+        None, description="the design points; without one, the scenario is the only point"
+    )
+    policies: tuple[str, ...] = Field(min_length=1, description='teams: "P" or "P,P,..."')
+    missions: Integer = Field(
+        1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"
+    )
+    precision: Precision | None = Field(
+        None, description="a rule: as many missions as narrow intervals take"
+    )
+    selection: Selection | None = Field(
+        None, description="a rule: as many missions as finding the best design point takes"
+    )
+    seed: Integer = Field(0, ge=0, le=MAX_SEED)
+    engine: Literal["batch", "events"] = "batch"
+    logged: Integer = Field(
+        0, ge=0, description="first replications of every cell whose event log is kept"
+    )
+
+    _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
+
+    @field_validator("policies", mode="before")
+    @classmethod
+    def _list_to_tuple(cls, value: Any) -> Any:
+        return tuple(value) if isinstance(value, list) else value
+
+    @field_validator("policies")
+    @classmethod
+    def _are_known(cls, teams: tuple[str, ...]) -> tuple[str, ...]:
+        teams = tuple(",".join(name.strip() for name in team.split(",")) for team in teams)
+        for team in teams:
+            load_team(team)
+            if teams.count(team) > 1:
+                raise ValueError(f"{team} is listed twice; allowed: distinct teams")
+        return teams
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        self._check_rule()
+        self._check_design()
+        if self.logged > self.first:
+            raise ValueError(
+                f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
+            )
+        self._check_budget()
+        return self
+
+    def _check_rule(self) -> None:
+        if self.precision and self.selection:
+            raise ValueError("precision: selection is there too; allowed: either")
+        if self.rule and "missions" in self.model_fields_set:
+            rule = "precision" if self.precision else "selection"
+            raise ValueError(f"missions: are decided by {rule}; allowed: either")
+        if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
+            raise ValueError(
+                "missions: every point of a saltelli design is one mission; allowed: missions = 1"
+            )
+
+    def _check_budget(self) -> None:
+        """A selection must be able to afford its first round; needs valid design points."""
+        least = self.first * len(self.points)
+        if self.selection and least > self.selection.budget:
+            raise ValueError(
+                f"selection.budget: {self.selection.budget} is less than the first missions of all "
+                f"design points; allowed: {least} or more"
+            )
+
+    def _check_design(self) -> None:
+        designs = [values for values, _ in self._rows]
+        for values in designs:
+            if both := sorted(self.set.keys() & values.keys()):
+                raise ValueError(f"design: {both[0]} is also in set; allowed: either")
+        if hasattr(self.design, "ranges"):  # drawn integers may well fall together
+            return
+        for shown, count in Counter(map(_shown, designs)).items():
+            if count > 1:
+                raise ValueError(f"design: {shown} is there twice; allowed: once")
+
+    @property
+    def command(self) -> list[str]:
+        """The command that runs it, as far as it came from ``load_study``."""
+        name, changes = self._origin
+        policies = [word for team in changes.get("policies", ()) for word in ("--policy", team)]
+        missions = ["--missions", str(changes["missions"])] if "missions" in changes else []
+        return ["dess", "study", "run", name or self.name, *policies, *missions]
+
+    @property
+    def rule(self) -> Precision | Selection | None:
+        """What decides how many replications a design point gets, if they are not fixed."""
+        return self.precision or self.selection
+
+    @property
+    def first(self) -> int:
+        """Replications of every cell before a rule, if there is one, asks for more."""
+        return self.rule.first if self.rule else self.missions
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        """The design points in the order of the design."""
+        return tuple(Point(v, self._scenario_at(v), first) for v, first in self._rows)
+
+    @property
+    def _rows(self) -> tuple[DesignPoint, ...]:
+        return self.design.points if self.design else (DesignPoint({}),)
+
+    def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
+        try:
+            return load_scenario(self.scenario, **self.set, **values)
+        except InputError as error:
+            raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
+
+
+def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
+    """A shipped study by name, or one from a TOML file.
+
+    Args:
+        name_or_path: One of ``study_names()``, or the path of a TOML file. A file that names no
+            study gives it its own name; its scenario, if a file, is looked for beside it.
+        **overrides: Fields of ``Study`` to set on top.
+
+    Raises:
+        InputError: If there is no such study, or it is not valid.
+    """
+    text = str(name_or_path)
+    where, values = _STUDIES.load(name_or_path)
+    values = {"name": text if text in study_names() else Path(text).stem} | values
+    scenario = values.get("scenario")
+    if isinstance(scenario, str) and scenario not in scenario_names():
+        values["scenario"] = str(Path(text).parent / scenario)
+    values |= overrides
+    if unknown := sorted(values.keys() - Study.model_fields.keys()):
+        allowed = ", ".join(Study.model_fields)
+        raise InputError(f"{where}: {unknown[0]}: unknown key; allowed: {allowed}")
+    try:
+        study = Study.model_validate(values)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where)) from None
+    except InputError as error:  # of a design point's scenario
+        raise InputError(f"{where}: {error}") from None
+    study._origin = (text, overrides)
+    return study
+
+
+def study_names() -> list[str]:
+    """The names of the shipped studies."""
+    return _STUDIES.names()
+
+
+def _shown(values: dict[str, Any]) -> str:
+    return (
+        "the scenario as it is"
+        if not values
+        else ", ".join(f"{key}={value}" for key, value in values.items())
+    )

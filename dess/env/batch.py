@@ -1,0 +1,133 @@
+"""``batch_env``: many missions in lockstep, after Gymnasium's vector environments."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+
+from dess.env.observation import Observation, observation_names, observation_space, observe
+from dess.env.stepper import Lanes, checked_actions
+from dess.errors import InputError
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import ACTION_NAMES
+from dess.view import View, acting_rows
+
+
+def batch_env(scenario: Scenario | ScenarioSpace, num_envs: int, seed: int = 0) -> "BatchEnv":
+    """An environment of many missions that step together.
+
+    Args:
+        scenario: The scenario, or the space that each mission draws its own from.
+        num_envs: Missions under way (N).
+        seed: Seed of the missions until ``reset`` is given another.
+
+    Raises:
+        InputError: If the seed or the number of missions is not allowed.
+    """
+    return BatchEnv(scenario, num_envs, seed)
+
+
+class BatchEnv:
+    """N missions in lockstep, after the conventions of Gymnasium's vector environments.
+
+    Arrays are (N, I, ...): mission, then UAV; I is the largest fleet of the scenario. A mission
+    with fewer UAVs has absent ones, and a UAV that has ended stays inactive until its mission is
+    over: ``info["active"]`` (N, I) says who acts next. The actions of the others are ignored.
+
+    A mission is reset automatically in the same step (``metadata["autoreset_mode"]``): when its
+    last UAV ends, its lane starts the next mission, and the observation returned is the new one's
+    first. ``info`` then has ``final_obs``, the last observations of the missions that are over, in
+    the rows of their lanes; ``_final_obs`` (N,), which lanes these are; and ``final_records``,
+    their records in the order of the lanes.
+
+    Missions are numbered as they start: replications 0 to N - 1 at the first reset, then one after
+    the other, lower lanes first. So a seed gives the sequence of missions 0, 1, 2, ... whatever N
+    is, and how a mission goes depends on its number and the actions of its UAVs alone.
+
+    Attributes:
+        num_envs: Missions under way (N).
+        state: The arrays of the missions under way, to be read only.
+        world: The nodes and the path loss table.
+        single_observation_space: The space of one UAV's observation.
+        single_action_space: The space of one UAV's action.
+        action_space: The space of all actions (N, I).
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(self, scenario: Scenario | ScenarioSpace, num_envs: int, seed: int):
+        if not isinstance(num_envs, int) or num_envs < 1:
+            raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
+        self.num_envs = num_envs
+        self._lanes = Lanes(scenario, num_envs, seed)
+        self.state, self.world = self._lanes.state, self._lanes.world
+        self._components = len(observation_names(scenario))
+        self.single_observation_space = observation_space(scenario)
+        self.single_action_space = spaces.Discrete(len(ACTION_NAMES))
+        self.action_space = spaces.MultiDiscrete(np.full(self.state.uavs.shape, len(ACTION_NAMES)))
+
+    def reset(self, seed: int | None = None) -> tuple[Observation, dict[str, np.ndarray]]:
+        """Start a new mission in every lane.
+
+        Args:
+            seed: Start over with replication 0 of this seed; without it, the numbering goes on.
+
+        Returns:
+            Observations, and info with ``active`` (N, I) and ``replication`` (N,).
+
+        Raises:
+            InputError: If the seed is out of range.
+        """
+        if seed is not None:
+            self._lanes.start_at(seed, 0)
+        self._lanes.launch(self._lanes.numbers)
+        return self._observe(self._lanes.numbers), self._present()
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """One mission slot of every mission.
+
+        Args:
+            actions: (N, I) integers 0..4.
+
+        Returns:
+            Observations; rewards, terminated and truncated (N, I), the last two true in the step
+            in which the UAV ends; and info: of the slot the other arrays of ``lanes.Outcome``, of
+            which ``acted`` tells the rows that are transitions, of the missions now under way
+            ``active`` (N, I) and ``replication`` (N,), and of those that are over ``final_obs``,
+            ``_final_obs`` and ``final_records``.
+
+        Raises:
+            InputError: If ``reset`` was not called first, or the actions are not allowed.
+        """
+        missions = self.state.missions
+        if not missions["active"].all():
+            raise InputError("step: no missions are under way; call reset() first")
+        info = self._lanes.step(checked_actions(actions, self.state.uavs.shape))._asdict()
+        rewards, terminated, truncated = map(info.pop, ("reward", "terminated", "truncated"))
+        over = missions["active"] == 0
+        if over.any():
+            done = np.nonzero(over)[0]
+            info |= {"final_obs": self._observe(done), "_final_obs": over}
+            info["final_records"] = self._lanes.records(done)
+            self._lanes.launch(done)
+        observations = self._observe(self._lanes.numbers)
+        return observations, rewards, terminated, truncated, info | self._present()
+
+    def view(self) -> View:
+        """What the UAVs that must act see, as a policy is shown it."""
+        return View(
+            self.state, self.world, *acting_rows(self.state.missions, self.state.uavs, 1, 0)
+        )
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _observe(self, lanes: np.ndarray) -> Observation:
+        return observe(self.state, lanes, self._components)
+
+    def _present(self) -> dict[str, np.ndarray]:
+        active, replication = self.state.uavs["active"], self.state.missions["replication"]
+        return {"active": active.copy(), "replication": replication.copy()}

@@ -1,0 +1,143 @@
+"""What a learner is told of a UAV: one vector of float32, and its mask of legal actions."""
+
+import numpy as np
+from gymnasium import spaces
+
+from dess.compiled import kernel
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import ACTION_NAMES, HOVER, State, spaces_of
+from dess.view import legal_actions
+
+Observation = dict[str, np.ndarray]
+
+# The UAV's own state, the scenario's parameters and the clock; the residual data of the nodes
+# comes next, then the team mates in the order of their numbers.
+_OWN = (
+    "active",
+    "x",
+    "y",
+    "battery",
+    "quota",
+    "latch",
+    "charging",
+    "waiting",  # for a pad
+    "zone_dx",  # to the nearest cell of the zone
+    "zone_dy",
+    "charge_start",
+    "charge_complete",
+    "slot",
+)
+_MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 once it has ended
+
+
+def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
+    """The names of the F components of an observation.
+
+    Positions and distances are in units of the grid's last index; the battery, C_S and C_C of
+    100; communications of the quota; the slot of ``max_slots``; residual data of the high end of
+    ``initial_data``. Of a UAV that has ended, its last state is told; of an absent one, zeros.
+    """
+    space = spaces_of([scenario])[0]
+    nodes = [f"residual_{k}" for k in range(len(space.nodes))]
+    mates = [f"mate_{j}_{name}" for j in range(1, space.uavs[1]) for name in _MATE]
+    return [*_OWN, *nodes, *mates]
+
+
+def observation_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the greatest values (F,) of an observation."""
+    names = observation_names(scenario)
+    low, high = np.zeros(len(names), np.float32), np.ones(len(names), np.float32)
+    for index, name in enumerate(names):
+        if name.endswith(("dx", "dy")):
+            low[index] = -1.0
+        elif name.startswith("residual"):  # new data arrives without a bound
+            high[index] = np.inf
+    return low, high
+
+
+def observation_space(scenario: Scenario | ScenarioSpace) -> spaces.Dict:
+    """The space of one UAV's ``observation`` (F,) and ``action_mask`` (5,)."""
+    vector = spaces.Box(*observation_bounds(scenario), dtype=np.float32)
+    mask = spaces.MultiBinary(len(ACTION_NAMES))
+    return spaces.Dict({"observation": vector, "action_mask": mask})
+
+
+def observe(state: State, lanes: np.ndarray, components: int) -> dict[str, np.ndarray]:
+    """The observations of some missions of a state, in rows of the same number.
+
+    Args:
+        state: The state of N missions with up to I UAVs.
+        lanes: The missions to observe; the rows of the others are zeros.
+        components: Length of an observation (F).
+
+    Returns:
+        ``observation`` (N, I, F) of float32 and ``action_mask`` (N, I, 5) of int8; the mask of a
+        UAV that does not act has Hover alone.
+    """
+    vector = np.zeros((*state.uavs.shape, components), np.float32)
+    mask = np.zeros((*state.uavs.shape, len(ACTION_NAMES)), np.int8)
+    _observe(state, lanes, vector, mask)
+    return {"observation": vector, "action_mask": mask}
+
+
+@kernel
+def _observe(state, lanes, vector, mask):
+    fleet = state.uavs.shape[1]
+    for lane in lanes:
+        mission, uavs = state.missions[lane], state.uavs[lane]
+        legal = legal_actions(state.missions, state.uavs, np.full(fleet, lane), np.arange(fleet))
+        for i in range(fleet):
+            mask[lane, i, HOVER] = 1
+            if i < mission.uavs:
+                if uavs[i].active:
+                    mask[lane, i] = legal[i]
+                _observe_uav(mission, uavs, i, state.residual[lane], vector[lane, i])
+
+
+@kernel
+def _observe_uav(mission, uavs, i, residual, out):
+    """One UAV's observation, in the order of ``observation_names``."""
+    u = uavs[i]
+    cell = 1.0 / (mission.grid - 1)
+    out[0] = u.active
+    out[1] = u.x * cell
+    out[2] = u.y * cell
+    out[3] = u.battery / 100.0
+    out[4] = _quota_share(mission, u)
+    out[5] = u.latch
+    out[6] = u.charging
+    out[7] = u.pad_request >= 0 and not u.charging
+    out[8] = (_nearest(u.x, mission.zone_x, mission.zone_width) - u.x) * cell
+    out[9] = (_nearest(u.y, mission.zone_y, mission.zone_height) - u.y) * cell
+    out[10] = mission.charge_start / 100.0
+    out[11] = mission.charge_complete / 100.0
+    out[12] = mission.slot / mission.max_slots
+    at = 13
+    full = mission.initial_high if mission.initial_high > 0.0 else 1.0
+    for k in range(mission.nodes):
+        out[at] = residual[k] / full
+        at += 1
+    for j in range(len(uavs)):
+        if j == i:
+            continue
+        mate = uavs[j]
+        if mate.active:
+            out[at] = 1.0
+            out[at + 1] = (mate.x - u.x) * cell
+            out[at + 2] = (mate.y - u.y) * cell
+            out[at + 3] = mate.battery / 100.0
+            out[at + 4] = _quota_share(mission, mate)
+            out[at + 5] = mate.charging
+        at += 6
+
+
+@kernel
+def _quota_share(mission, u):
+    """Communications as a share of the quota; the last slot may have overshot it."""
+    return min(u.communications / mission.quota, 1.0)
+
+
+@kernel
+def _nearest(value, first, count):
+    """The nearest of ``count`` cells from ``first`` on."""
+    return min(max(value, first), first + count - 1)

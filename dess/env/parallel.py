@@ -1,0 +1,163 @@
+"""``parallel_env``: one mission as a PettingZoo ``ParallelEnv``."""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import ParallelEnv
+
+from dess.env.observation import (
+    Observation,
+    observation_bounds,
+    observation_names,
+    observation_space,
+    observe,
+)
+from dess.env.render import draw
+from dess.env.stepper import REWARD_TERMS, Lanes, Outcome, checked_actions
+from dess.errors import InputError
+from dess.record import MissionRecord
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import ACTION_NAMES, END_NAMES, HOVER
+
+
+def parallel_env(
+    scenario: Scenario | ScenarioSpace, seed: int = 0, render_mode: str | None = None
+) -> "HarvestEnv":
+    """A PettingZoo environment of one mission.
+
+    Args:
+        scenario: The scenario, or the space that each episode draws its own from.
+        seed: Seed of the episodes until ``reset`` is given another.
+        render_mode: None or ``"rgb_array"``.
+
+    Raises:
+        InputError: If the seed or the render mode is not allowed.
+    """
+    return HarvestEnv(scenario, seed, render_mode)
+
+
+class HarvestEnv(ParallelEnv[str, Observation, int]):
+    """One mission as a PettingZoo ``ParallelEnv``; each UAV is an agent, ``uav_0`` the first.
+
+    ``reset(seed=s)`` starts replication 0 of seed s and each further ``reset()`` the next
+    replication, so a seed repeats whole sequences of episodes. ``options={"replication": r}`` goes
+    to replication r.
+
+    A UAV that ends reports ``terminated`` (quota or battery) or ``truncated`` (``max_slots``) in
+    that step and is out of ``agents`` from then on. The ``possible_agents`` are the largest fleet
+    of the scenario; ``reset`` puts those of the episode into ``agents``.
+
+    ``info`` holds, per agent: ``reward_terms`` (their sum is the reward), ``collected`` and
+    ``team_collected`` (data units of the slot), ``end`` (``active``, ``quota``, ``battery`` or
+    ``truncated``) and ``overruled``.
+    """
+
+    metadata: dict[str, Any] = {
+        "name": "dess_harvest_v0",
+        "render_modes": ["rgb_array"],
+        "render_fps": 4,
+    }
+
+    def __init__(self, scenario: Scenario | ScenarioSpace, seed: int, render_mode: str | None):
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"render_mode: {render_mode!r} is unknown; allowed: None, 'rgb_array'")
+        self.render_mode = render_mode
+        self._lanes = Lanes(scenario, 1, seed)
+        fleet = self._lanes.space.uavs[1]
+        self._components = len(observation_names(scenario))
+        self.agents: list[str] = []
+        self.possible_agents = [f"uav_{i}" for i in range(fleet)]
+        self.observation_spaces = {a: observation_space(scenario) for a in self.possible_agents}
+        self.action_spaces = {a: spaces.Discrete(len(ACTION_NAMES)) for a in self.possible_agents}
+        low, high = (np.tile(bound, fleet) for bound in observation_bounds(scenario))
+        self.state_space = spaces.Box(low, high, dtype=np.float32)
+
+    def observation_space(self, agent: str) -> spaces.Space:
+        """The observation space of an agent: the same object at every call."""
+        return self.observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space:
+        """The action space of an agent: the same object at every call."""
+        return self.action_spaces[agent]
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+        """Start the next episode.
+
+        Args:
+            seed: Start over with replication 0 of this seed.
+            options: ``{"replication": r}`` starts replication r; other keys are ignored.
+
+        Raises:
+            InputError: If the seed or the replication is out of range.
+        """
+        lanes, replication = self._lanes, (options or {}).get("replication")
+        if seed is not None or replication is not None:
+            lanes.start_at(lanes.seed if seed is None else seed, replication or 0)
+        lanes.launch(lanes.numbers)
+        self.agents = self.possible_agents[: lanes.state.missions["uavs"][0]]
+        return self._observations(), {agent: {} for agent in self.agents}
+
+    def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
+        """One mission slot.
+
+        Args:
+            actions: An action 0..4 for each of ``agents``.
+
+        Returns:
+            Observations, rewards, terminated, truncated and info of the agents that acted.
+
+        Raises:
+            InputError: If no episode is under way, or the actions are not those of ``agents``.
+        """
+        acting = self.agents
+        if not acting:
+            raise InputError("step: no episode is under way; call reset() first")
+        if set(actions) != set(acting):
+            raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {acting}")
+        index = {agent: self.possible_agents.index(agent) for agent in acting}
+        row = np.full((1, len(self.possible_agents)), HOVER)
+        row[0, list(index.values())] = checked_actions([actions[a] for a in acting], (len(acting),))
+        out = self._lanes.step(row)
+        observations = self._observations()
+        rewards = {a: float(out.reward[0, i]) for a, i in index.items()}
+        terminated = {a: bool(out.terminated[0, i]) for a, i in index.items()}
+        truncated = {a: bool(out.truncated[0, i]) for a, i in index.items()}
+        self.agents = [a for a in acting if not (terminated[a] or truncated[a])]
+        infos = {a: _info(out, i) for a, i in index.items()}
+        return observations, rewards, terminated, truncated, infos
+
+    def state(self) -> np.ndarray:
+        """The observations of all possible agents one after the other, for a central critic."""
+        return self._observe()["observation"].ravel()
+
+    def record(self) -> MissionRecord:
+        """The record of the episode, as far as it has come."""
+        records = self._lanes.records(self._lanes.numbers)
+        return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
+
+    def render(self) -> np.ndarray | None:
+        """A picture (H, W, 3) of uint8; None without a ``render_mode``."""
+        return draw(self._lanes.space, self._lanes.state) if self.render_mode else None
+
+    def _observe(self) -> Observation:
+        return observe(self._lanes.state, self._lanes.numbers, self._components)
+
+    def _observations(self) -> dict[str, Observation]:
+        """Of the agents that are acting or have just acted."""
+        every = self._observe()
+        rows = [self.possible_agents.index(agent) for agent in self.agents]
+        return {self.possible_agents[i]: {key: every[key][0, i] for key in every} for i in rows}
+
+
+def _info(out: Outcome, i: int) -> dict[str, Any]:
+    """What a step did to UAV ``i`` of a single mission, in plain Python."""
+    return {
+        "reward_terms": dict(zip(REWARD_TERMS, out.reward_terms[0, i].tolist(), strict=True)),
+        "collected": float(out.collected[0, i]),
+        "team_collected": float(out.team_collected[0]),
+        "end": END_NAMES[out.end[0, i]],
+        "overruled": bool(out.overruled[0, i]),
+    }

@@ -1,0 +1,184 @@
+"""Missions under way that are steered from outside, each in its lane."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dess import rules
+from dess.channel import empty_scratch, world_of
+from dess.compiled import kernel
+from dess.errors import InputError
+from dess.record import Records, empty_records, write_record
+from dess.scenario import Scenario, ScenarioSpace
+from dess.state import (
+    ACTION_NAMES,
+    TRUNCATED,
+    check_seed,
+    constants_of,
+    empty_state,
+    ranges_of,
+    spaces_of,
+)
+
+# The parts of a reward, as ``rules.reward_terms`` gives them.
+REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted")
+
+
+class Outcome(NamedTuple):
+    """What one mission slot did, per mission (N,) and per UAV (N, I).
+
+    Attributes:
+        acted: (N, I) whether the UAV was active in the slot.
+        reward: (N, I) of the slot; 0 if it was not.
+        reward_terms: (N, I, 6) its parts, in the order of ``REWARD_TERMS``.
+        end: (N, I) how the UAV's mission ended, an index of ``state.END_NAMES``.
+        terminated: (N, I) whether it ended in this slot, by its quota or its battery.
+        truncated: (N, I) whether it ended in this slot, by ``max_slots``.
+        overruled: (N, I) whether the safety controller overruled it.
+        collected: (N, I) data that the UAV collected in the slot [data units].
+        team_collected: (N,) data that its team collected.
+    """
+
+    acted: np.ndarray
+    reward: np.ndarray
+    reward_terms: np.ndarray
+    end: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    overruled: np.ndarray
+    collected: np.ndarray
+    team_collected: np.ndarray
+
+
+class Lanes:
+    """N missions of one scenario under way.
+
+    Attributes:
+        space: The space that each mission draws its scenario from.
+        state: The arrays of the missions.
+        world: The nodes and the path loss table.
+        numbers: (N,) the numbers of the lanes.
+    """
+
+    def __init__(self, scenario: Scenario | ScenarioSpace, lanes: int, seed: int):
+        self.space = spaces_of([scenario])[0]
+        self.numbers = np.arange(lanes)
+        fleet, nodes = self.space.uavs[1], len(self.space.nodes)
+        self.world, self._ranges = world_of(self.space), ranges_of(self.space)
+        self._constants = constants_of(self.space)
+        self.state, self._scratch = empty_state(lanes, fleet, nodes), empty_scratch(fleet, nodes)
+        self.start_at(seed, 0)
+
+    @property
+    def seed(self) -> int:
+        """Seed of the missions to be launched."""
+        return int(self._constants["seed"][0])
+
+    @property
+    def replication(self) -> int:
+        """The next replication to be launched."""
+        return self._next
+
+    def start_at(self, seed: int, replication: int) -> None:
+        """Make this replication of this seed the next mission to be launched.
+
+        Raises:
+            InputError: If one of them is out of range.
+        """
+        check_seed(seed, replication)
+        self._constants["seed"], self._next = seed, replication
+
+    def launch(self, lanes: np.ndarray) -> None:
+        """Put the next replications into these lanes, in this order."""
+        check_seed(self.seed, self._next + len(lanes) - 1)
+        _launch(lanes, self._next, self._constants, self._ranges, self.state)
+        self._next += len(lanes)
+
+    def step(self, actions: np.ndarray) -> Outcome:
+        """One mission slot of every lane; (N, I) actions 0..4, read of the UAVs that act."""
+        shape = self.state.uavs.shape
+        outcome = Outcome(
+            acted=np.empty(shape, np.bool_),
+            reward=np.empty(shape),
+            reward_terms=np.empty((*shape, len(REWARD_TERMS))),
+            end=np.empty(shape, np.int64),
+            terminated=np.empty(shape, np.bool_),
+            truncated=np.empty(shape, np.bool_),
+            overruled=np.empty(shape, np.bool_),
+            collected=np.empty(shape),
+            team_collected=np.empty(len(actions)),
+        )
+        _step(self.state, self.world, self._scratch, actions, outcome)
+        return outcome
+
+    def records(self, lanes: np.ndarray) -> Records:
+        """The records of these lanes' missions, as far as they have come."""
+        records = empty_records(len(lanes), self.state.uavs.shape[1])
+        for row, lane in enumerate(lanes):
+            mission, uavs, residual = (part[lane] for part in self.state)
+            write_record(mission, uavs, residual, records.missions[row], records.uavs[row])
+        return records
+
+
+@kernel
+def _launch(lanes, first, constants, ranges, state):
+    """Start the replications from ``first`` on in these lanes."""
+    for n in range(len(lanes)):
+        lane = lanes[n]
+        state.missions[lane] = constants[0]
+        mission = state.missions[lane]
+        mission.replication = first + n
+        rules.launch(mission, ranges, state.uavs[lane], state.residual[lane])
+
+
+@kernel
+def _step(state, world, scratch, actions, out):
+    """One mission slot of every mission; what it did goes into an ``Outcome``."""
+    nodes, path_loss, order, means = world
+    batches, search = scratch
+    fleet = state.uavs.shape[1]
+    arrivals = np.empty(len(world.nodes), np.int64)
+    charged, collected = np.empty(fleet, np.int64), np.empty(fleet)
+    for b in range(len(state.missions)):
+        mission, uavs = state.missions[b], state.uavs[b]
+        for i in range(fleet):
+            u = uavs[i]
+            u.action = actions[b, i]
+            out.acted[b, i] = u.active
+            charged[i], collected[i] = u.slots_charging, u.collected
+        rules.advance(
+            mission, uavs, state.residual[b], arrivals,
+            nodes, path_loss, order, means, batches, search,
+        )  # fmt: skip
+        out.team_collected[b] = mission.slot_collected
+        for i in range(fleet):
+            u, acted = uavs[i], out.acted[b, i]
+            ended = acted and not u.active
+            out.reward[b, i] = u.reward
+            out.end[b, i] = u.end
+            out.terminated[b, i] = ended and u.end != TRUNCATED
+            out.truncated[b, i] = ended and u.end == TRUNCATED
+            out.overruled[b, i] = u.overruled
+            out.collected[b, i] = u.collected - collected[i]
+            out.reward_terms[b, i] = 0.0
+            if acted:
+                terms = rules.reward_terms(mission, u, u.slots_charging > charged[i])
+                for t in range(len(terms)):
+                    out.reward_terms[b, i, t] = terms[t]
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Actions as an integer array of that shape.
+
+    Raises:
+        InputError: If they are none.
+    """
+    array = np.asarray(actions)
+    if array.dtype.kind not in "iu" or array.shape != shape:
+        raise InputError(
+            f"actions: {array.dtype} of shape {array.shape}; allowed: integers of shape {shape}"
+        )
+    wrong = array[(array < 0) | (array >= len(ACTION_NAMES))]
+    if wrong.size:
+        raise InputError(f"actions: {wrong[0]} is no action; allowed: 0..{len(ACTION_NAMES) - 1}")
+    return array.astype(np.int64)

@@ -1,0 +1,127 @@
+"""The paper's observation: maps centred on the UAV, near it in detail, far from it pooled.
+
+Section III-D, eq. 19-22. A few of the cells are not zero, so both maps are written straight from
+the zone, the nodes and the UAVs; the centred map between them is never built.
+"""
+
+import numpy as np
+
+from dess.compiled import inlined, kernel
+from dess.errors import InputError
+from policies.ddqn.observations.states import ACTIVE, BATTERY, Layout, Snapshots, X, Y
+
+# The layers of a map: the charging zone, residual data / 20 [data units], remaining flying time
+# of the active UAVs / 100 [%], and their operational status.
+ZONE, DATA, FLYING_TIME, STATUS = range(4)
+LAYERS = 4
+DATA_SCALE = 20.0  # the most that a node starts with (Table II)
+BATTERY_SCALE = 100.0
+# Widths of the paper's local map and of a cell of its global map [cells] (l, g).
+CROP, POOL = 17, 3
+
+
+class Maps:
+    """Encodes snapshots as the paper's local and global maps and the own flying time.
+
+    The M x M map is moved into one of ``2 M - 1`` cells a side with the UAV in its middle, and
+    zeros around. The local map is the ``crop`` x ``crop`` cells in the middle; a cell of the global
+    map is the mean of ``pool`` x ``pool`` cells, and what fills no whole one in the south and east
+    is left out. Maps are indexed layer, y, x; the layers are ``ZONE`` to ``STATUS``.
+
+    Attributes:
+        layout: The grid, the zone and the nodes.
+        crop: Width of the local map [cells] (l).
+        pool: Cells a side that make one of the global map (g).
+        width: Width of the global map, ``(2 M - 1) // pool``.
+    """
+
+    version = 1  # of what the numbers mean: weights of another one do not fit
+
+    def __init__(self, layout: Layout, crop: int = CROP, pool: int = POOL) -> None:
+        """Make an encoder for one layout.
+
+        Raises:
+            InputError: If ``crop`` is not an odd number up to ``2 M - 1``, or ``pool`` not a number
+                of 1 to ``2 M - 1``.
+        """
+        centred = 2 * layout.grid - 1
+        if not (1 <= crop <= centred and crop % 2):
+            raise InputError(f"crop: must be an odd number of 1 to {centred}, not {crop}")
+        if not 1 <= pool <= centred:
+            raise InputError(f"pool: must be 1 to {centred}, not {pool}")
+        self.layout = layout
+        self.crop = crop
+        self.pool = pool
+        self.width = centred // pool
+
+    @property
+    def shapes(self) -> tuple[tuple[int, ...], ...]:
+        """The shapes of one row of each array that ``encode`` returns."""
+        return (LAYERS, self.crop, self.crop), (LAYERS, self.width, self.width), (1,)
+
+    def encode(
+        self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """What UAV ``uavs[r]`` of snapshot ``missions[r]`` observes, for every r.
+
+        Args:
+            snapshots: S missions at one moment each.
+            missions: (R,) indices into the snapshots.
+            uavs: (R,) indices of the UAVs.
+
+        Returns:
+            The local maps (R, 4, crop, crop), the global maps (R, 4, width, width) and the own
+            batteries / 100 (R, 1), all float32.
+        """
+        local, far, own = (np.zeros((len(missions), *s), np.float32) for s in self.shapes)
+        rows = np.asarray(missions, np.int64), np.asarray(uavs, np.int64)
+        _encode(snapshots, self.layout, *rows, self.pool, local, far, own)
+        return local, far, own
+
+
+@kernel
+def _encode(snapshots, layout, missions, uavs, pool, local, far, own):
+    """Write the maps of all rows into zeroed arrays."""
+    zone, nodes = layout.zone, layout.nodes
+    centre = layout.grid - 1
+    middle = local.shape[2] // 2
+    for r in range(len(missions)):
+        team, residual = snapshots.uavs[missions[r]], snapshots.residual[missions[r]]
+        x, y = team[uavs[r], X], team[uavs[r], Y]
+        own[r, 0] = team[uavs[r], BATTERY] / np.float32(BATTERY_SCALE)
+        # From here on all places are relative to the own cell.
+        _mark_zone(local[r, ZONE], middle, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
+        _mark_zone(far[r, ZONE], centre, pool, zone[0] - x, zone[1] - y, zone[2], zone[3])
+        for k in range(len(nodes)):
+            data = residual[k] / np.float32(DATA_SCALE)
+            _add(local[r, DATA], middle, 1, nodes[k, 0] - x, nodes[k, 1] - y, data)
+            _add(far[r, DATA], centre, pool, nodes[k, 0] - x, nodes[k, 1] - y, data)
+        for i in range(len(team)):
+            if not team[i, ACTIVE]:
+                continue
+            dx, dy = team[i, X] - x, team[i, Y] - y
+            battery = team[i, BATTERY] / np.float32(BATTERY_SCALE)
+            _add(local[r, FLYING_TIME], middle, 1, dx, dy, battery)
+            _add(far[r, FLYING_TIME], centre, pool, dx, dy, battery)
+            _add(local[r, STATUS], middle, 1, dx, dy, np.float32(1))
+            _add(far[r, STATUS], centre, pool, dx, dy, np.float32(1))
+
+
+@inlined
+def _add(layer, centre, pool, dx, dy, value):
+    """Add a value at a cell to a layer that pools, if the layer holds the cell."""
+    column, row = centre + dx, centre + dy
+    end = len(layer) * pool
+    if 0 <= column < end and 0 <= row < end:
+        layer[row // pool, column // pool] += value / np.float32(pool * pool)
+
+
+@inlined
+def _mark_zone(layer, centre, pool, dx, dy, width, height):
+    """Set each cell of a layer to the share of it that the zone covers."""
+    end = len(layer) * pool
+    left, right = max(centre + dx, 0), min(centre + dx + width, end)
+    top, bottom = max(centre + dy, 0), min(centre + dy + height, end)
+    for row in range(top, bottom):
+        for column in range(left, right):
+            layer[row // pool, column // pool] += np.float32(1) / np.float32(pool * pool)

@@ -1,0 +1,84 @@
+"""Observation (b), node by node: the vector, and for every node how it lies to the UAV.
+
+A network that treats all nodes alike learns once what a node five slots to the east is worth.
+"""
+
+import numpy as np
+
+from dess.compiled import kernel
+from policies.ddqn.observations.states import Layout, Snapshots, X, Y
+from policies.ddqn.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
+
+NODE = 22
+
+
+class Relations:
+    """The observation of one UAV as a vector and one row per node.
+
+    Attributes:
+        layout: The grid, zone and nodes that it is made for.
+        shapes: The shapes of its parts per row: (F,) and (K, 22).
+    """
+
+    version = 1  # of what the numbers mean: weights of another one do not fit
+
+    def __init__(self, layout: Layout):
+        self.layout, self._vector = layout, Vector(layout)
+        self.shapes = (*self._vector.shapes, (len(layout.nodes), NODE))
+        slots = np.arange(2 * layout.grid + 2)
+        self._nearness = np.exp(-slots / SCALES[:, None])
+        between = np.abs(layout.nodes[:, None] - layout.nodes[None]).sum(2)
+        self._around = np.stack([np.exp(-between / 6.0) / 25.0, np.exp(-between / 12.0) / 80.0])
+        self._home = layout.zone_slots(layout.nodes)
+
+    def encode(
+        self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, as float32.
+
+        Returns:
+            (R, F) vectors and (R, K, 22) nodes.
+        """
+        out = np.zeros((len(missions), *self.shapes[1]), np.float32)
+        nodes = self.layout.nodes
+        _encode(snapshots, missions, uavs, nodes, self._nearness, self._around, self._home, out)
+        return (*self._vector.encode(snapshots, missions, uavs), out)
+
+
+@kernel
+def _encode(snapshots, rows_mission, rows_uav, nodes, nearness, around, home, out):
+    count = len(nodes)
+    for row in range(len(rows_mission)):
+        team = snapshots.uavs[rows_mission[row]]
+        data = snapshots.residual[rows_mission[row]]
+        i = rows_uav[row]
+        me = team[i]
+        for k in range(count):
+            line = out[row, k]
+            dx, dy = nodes[k, 0] - me[X], nodes[k, 1] - me[Y]
+            slots = abs(dx) + abs(dy)
+            lead = lead_of(team, i, nodes[k, 0], nodes[k, 1], slots)
+            units = data[k] / DATA_UNIT
+            line[0] = units
+            line[1] = units * nearness[0, slots]
+            line[2] = units * nearness[1, slots]
+            line[3] = dx / 16.0
+            line[4] = dy / 16.0
+            line[5] = slots / 30.0
+            line[6] = nearness[0, slots]
+            line[7] = nearness[1, slots]
+            line[8] = nearness[2, slots]
+            line[9] = min(max(lead / 10.0, -1.0), 1.0)
+            line[10] = min(lead + slots, 40) / 30.0
+            line[11] = home[k] / 30.0
+            line[12] = spare_slots(me, home[k], slots)
+            line[13] = line[12] >= 0.0
+            line[14] = dx > 0
+            line[15] = dx < 0
+            line[16] = dy > 0
+            line[17] = dy < 0
+            for j in range(count):
+                line[18] += data[j] * around[0, k, j]
+                line[19] += data[j] * around[1, k, j]
+            line[20] = nodes[k, 0] / 30.0
+            line[21] = nodes[k, 1] / 30.0

@@ -1,0 +1,186 @@
+"""Pieces of a report page: figures, tables and numbers as clean HTML."""
+
+import io
+import json
+import re
+from base64 import b64encode
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from pathlib import Path
+
+import matplotlib as mpl
+import pandas as pd
+from IPython.display import HTML
+from matplotlib.figure import Figure
+
+from analysis.results.evidence import Evidence, learned_files
+from analysis.results.tables import Results
+
+SHORT = 12  # characters of a hash that are shown
+STUDY, FILES = "dess-study", "dess-files"  # what a page carries, by the class of its element
+
+_NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
+
+
+def percent(value: float) -> str:
+    """``0.9731`` as ``97.3 %``."""
+    return f"{_minus(f'{100 * value:.1f}')} %"
+
+
+def interval(mean: float, low: float, high: float) -> str:
+    """A mean and its interval as ``97.3 % [96.1, 98.1]``."""
+    return f"{percent(mean)} [{_minus(f'{100 * low:.1f}')}, {_minus(f'{100 * high:.1f}')}]"
+
+
+def difference(value: float, reference: float) -> str:
+    """By how many percentage points a value is above its reference, as ``+7.4`` or ``−2.1``."""
+    points = round(100 * (value - reference), 1) or 0.0  # no −0.0
+    return _minus(f"{points:+.1f}") if points else "0.0"
+
+
+def points(value: float, low: float, high: float) -> str:
+    """A difference and its interval in percentage points, as ``+7.4 [6.9, 7.9]``."""
+    ends = [difference(end, 0) for end in (low, high)]
+    return f"{difference(value, 0)} [{ends[0]}, {ends[1]}]"
+
+
+def _minus(number: str) -> str:
+    """A number with a proper minus, and none on zero."""
+    return number.replace("-", "−") if float(number) else number.replace("-", "")
+
+
+def level(share: float) -> str:
+    """A confidence level, as ``95 %``."""
+    return f"{100 * share:g} %"
+
+
+def p_value(p: float) -> str:
+    """A p-value, as ``0.094``, or ``< 0.001``."""
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def words(names: Sequence[str]) -> str:
+    """``a, b and c``."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def commands(lines: Iterable[str]) -> str:
+    """Lines for a shell, as Markdown: none is broken, and all can be copied at once."""
+    return "\n".join(["```sh", *lines, "```"])
+
+
+def provenance(studies: Iterable[Results]) -> HTML:
+    """Where the results of a page come from: a column per study, and the evidence to check them."""
+    return carrying([Evidence.of(results) for results in studies])
+
+
+def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
+    """What studies were made with, a column per study, and the evidence itself, out of sight.
+
+    Args:
+        evidence: Of the studies.
+        files: The lists of files that pages carry, as of ``embedded``.
+    """
+    hidden = [_embedded(STUDY, each.text) for each in evidence]
+    hidden += [_embedded(FILES, text) for text in files]
+    return HTML((_origins(evidence).data if evidence else "") + "".join(hidden))
+
+
+def _origins(evidence: Sequence[Evidence]) -> HTML:
+    names = [each.study for each in evidence]
+    columns = {
+        e.study if names.count(e.study) == 1 else f"{e.study} {e.key}": {
+            "Scenario": e.scenario_name,
+            "Policies": ", ".join(team.policy for team in e.policies),
+            "Weights": ", ".join(_weights(e)) or "none",
+            "Design points": f"{e.points:,}",
+            "Missions per policy and point": _range(e.missions),
+            "Budget": e.budget,
+            "Seed": e.seed,
+            "Engine": e.engine,
+            "Study key": e.key,
+            "dess": e.version,
+            "Code": e.code[:SHORT],
+            "Commit": (e.commit or "unknown")[:SHORT],
+            "Libraries": ", ".join(f"{name} {version}" for name, version in e.libraries.items()),
+        }
+        for e in evidence
+    }
+    return table(pd.DataFrame(columns).rename_axis("Study").reset_index(), wrap=True)
+
+
+def weights(folder: Path) -> HTML:
+    """The files of the learned policies in a folder, and the evidence to check them."""
+    files = learned_files(folder)
+    rows = [(name, digest[:SHORT]) for name, digest in files.items()]
+    shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]))
+    return HTML(shown.data + _embedded(FILES, json.dumps(files)))
+
+
+def embedded(kind: str, html: str) -> list[str]:
+    """The texts of a kind, ``STUDY`` or ``FILES``, that a page carries; each once."""
+    found = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', html, re.S)
+    return list(dict.fromkeys(found))
+
+
+def _embedded(kind: str, text: str) -> str:
+    inert = text.replace("<", "\\u003c")  # nothing in it ends the element
+    return f'<script class="{kind}" type="application/json">{inert}</script>'
+
+
+def _weights(evidence: Evidence) -> Iterator[str]:
+    """The hashes of the weights of every learned policy of a study, each once."""
+    for name, digest in dict.fromkeys(
+        (team.policy if len(team.members) == 1 else member.name, member.weights)
+        for team in evidence.policies
+        for member in team.members
+    ):
+        if digest:
+            yield f"{name} {digest[:SHORT]}"
+
+
+def _range(ends: tuple[int, int]) -> str:
+    """``300``, or ``20 to 1,200``."""
+    return " to ".join(f"{n:,}" for n in sorted({*ends}))
+
+
+def table(frame: pd.DataFrame, caption: str = "", wrap: bool = False) -> HTML:
+    """A table without its index, under its caption; where it is too wide, it scrolls.
+
+    Args:
+        frame: The table.
+        caption: What stands above it.
+        wrap: Whether cells with many words take several lines.
+    """
+    look = ["table", "wrap"] if wrap else "table"
+    html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
+    above = f'<p class="caption">{escape(caption)}</p>' if caption else ""
+    return HTML(f'{above}<div class="scroll">{html}</div>')
+
+
+def figure(drawing: Figure, alt: str, caption: str = "") -> HTML:
+    """A figure with its caption, and what it shows for those who cannot see it."""
+    return HTML(_figure(drawing, alt, caption))
+
+
+def gallery(drawings: list[tuple[Figure, str, str]]) -> HTML:
+    """Figures, each with its alternative text and caption, side by side as far as there is room."""
+    return HTML(f'<div class="gallery">{"".join(_figure(*each) for each in drawings)}</div>')
+
+
+def svg(drawing: Figure) -> bytes:
+    """A figure as SVG that is the same, byte for byte, whenever and wherever it is drawn."""
+    buffer = io.BytesIO()
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams["svg.hashsalt"] = "dess"
+        drawing.savefig(buffer, format="svg", metadata=_NO_METADATA)
+    return buffer.getvalue()
+
+
+def _figure(drawing: Figure, alt: str, caption: str) -> str:
+    source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
+    below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    width, height = drawing.get_size_inches()
+    shape = ' class="tall"' if height > 1.5 * width else ""
+    return f'<figure><img{shape} alt="{escape(alt)}" src="{source}">{below}</figure>'

@@ -1,0 +1,70 @@
+import pytest
+
+from analysis import run_study
+from analysis.execution.dry_run import LONG_TRIAL, TRIAL, plan_study
+from dess import InputError
+from tests.analysis.small import files_of, grid, small_study
+
+
+class Clock:
+    """Every look at it is that many seconds after the last one."""
+
+    def __init__(self, step):
+        self.now, self.step = 0.0, step
+
+    def __call__(self):
+        self.now += self.step
+        return self.now
+
+
+def test_a_plan_counts_and_writes_nothing(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]))
+    before = files_of(tmp_path)
+    plan = plan_study(study, tmp_path / "out")
+    assert [(p.policy, p.missions, p.present) for p in plan.policies] == [
+        ("greedy", 20, 0),
+        ("random", 20, 0),
+    ]
+    assert (plan.missions, plan.points, plan.at_most) == (40, 2, None)
+    assert files_of(tmp_path) == before
+
+
+def test_a_plan_knows_what_is_there(tmp_path):
+    run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    before = files_of(tmp_path / "out")
+    plan = plan_study(small_study(tmp_path, missions=25), tmp_path / "out")
+    assert [(p.missions, p.present) for p in plan.policies] == [(25, 10), (25, 0)]
+    assert files_of(tmp_path / "out") == before
+    done = plan_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "out")
+    assert done.seconds == 0.0
+
+
+@pytest.mark.parametrize(("step", "trial"), [(60.0, TRIAL), (0.01, LONG_TRIAL)])
+def test_the_time_is_that_of_a_trial(step, trial, tmp_path):
+    plan = plan_study(small_study(tmp_path), tmp_path / "out", clock=Clock(step))
+    assert [p.seconds for p in plan.policies] == pytest.approx([10 * step / trial] * 2)
+    assert plan.seconds == pytest.approx(2 * 10 * step / trial)
+    by_two = plan_study(small_study(tmp_path), tmp_path / "out", 2, Clock(step))
+    assert by_two.seconds == pytest.approx(plan.seconds / 2)
+
+
+def test_a_rule_has_a_least_and_a_most(tmp_path):
+    targets = {"success": {"absolute": 0.1}}
+    precise = {"first": 5, "look_ahead": 5, "budget": 50, "targets": targets}
+    design = grid(uavs=[1, 2])
+    plan = plan_study(small_study(tmp_path, precision=precise, design=design), tmp_path / "out")
+    assert (plan.missions, plan.at_most) == (2 * 2 * 5, 2 * 2 * 50)
+    rule = {"procedure": "kn", "first": 8, "indifference": 0.1, "budget": 200, "check": 7}
+    study = small_study(tmp_path, selection=rule, design=design)
+    plan = plan_study(study, tmp_path / "out")
+    assert (plan.missions, plan.at_most) == (2 * 2 * 8, 2 * (200 + 7))
+    run_study(study, tmp_path / "out")
+    done = plan_study(study, tmp_path / "out")
+    assert all(p.missions == p.present > 7 for p in done.policies)
+
+
+def test_a_plan_refuses_what_a_run_would(tmp_path):
+    with pytest.raises(InputError, match="holds other files"):
+        plan_study(small_study(tmp_path), tmp_path)
+    with pytest.raises(InputError, match="workers: 0 is out of range"):
+        plan_study(small_study(tmp_path), tmp_path / "out", workers=0)

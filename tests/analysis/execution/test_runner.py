@@ -1,0 +1,357 @@
+import shlex
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import evaluate, load_results, load_study, run_study
+from analysis.execution import jobs, runner
+from analysis.questions.sensitivity import sensitivity
+from analysis.study.study import CHECK
+from dess import InputError, load_scenario, simulate
+from dess.record import MISSION_RECORD, UAV_RECORD
+from dess.state import END_NAMES
+from policies import load_team
+from reports import cli
+from reports.cli.settings import setting
+from tests.analysis.small import files_of, grid, small_study
+
+
+def assert_same(ours, other):
+    pd.testing.assert_frame_equal(ours.missions, other.missions)
+    pd.testing.assert_frame_equal(ours.uavs, other.uavs)
+
+
+def test_results_are_tidy(tmp_path):
+    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[1, 2]))
+    results = run_study(study, tmp_path / "out")
+    missions, uavs = results.missions, results.uavs
+    assert list(missions.columns) == ["policy", "point", "quota", *MISSION_RECORD.names]
+    assert list(uavs.columns) == ["policy", "point", "replication", "uav", *UAV_RECORD.names]
+    assert len(missions) == 2 * 4 * 10
+    assert len(uavs) == missions["uavs"].sum()
+    order = [(p, d, r) for p in study.policies for d in range(4) for r in range(10)]
+    assert list(missions[["policy", "point", "replication"]].itertuples(index=False)) == order
+    assert (missions["uavs"] == missions["point"].map({0: 1, 1: 2, 2: 1, 3: 2})).all()
+    assert set(uavs["end"]) <= set(END_NAMES[1:])
+    success = uavs.groupby(["policy", "point", "replication"], sort=False)["end"].agg(
+        lambda ends: (ends == "quota").all()
+    )
+    assert (success.to_numpy() == missions["success"]).all()
+    assert 0 < missions["success"].mean() < 1  # or this test says little
+
+
+def test_a_swept_range_is_a_column_of_text(tmp_path):
+    study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), missions=1)
+    missions = run_study(study, tmp_path / "out").missions
+    assert list(missions["initial_data"].unique()) == ["5", "[5, 9.5]"]
+
+
+def test_a_mission_of_a_study_equals_the_same_one_alone(tmp_path):
+    study = small_study(tmp_path, policies=["greedy,tour"])
+    results = run_study(study, tmp_path / "out")
+    for replication in (0, 4, 9):
+        alone = simulate(
+            study.points[0].scenario, load_team("greedy,tour"), study.seed, replication
+        )
+        row = results.missions.iloc[replication]
+        assert {name: row[name] for name in MISSION_RECORD.names} == {
+            name: alone.metrics[name].item() for name in MISSION_RECORD.names
+        }
+        uavs = results.uavs[results.uavs["replication"] == replication]
+        assert (
+            uavs[["quota", "battery", "slots_charging", "end"]].to_dict("records")
+            == alone.uav_rows()
+        )
+
+
+def test_policies_meet_the_same_sea(tmp_path):
+    missions = run_study(small_study(tmp_path), tmp_path / "out").missions
+    drawn = ["replication", "uavs", "flying_time", "charge_start", "charge_complete", "initial"]
+    greedy, random = (missions[missions["policy"] == p][drawn] for p in ("greedy", "random"))
+    pd.testing.assert_frame_equal(greedy.reset_index(drop=True), random.reset_index(drop=True))
+    assert greedy["initial"].nunique() == len(greedy)
+
+
+def test_equal_runs_have_equal_bytes_under_any_number_of_workers(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=2)
+    done: list[int] = []
+    for workers in (1, 2):
+        run_study(study, tmp_path / str(workers), workers, progress=done.append)
+        assert sum(done) == 40 * workers
+    assert files_of(tmp_path / "1") == files_of(tmp_path / "2")
+    assert str(tmp_path) not in (tmp_path / "1" / "manifest.json").read_text()
+
+
+def test_both_engines_leave_the_same_records(tmp_path):
+    batch, events = (
+        run_study(small_study(tmp_path, engine=engine), tmp_path / engine)
+        for engine in ("batch", "events")
+    )
+    assert_same(batch, events)
+
+
+def test_dask_leaves_the_same_bytes(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    study = small_study(tmp_path, logged=1)
+    run_study(study, tmp_path / "here")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        run_study(study, tmp_path / "dask", scheduler=cluster.scheduler_address)
+    assert files_of(tmp_path / "here") == files_of(tmp_path / "dask")
+
+
+def test_dask_is_an_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install dess\[distributed\]"):
+        run_study(small_study(tmp_path), tmp_path / "out", scheduler="tcp://localhost:8786")
+    assert not (tmp_path / "out").exists()
+
+
+def test_raising_the_missions_tops_up_and_lowering_loads_fewer(tmp_path):
+    few, many = (small_study(tmp_path, missions=n) for n in (10, 21))
+    at_once = run_study(many, tmp_path / "at_once")
+    run_study(few, tmp_path / "out")
+    before, done = files_of(tmp_path / "out"), []
+    assert_same(run_study(many, tmp_path / "out", progress=done.append), at_once)
+    assert done[0] == 2 * 10  # kept
+    after = files_of(tmp_path / "out")
+    assert all(after[name] == before[name] for name in before if name != "manifest.json")
+    lowered = run_study(few, tmp_path / "out")
+    assert_same(lowered, run_study(few, tmp_path / "few"))
+
+
+def test_policies_and_points_can_be_added(tmp_path):
+    run_study(small_study(tmp_path, design=grid(uavs=[2])), tmp_path / "out")
+    more = small_study(
+        tmp_path, design=grid(uavs=[1, 2]), policies=["tour", "greedy", "random"], logged=1
+    )
+    done: list[int] = []
+    extended = run_study(more, tmp_path / "out", progress=done.append)
+    assert done[0] == 2 * 10
+    assert_same(extended, run_study(more, tmp_path / "fresh"))
+
+
+def check_that_an_interrupted_run_is_completed(study, folder, after, workers):
+    """Interrupt a run after some missions, and run it again."""
+    done = 0
+
+    def interrupt(missions: int) -> None:
+        nonlocal done
+        done += missions
+        if done >= after:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study, folder / "out", progress=interrupt)
+    with pytest.raises(InputError, match="incomplete.*; allowed: run the study again"):
+        load_results(folder / "out")
+    run_study(study, folder / "out", workers)
+    run_study(study, folder / "undisturbed")
+    assert files_of(folder / "out") == files_of(folder / "undisturbed")
+
+
+@pytest.mark.parametrize("after", [1, 7, 14])
+def test_an_interrupted_run_is_completed(after, tmp_path):
+    study = small_study(tmp_path, logged=1)
+    check_that_an_interrupted_run_is_completed(study, tmp_path, after, workers=1)
+
+
+def test_event_logs_are_those_of_the_missions(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), logged=2)
+    results = run_study(study, tmp_path / "out")
+    alone = simulate(study.points[1].scenario, load_team("random"), 7, 1, events=True)
+    log = results.events("random", point=1, replication=1)
+    assert list(log.columns) == ["time", "event", "uav", "node", "value", "x", "y"]
+    for name, column in alone.events.columns().items():
+        assert (log[name].to_numpy() == column).all()
+    ends = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
+    row = results.missions.query("policy == 'random' and point == 1 and replication == 1")
+    assert ends["value"].sum() == pytest.approx(row["residual"].item(), abs=1e-9)
+
+
+def test_event_logs_that_are_not_there(tmp_path):
+    results = run_study(small_study(tmp_path, logged=1), tmp_path / "out")
+    for asked, line in {
+        ("greedy", 0, 1): "no event log of greedy, point 0, replication 1",
+        ("tour", 0, 0): "policy: 'tour' is not in the study; allowed: greedy, random",
+        ("greedy", 1, 0): r"point: 1 is not in the study; allowed: 0\.\.0",
+    }.items():
+        with pytest.raises(InputError, match=line):
+            results.events(*asked)
+
+
+def test_the_scenario_of_a_point_is_at_hand(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), missions=1)
+    results = run_study(study, tmp_path / "out")
+    assert [results.scenario(point) for point in (0, 1)] == [p.scenario for p in study.points]
+
+
+def test_evaluate_counts_and_times_the_missions_alone(tmp_path):
+    scenario = small_study(tmp_path).points[0].scenario
+    ticks, done = iter([100.0, 102.5]), []
+    batch = evaluate(scenario, "greedy", 30, 7, progress=done.append, clock=lambda: next(ticks))
+    assert batch.seconds == 2.5
+    assert sum(done) == 30
+    assert batch.uav_slots == batch.records.missions["uav_slots"].sum() > 0
+    study = run_study(small_study(tmp_path, missions=30), tmp_path / "out").missions
+    greedy = study[study["policy"] == "greedy"]
+    assert (batch.records.missions["reward"] == greedy["reward"].to_numpy()).all()
+
+
+def test_evaluate_is_the_same_by_both_engines(tmp_path, monkeypatch):
+    monkeypatch.setitem(runner.CHUNK, "events", 4)
+    scenario = small_study(tmp_path).points[0].scenario
+    batch = evaluate(scenario, "greedy,random", 10, 7, workers=2)
+    events = evaluate(scenario, "greedy,random", 10, 7, engine="events")
+    for ours, other in zip(batch.records, events.records, strict=True):
+        assert np.array_equal(ours, other)
+
+
+def test_a_chunk_holds_many_cells(tmp_path):
+    study = small_study(
+        tmp_path, policies=["greedy"], design=grid(quota=[*range(20, 60)]), missions=1
+    )
+    run_study(study, tmp_path / "out")
+    assert len([*(tmp_path / "out").rglob("*.parquet")]) == 2 * 40 / runner.CHUNK["batch"]
+
+
+def test_a_chunk_gives_every_design_point_its_own_missions(tmp_path):
+    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[2, 1]), missions=3)
+    missions = run_study(study, tmp_path / "out").missions
+    for row in missions.sample(12, random_state=1).itertuples():
+        space = study.points[row.point].scenario
+        alone = simulate(space, load_team(row.policy), study.seed, row.replication)
+        assert (alone.metrics["reward"], alone.uavs.size) == (row.reward, row.uavs)
+
+
+def precise(folder, **changes):
+    """A study that runs until the success of every cell is known well enough."""
+    targets = {"success": {"absolute": 0.2}, "reward": {"relative": 0.2}}
+    rule = {"first": 5, "look_ahead": 3, "budget": 60, "targets": targets}
+    return small_study(folder, precision=rule, design=grid(quota=[20, 60]), **changes)
+
+
+def selecting(folder, **changes):
+    """A study that selects the best of some settings."""
+    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 2000, "check": 5}
+    return small_study(folder, selection=rule, design=grid(quota=[20, 40, 60, 80]), **changes)
+
+
+def test_precision_decides_how_many_missions_there_are(tmp_path):
+    study = precise(tmp_path)
+    results = run_study(study, tmp_path / "out")
+    counts = results.missions.groupby(["policy", "point"], sort=False).size()
+    assert counts.nunique() > 1  # or this test says little
+    assert counts.tolist() == [n for of_team in results.manifest["missions"] for n in of_team]
+    fields = ["success", "reward"]
+    for (_, _), cell in results.missions.groupby(["policy", "point"]):
+        assert cell["replication"].tolist() == [*range(len(cell))]
+        assert study.precision.wanted([{f: cell[f].to_numpy() for f in fields}]) == [len(cell)]
+
+
+def test_a_selection_is_checked_by_missions_that_did_not_select(tmp_path):
+    study = selecting(tmp_path)
+    results = run_study(study, tmp_path / "out")
+    for policy, best in zip(study.policies, results.manifest["selected"], strict=True):
+        assert results.choice(policy).best == best
+        checks = results.checks[results.checks["policy"] == policy]
+        assert (checks["point"] == best).all()
+        assert checks["replication"].tolist() == [CHECK + n for n in range(5)]
+        assert checks["quota"].iloc[0] == study.points[best].values["quota"]
+    assert results.missions["replication"].max() < CHECK
+    assert len(results.checks) == 10
+
+
+def test_rounds_are_announced_before_their_missions(tmp_path):
+    told, done = [], []
+    run_study(selecting(tmp_path), tmp_path / "out", announce=told.append, progress=done.append)
+    assert [each.number for each in told] == [*range(len(told))]
+    assert told[-1].missions == sum(done)
+    assert len(told) > 2
+    again = []
+    run_study(selecting(tmp_path), tmp_path / "out", announce=again.append)
+    assert sum(each.present for each in again) == again[-1].missions == told[-1].missions
+
+
+def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
+    """numba makes it a SystemError; the chunk has not failed."""
+
+    def run(*_):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(jobs.MissionsJob, "run", run)
+    with pytest.raises(KeyboardInterrupt):
+        run_study(small_study(tmp_path), tmp_path / "out")
+    assert not [*(tmp_path / "out" / "failures").iterdir()]
+    assert (
+        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")]) == 1
+    )
+
+
+@pytest.mark.parametrize("kind", [precise, selecting])
+@pytest.mark.parametrize(
+    "after",
+    [pytest.param(11, marks=pytest.mark.slow), 47, pytest.param(71, marks=pytest.mark.slow)],
+)
+def test_an_interrupted_run_of_rounds_is_completed(kind, after, tmp_path):
+    check_that_an_interrupted_run_is_completed(kind(tmp_path), tmp_path, after, workers=2)
+
+
+def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):
+    design = {"kind": "saltelli", "base": 4, "ranges": {"uavs": [1, 2], "quota": [20, 60]}}
+    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
+    missions = run_study(study, tmp_path / "out").missions
+    assert missions["point"].tolist() == [*range(len(study.points))]
+    assert missions["replication"].tolist() == [point.replication for point in study.points]
+    assert missions["quota"].tolist() == [point.values["quota"] for point in study.points]
+    assert missions["replication"].nunique() > 4
+    indices = sensitivity(study.design, missions, ["reward"])
+    assert np.isfinite(indices["total"]).all()
+
+
+def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
+    study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), set={"max_slots": 99})
+    results = run_study(study, tmp_path / "out")
+    program, command, *options = shlex.split(results.replay("random", 1, 3))
+    assert (program, command) == ("dess", "simulate")
+    monkeypatch.chdir(tmp_path)
+    assert options[:2] == ["--scenario", "paper"]  # whose file needs not be there
+    settings = [value for key, value in zip(options, options[1:], strict=False) if key == "--set"]
+    ours = load_scenario("paper", **dict(setting(text) for text in settings))
+    assert ours == results.scenario(1)
+    assert ours.max_slots == 99
+    assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]
+    shipped = load_study("fig4", policies=["greedy"], missions=1)
+    command = run_study(shipped, tmp_path / "fig4").replay("greedy", 1, 0)
+    assert command == (
+        "dess simulate --scenario fig4 --set uavs=2 --policy greedy --seed 2022 --replication 0"
+    )
+
+
+def test_points_that_are_one_scenario_share_their_missions(tmp_path):
+    """Where a list holds the scenario's own value, or drawn integers fall together."""
+    rule = {"procedure": "ocba", "first": 4, "budget": 60, "check": 0}
+    values = {"quota": [20, 60], "flying_time": [[20, 30], 20]}
+    design = {"kind": "one-at-a-time", "values": values}
+    study = small_study(tmp_path, selection=rule, design=design)
+    told = []
+    results = run_study(study, tmp_path / "out", announce=told.append)
+    cells = results.store.manifest.cells[0]
+    assert cells[1].key == cells[2].key
+    for counts in results.manifest["missions"]:
+        assert sum(counts) <= 60
+    sizes = results.missions.groupby(["policy", "point"], sort=False).size().tolist()
+    assert sizes == [n for of_team in results.manifest["missions"] for n in of_team]
+    there = [row for table in results.store._tables.values() for row in table.missions.to_pylist()]
+    assert len({(row["cell"], row["replication"]) for row in there}) == len(there)
+
+
+def test_there_is_at_least_one_worker(tmp_path):
+    study = small_study(tmp_path)
+    with pytest.raises(InputError, match="workers: 0 is out of range"):
+        run_study(study, tmp_path / "out", workers=0)
+    with pytest.raises(InputError, match="workers: 0 is out of range"):
+        evaluate(study.points[0].scenario, "greedy", workers=0)
+    assert not (tmp_path / "out").exists()

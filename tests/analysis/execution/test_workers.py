@@ -1,0 +1,145 @@
+import json
+import shlex
+
+import pytest
+
+from analysis import load_results, run_study
+from analysis.execution.jobs import MissionsJob
+from analysis.execution.runner import ChunkError
+from analysis.execution.workers import _checked
+from analysis.results.chunks import Chunk, Part
+from analysis.results.manifest import Manifest, fingerprint, members_of
+from analysis.results.store import Store
+from dess import InputError
+from tests.analysis import troublesome
+from tests.analysis.small import files_of, small_study
+
+
+@pytest.fixture
+def plugin(tmp_path, monkeypatch):
+    troublesome.install(tmp_path / "plugin", monkeypatch)
+    yield
+    monkeypatch.undo()
+
+
+@pytest.fixture
+def cluster():
+    """A dask cluster of two worker processes; its address."""
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        yield cluster.scheduler_address
+
+
+def failing(study, out, **options):
+    """The only failure of a study: its file and what it says."""
+    with pytest.raises(ChunkError) as error:
+        run_study(study, out, **options)
+    ((path, failure),) = error.value.failures.items()
+    assert path.parent == out / "failures"
+    assert json.loads(path.read_text()) == vars(failure)
+    return failure
+
+
+def check_that_the_rest_is_there(study, out, policy, missing):
+    """All chunks but one of one policy are there, and the results say that they are incomplete."""
+    with pytest.raises(InputError, match=f"missions of {policy} .*1 chunks failed, see .*failures"):
+        load_results(out)
+    done = []
+    with pytest.raises(ChunkError):
+        run_study(study, out, progress=done.append)
+    assert done[0] == study.missions * len(study.policies) - missing
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(workers, plugin, tmp_path):
+    study = small_study(tmp_path, policies=["raising", "greedy"])
+    failure = failing(study, tmp_path / "out", workers=workers)
+    assert failure.policy == "raising"
+    assert failure.missions == 4
+    assert failure.error == "ZeroDivisionError: nothing to divide by"
+    assert "in trouble" in failure.traceback
+    assert shlex.split(failure.replay)[-4:] == ["--seed", "7", "--replication", "5"]
+    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+
+
+def test_a_policy_that_raises_leaves_the_others_whole(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["greedy", "raising"])
+    failing(study, tmp_path / "out")
+    run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "alone")
+    ours, alone = (
+        files_of(tmp_path / folder / "missions" / "policy=greedy") for folder in ("out", "alone")
+    )
+    assert ours == alone
+
+
+def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
+    def refuse_the_second(store, chunk, missions):
+        if chunk.team == 1 and chunk.parts[0].replications.start == 4:
+            raise ValueError("not what was asked for")
+
+    monkeypatch.setattr(Store, "_check", refuse_the_second)
+    failure = failing(small_study(tmp_path), tmp_path / "out")
+    assert (failure.policy, failure.missions) == ("random", 4)
+    assert failure.error == "ValueError: not what was asked for"
+
+
+def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["raising"], logged=6, missions=6)
+    with pytest.raises(ChunkError) as error:
+        run_study(study, tmp_path / "out")
+    assert sorted(failure.missions for failure in error.value.failures.values()) == [0, 2]
+
+
+def test_a_killed_worker_is_replaced(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+    done: list[int] = []
+    run_study(study, tmp_path / "out", workers=2, progress=done.append)
+    assert (tmp_path / "plugin" / "killed").exists()
+    assert sum(done) == 20
+    run_study(study, tmp_path / "undisturbed")  # it has been killed, so it hovers
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+@pytest.mark.slow
+def test_a_chunk_that_kills_every_worker_is_given_up(plugin, tmp_path):
+    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+    failure = failing(study, tmp_path / "out", workers=2)
+    assert failure.policy == "killed-always"
+    assert failure.missions == 4
+    assert "worker died" in failure.error
+    assert shlex.split(failure.replay)[-4:] == ["--seed", "7", "--replication", "5"]
+
+
+def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+    run_study(study, tmp_path / "out", scheduler=cluster)
+    assert (tmp_path / "plugin" / "killed").exists()
+    run_study(study, tmp_path / "undisturbed")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
+    study = small_study(tmp_path)
+    cell = Manifest.of(study).cells[0][0]
+    chunk = Chunk(0, (Part(cell, range(1)),))
+    job = MissionsJob(chunk, (study.points[0].scenario,), "greedy", 7, "batch")
+    code, members = fingerprint("dess"), members_of("greedy")
+    assert len(_checked(job, code, members).missions) == 1
+    for others in (("0" * 64, members), (code, members_of("random"))):
+        with pytest.raises(InputError, match="a worker has other code"):
+            _checked(job, *others)
+
+
+def test_dask_records_a_chunk_that_raises(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["raising", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert failure.error == "ZeroDivisionError: nothing to divide by"
+    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+
+
+@pytest.mark.slow
+def test_dask_gives_up_a_chunk_that_kills_every_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert "workers died" in failure.error

@@ -1,0 +1,131 @@
+"""What figures of trainings show is what the trainings did."""
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+
+from analysis.figures import learning as learning_figures
+from analysis.names import METRICS
+from analysis.questions import learning as curves
+from tests.analysis.questions.test_learning import training
+
+METRIC = "evaluation_collection_ratio_and_communication"
+LABELS = {"one": "with", "two": "without"}
+ENDS = {"one": [0.5, 0.6, 0.7], "two": [0.55, 0.9]}
+
+
+@pytest.fixture(scope="module")
+def table():
+    """Three trainings of one variant, in two phases, and two of another."""
+    parts = [
+        training(name, seed, np.linspace(0.2, end, 4), before=2 * (name == "one"))
+        for name, ends in ENDS.items()
+        for seed, end in enumerate(ends)
+    ]
+    return pd.concat(parts, ignore_index=True).rename(columns={"evaluation_reward": METRIC})
+
+
+@pytest.fixture(scope="module")
+def panel(table):
+    (ax,) = learning_figures.trainings(table, METRIC, LABELS).axes
+    return ax
+
+
+def thick(ax):
+    return [line for line in ax.lines if line.get_linewidth() > 2]
+
+
+def test_fig_3_shows_the_means_of_the_averages(table, panel):
+    rows = curves.bands(curves.smoothed(table, METRIC))
+    drawn = [(line.get_xdata().tolist(), line.get_ydata().tolist()) for line in thick(panel)]
+    parts = rows.groupby(["variant", "phase"], sort=False)
+    assert drawn == [(own["updates"].tolist(), own["mean"].tolist()) for _, own in parts]
+
+
+def test_fig_3_shows_every_training(table, panel):
+    averages = curves.smoothed(table, METRIC)
+    thin = [line for line in panel.lines if line.get_linewidth() < 1 and len(line.get_xdata()) > 1]
+    expected = [own["value"].tolist() for _, own in averages.groupby(["variant", "seed", "phase"])]
+    drawn = [line.get_ydata().tolist() for line in thin if line.get_gid() is None]
+    assert sorted(drawn) == sorted(expected)
+
+
+def test_fig_3_has_a_band_where_the_trainings_are_enough(table, panel):
+    rows = curves.bands(curves.smoothed(table, METRIC))
+    bands = [a for a in panel.collections if (a.get_gid() or "").startswith("band")]
+    known = rows.dropna().groupby(["variant", "phase"], sort=False)
+    assert len(bands) == len(known) == 2  # both phases of the variant with three trainings
+    for band, (_, own) in zip(bands, known, strict=True):
+        corners = band.get_paths()[0].vertices
+        for step, low, high in own[["updates", "low", "high"]].to_numpy():
+            at = corners[corners[:, 0] == step, 1]
+            assert (at.min(), at.max()) == pytest.approx((low, high))
+
+
+def test_fig_3_tells_the_phases_and_the_trainings(panel):
+    names = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert names == ["with, n = 3", "without, n = 2"]
+    (line,) = [line for line in panel.lines if line.get_gid() == "last phase"]
+    assert set(line.get_xdata()) == {2000}
+    assert panel.get_title(loc="left") == METRICS["collection_ratio_and_communication"]
+    styles = [line.get_linestyle() for line in thick(panel)]
+    assert styles == [":", "-", "--"]
+
+
+def test_all_curves_are_on_the_axes(table, panel):
+    low, high = panel.get_ylim()
+    assert curves.smoothed(table, METRIC)["value"].between(low, high).all()
+
+
+@pytest.fixture(scope="module")
+def ended():
+    """Final products: of three trainings, of one, and of two that came to nothing."""
+    rows = [("base", 0.7), ("base", 0.8), ("base", 0.75), ("once", 0.6), ("lost", 0.0), ("lost", 0)]
+    table = pd.DataFrame(rows, columns=["variant", "final_collection_ratio_and_communication"])
+    return table.assign(seed=range(len(table)))
+
+
+def test_the_ablation_shows_trainings_means_and_intervals(ended):
+    metric = "final_collection_ratio_and_communication"
+    table = curves.ablation(ended, metric, "base")
+    (ax,) = learning_figures.ablation(table, ended, metric, "base").axes
+    dots = {a.get_gid(): a.get_offsets()[:, 0].tolist() for a in ax.collections if a.get_gid()}
+    assert dots == {"base": [0.7, 0.8, 0.75], "once": [0.6]}
+    (bar,) = ax.containers  # one training has no interval
+    base = table.iloc[0]
+    assert bar.lines[0].get_xdata() == pytest.approx([base["mean"]])
+    ends = bar.lines[2][0].get_segments()[0][:, 0]
+    assert ends == pytest.approx([base["low"], base["high"]])
+    arrows = [line for line in ax.lines if line.get_gid() == "lost"]
+    assert [arrow.get_marker() for arrow in arrows] == ["<"]
+    left, right = ax.get_xlim()
+    assert 0 < left < base["low"] < base["high"] < right
+    notes = [text.get_text() for text in ax.texts]
+    assert notes == ["75.0%, n = 3", "60.0%, n = 1", "0.0%, n = 2"]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["base", "once", "lost"]
+    (line,) = [line for line in ax.lines if line.get_gid() == "baseline"]
+    assert set(line.get_xdata()) == {base["mean"]}
+
+
+def test_a_training_shows_its_evaluations_and_the_weights_kept():
+    curve = training("one", 1, [0.1, 0.2, 0.5, 0.4], before=1)
+    values = {name: curve["evaluation_reward"] / n for n, name in enumerate(METRICS, 1)}
+    curve = curve.assign(is_best=[True, False, True, False])
+    curve = curve.assign(**{f"evaluation_{name}": value for name, value in values.items()})
+    (ax,) = learning_figures.training(curve, "one").axes
+    for name, title in METRICS.items():
+        (last,) = [line for line in ax.lines if line.get_label() == title]
+        colour = to_hex(last.get_color())
+        own = [line for line in ax.lines if to_hex(line.get_color()) == colour]
+        drawn = np.concatenate([line.get_ydata() for line in own])
+        assert sorted(drawn) == sorted(curve[f"evaluation_{name}"])
+    (star,) = [line for line in ax.lines if line.get_marker() == "*"]
+    assert (star.get_xdata().tolist(), star.get_ydata().tolist()) == ([3000], [0.5 / 3])
+
+
+def test_figures_leave_no_state_behind(table):
+    before = dict(mpl.rcParams)
+    learning_figures.trainings(table, METRIC, LABELS)
+    assert dict(mpl.rcParams) == before

@@ -1,0 +1,196 @@
+"""What figures show is what happened."""
+
+from collections import Counter
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.quiver import Quiver
+
+import dess
+import policies
+from analysis.figures import missions
+from analysis.names import METRICS
+from analysis.results.event_log import uav_slots
+from dess.state import sample_scenario
+
+
+@pytest.fixture(scope="module")
+def mission() -> tuple[Any, pd.DataFrame, dess.Scenario]:
+    """A mission with moves, hovering, charging and a queue for the one pad."""
+    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1])
+    record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
+    return record, pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
+
+
+@pytest.fixture(scope="module")
+def parts(mission: Any) -> list[Axes]:
+    """Map, battery, residual data and occupancy of the mission's figure."""
+    _, log, scenario = mission
+    return missions.mission_figure(log, scenario).axes
+
+
+def drawn(ax: Axes, what: str) -> list[Any]:
+    """The artists of the map that are marked with a name, in the order of the UAVs."""
+    marked = [a for a in ax.collections if (a.get_gid() or "").startswith(what)]
+    return sorted(marked, key=lambda artist: artist.get_gid())
+
+
+def colours(artist: Any) -> list[str]:
+    return [to_hex(c) for c in artist.get_facecolor()]
+
+
+def test_every_move_is_an_arrow_in_the_colour_of_its_node(mission: Any, parts: Any) -> None:
+    _, log, scenario = mission
+    slots = uav_slots(log)
+    palette = [*missions.node_colours(len(scenario.nodes)), missions.MUTED]
+    arrows = drawn(parts[0], "moves")
+    assert len(arrows) == scenario.uavs
+    for uav, arrow in enumerate(arrows):
+        moves = slots[(slots["uav"] == uav) & slots["moved"]]
+        assert isinstance(arrow, Quiver)
+        assert arrow.N == len(moves) > 0
+        assert colours(arrow) == [palette[node] for node in moves["node"]]
+        assert np.array_equal(arrow.U, moves["x"] - moves["from_x"])
+        assert np.array_equal(arrow.V, moves["y"] - moves["from_y"])
+
+
+def test_crosses_hover_in_the_colour_of_their_node(mission: Any, parts: Any) -> None:
+    _, log, scenario = mission
+    slots = uav_slots(log)
+    palette = [*missions.node_colours(len(scenario.nodes)), missions.MUTED]
+    hovers = slots[~slots["moved"] & ~slots["charging"]]
+    seen = [c for cross in drawn(parts[0], "hovers") for c in colours(cross)]
+    assert seen == [palette[node] for node in hovers["node"]]
+    assert len(seen) > 0
+
+
+def test_stars_are_the_charging_slots(mission: Any, parts: Any) -> None:
+    record, _, _ = mission
+    stars = [len(star.get_offsets()) for star in drawn(parts[0], "charges")]
+    assert stars == record.uavs["slots_charging"].tolist()
+    assert sum(stars) > 0
+
+
+def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> None:
+    _, log, scenario = mission
+    (nodes,) = drawn(parts[0], "nodes")
+    assert np.array_equal(nodes.get_offsets(), scenario.nodes)
+    assert colours(nodes) == missions.node_colours(len(scenario.nodes))
+    x, y, width, height = scenario.zone
+    zone = parts[0].patches[0].get_bbox()
+    assert (zone.x0, zone.y0, zone.width, zone.height) == (x - 0.5, y - 0.5, width, height)
+    half = missions.SPREAD / 2
+    for event, name in (("mission_start", "start"), ("mission_end", "end")):
+        rows = log[(log["event"] == event) & (log["uav"] >= 0)]
+        spots = np.concatenate([mark.get_offsets() for mark in drawn(parts[0], name)])
+        assert np.allclose(spots, rows[["x", "y"]], atol=half)
+    top, bottom = parts[0].get_ylim()[::-1]
+    assert top < bottom  # y grows south
+
+
+def test_the_title_says_how_the_mission_ended(mission: Any, parts: Any) -> None:
+    record, _, scenario = mission
+    filled = [row["end"] for row in record.uav_rows()].count("quota")
+    assert 0 < filled < scenario.uavs
+    assert parts[0].get_title(loc="left") == (
+        f"I = 3: {record.collection_ratio:.1%} collected, {filled} of 3 quotas filled"
+    )
+
+
+def test_battery_ends_as_recorded(mission: Any, parts: Any) -> None:
+    record, _, scenario = mission
+    lines = {line.get_label(): line for line in parts[1].lines}
+    for uav, row in enumerate(record.uav_rows()):
+        line = lines[f"UAV {uav + 1}"]
+        assert line.get_ydata()[0] == record.flying_time
+        assert line.get_ydata()[-1] == row["battery"]
+    levels = {line.get_ydata()[0] for line in parts[1].lines if len(set(line.get_ydata())) == 1}
+    assert {scenario.charge_start, scenario.charge_complete} <= levels
+
+
+def test_residual_data_ends_as_recorded(mission: Any, parts: Any) -> None:
+    record, _, scenario = mission
+    (total,) = parts[2].lines
+    assert total.get_ydata()[0] == pytest.approx(record.initial)
+    assert total.get_ydata()[-1] == pytest.approx(record.residual)
+    assert [colours(band)[0] for band in parts[2].collections] == missions.node_colours(
+        len(scenario.nodes)
+    )
+
+
+def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) -> None:
+    record, log, scenario = mission
+    (steps,) = (line for line in parts[3].lines if line.get_gid() == "occupancy")
+    waiting = record.uavs["slots_waiting"].sum()
+    assert waiting > 0
+    assert steps.get_ydata().sum() == record.uavs["slots_charging"].sum() + waiting
+    busy = Counter(uav_slots(log).query("charging")["slot"])
+    assert max(busy.values()) <= scenario.pads
+
+
+def test_figures_leave_no_state_behind(mission: Any) -> None:
+    before = dict(mpl.rcParams)
+    _, log, scenario = mission
+    assert isinstance(missions.mission_figure(log, scenario), Figure)
+    assert dict(mpl.rcParams) == before
+    assert plt.get_fignums() == []
+
+
+@pytest.mark.parametrize("count", [1, 9, 25, 40])
+def test_neighbouring_nodes_differ_in_colour(count: int) -> None:
+    palette = missions.node_colours(count)
+    assert len(palette) == count
+    assert len(set(palette)) == min(count, 27)
+    assert all(a != b for a, b in zip(palette, palette[1:], strict=False))
+    columns = 5
+    assert all(a != b for a, b in zip(palette, palette[columns:], strict=False))
+
+
+def summary(by: dict[str, list[Any]]) -> pd.DataFrame:
+    """Rows as of ``analysis.summary``, with numbers of their own in every one."""
+    rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
+    mean = np.linspace(0.2, 0.8, len(rows))
+    return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
+
+
+@pytest.mark.parametrize("metric", METRICS)
+def test_performance_shows_means_intervals_and_the_printed_figure(metric: str) -> None:
+    table = summary({"policy": ["one", "two", "three"]})
+    (ax,) = missions.performance(table, metric, 0.55).axes
+    rows = table[table["metric"] == metric]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two", "three"]
+    for bar, (_, row) in zip(ax.containers, rows.iterrows(), strict=True):
+        assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
+        (arm,) = bar.lines[2]
+        assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
+    assert list(printed.get_xdata()) == [0.55, 0.55]
+    assert ax.get_title(loc="left") == METRICS[metric]
+
+
+def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
+    table = summary({"policy": ["one"] * 3 + ["two"] * 3, "uavs": [1, 2, 3] * 2})
+    (ax,) = missions.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
+    rows = table[table["metric"] == "success"]
+    assert len(ax.containers) == 2
+    for bar, (_, own) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
+        assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
+        assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper")
+    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
+
+
+def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> None:
+    everywhere = missions.policy_colours(pd.Series(missions.EVERYWHERE))
+    for names in (["ddqn", "mine", "greedy", "ddqn"], ["a", "b", "ddqn-paper"], ["b", "a"]):
+        looks = missions.policy_colours(pd.Series(names))
+        assert [*looks] == [*dict.fromkeys(names)]
+        assert len({*looks.values()}) == len(looks)
+        assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)

@@ -1,0 +1,101 @@
+"""What the figures of the verification show is in what they are given."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from scipy import stats
+
+from analysis.figures import verification as drawings
+from analysis.figures.verification import MISS, SEEN
+from analysis.verification import chance, closed_forms, lone_uav
+from dess import load_scenario
+
+SPACE = load_scenario("paper")
+TABLE = pd.DataFrame(
+    {"label": ["0", "1", "2 or more"], "observed": [901, 94, 5], "expected": [900.0, 80.0, 20.0]}
+)
+
+
+def dots(figure: Figure, panel: int, colour: str | None = None) -> np.ndarray:
+    """(N, 2) the dots of a panel, of all colours or of one."""
+    return np.concatenate(
+        [
+            np.asarray(group.get_offsets())
+            for group in figure.axes[panel].collections
+            if hasattr(group, "get_sizes")
+            and len(group.get_sizes())
+            and (colour is None or to_hex(group.get_facecolor()[0]) == colour)
+        ]
+    )
+
+
+def test_a_fit_shows_both_numbers_and_their_difference() -> None:
+    figure = drawings.fit(chance.Fit(TABLE, 0.1), "Title", "units")
+    bars = [bar.get_height() for bar in figure.axes[0].patches]
+    assert bars == TABLE["expected"].tolist()
+    assert dots(figure, 0)[:, 1].tolist() == TABLE["observed"].tolist()
+    share = TABLE["expected"] / 1000
+    z = (TABLE["observed"] - TABLE["expected"]) / np.sqrt(1000 * share * (1 - share))
+    assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
+    labels = [label.get_text() for label in figure.axes[1].get_xticklabels()]
+    assert labels == ["0", "1", "2\nor more"]
+
+
+def test_classes_that_are_far_off_are_marked() -> None:
+    figure = drawings.fit(chance.Fit(TABLE, 0.1), "Title", "units", logarithmic=True)
+    assert dots(figure, 1, MISS)[:, 0].tolist() == [2]
+    assert dots(figure, 1, SEEN)[:, 0].tolist() == [0, 1]
+    low, high = figure.axes[1].get_ylim()
+    assert low < dots(figure, 1)[:, 1].min() and high > dots(figure, 1)[:, 1].max()
+    assert figure.axes[0].get_yscale() == "log"
+
+
+def test_rates_stand_beside_their_curve() -> None:
+    table = lone_uav.rates(SPACE, 3)
+    figure = drawings.rates(table, SPACE)
+    assert dots(figure, 0) == pytest.approx(table[["distance", "mean"]].to_numpy())
+    (curve,) = figure.axes[0].lines
+    ends = [closed_forms.rate_moments(SPACE, d).mean for d in curve.get_xdata()[[0, -1]]]
+    assert curve.get_ydata()[[0, -1]] == pytest.approx(ends)
+    z = (table["mean"] - table["known"]) / table["error"]
+    assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
+
+
+def test_totals_are_bars_below_their_density() -> None:
+    values = stats.norm(5, 2).rvs(4000, random_state=1)
+    figure = drawings.totals(values, stats.norm(5, 2), "Title", "units")
+    bars = figure.axes[0].patches
+    assert sum(bar.get_height() * bar.get_width() for bar in bars) == pytest.approx(1)
+    (curve,) = figure.axes[0].lines
+    assert curve.get_ydata().max() == pytest.approx(stats.norm(5, 2).pdf(5), rel=1e-2)
+
+
+def test_blocks_that_miss_the_mean_are_marked() -> None:
+    values = np.random.default_rng(2).normal(size=900)
+    blocks = chance.blocks(values, 10, share=False)
+    figure = drawings.caterpillar(blocks, values.mean(), "Title")
+    own = blocks.head(drawings.SHOWN)
+    missing = own.index[~own["holds"]] + 1
+    assert len(missing) > 0
+    assert dots(figure, 0, MISS)[:, 0].tolist() == missing.tolist()
+    assert len(dots(figure, 0, SEEN)) == len(own) - len(missing)
+    assert dots(figure, 0, MISS)[:, 1] == pytest.approx(own.loc[~own["holds"], "mean"].to_numpy())
+
+
+def test_blocks_that_all_hold_it_are_drawn_too() -> None:
+    blocks = chance.blocks(np.ones(40), 10, share=True)
+    figure = drawings.caterpillar(blocks, 1.0, "Title")
+    assert len(dots(figure, 0)) == 4
+
+
+def test_the_order_of_events_goes_down_and_back_up() -> None:
+    steps = [("Start", "here"), ("First", "this"), ("Second", "that")]
+    figure = drawings.slot(steps, "again", "End")
+    texts = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
+    heights = [texts[name][1] for name in ("Start", "First", "Second", "End")]
+    assert heights == sorted(heights, reverse=True)
+    assert {"here", "this", "that", "again"} <= texts.keys()
+    (way,) = figure.axes[0].lines
+    assert way.get_ydata()[-1] > way.get_ydata()[0]

@@ -1,0 +1,180 @@
+"""What a parameter does is told by values that meet the same missions."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.names import PRODUCT, parameter
+from analysis.questions import main_effects
+from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
+from analysis.stats.intervals import mean_interval
+from analysis.stats.paired import adjust, paired
+from analysis.stats.verdict import HOLDS, OPEN, REFUTED
+from dess import InputError
+from tests.analysis.small import grid, small_study
+
+PRODUCT = PRODUCT
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    values = {"uavs": [1, 2], "initial_data": [[5, 7.5], 10, [2, 20]]}
+    design = {"kind": "one-at-a-time", "values": values}
+    return run_study(small_study(folder, design=design, missions=20), folder / "out")
+
+
+@pytest.fixture(scope="module")
+def table(results):
+    return main_effects.effects(results)
+
+
+def pairs_of(steps, sure=True, half=0.001, widened=2):
+    """All pairs of values with these steps between neighbours, all of them sure, or none."""
+    level = np.concatenate([[0.0], np.cumsum(steps)])
+    rows = [
+        (i, j, level[j] - level[i]) for i in range(len(level)) for j in range(i + 1, len(level))
+    ]
+    table = pd.DataFrame(rows, columns=["first", "second", "difference"])
+    p = np.where(sure & (table["difference"].abs() > half), 0.001, 1.0)
+    gap = table["difference"]
+    wide = widened * half
+    ends = {"low": gap - half, "high": gap + half, "wide_low": gap - wide, "wide_high": gap + wide}
+    return table.assign(**ends, p_adjusted=p)
+
+
+def test_effects_are_the_means_by_value(results, table):
+    named = table.drop_duplicates(["field", "position"])[["field", "position", "value"]]
+    assert named.to_numpy().tolist() == [
+        ["uavs", 0, "1"],
+        ["uavs", 1, "2"],
+        ["initial_data", 0, "5–7.5"],
+        ["initial_data", 1, "10"],
+        ["initial_data", 2, "2–20"],
+    ]
+    row = table.query("field == 'initial_data' and position == 2 and policy == 'random'")
+    ours = results.missions.query("point == 4 and policy == 'random'")
+    ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
+    assert tuple(ends) == mean_interval(ours["reward"])
+
+
+def test_a_design_of_several_fields_is_refused(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2], quota=[20, 30]), missions=2)
+    with pytest.raises(InputError, match="point 0: sets uavs, quota; allowed: one field"):
+        main_effects.effects(run_study(study, tmp_path / "out"))
+
+
+def test_changes_are_paired_by_replication(results, table):
+    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
+    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = ours.loc[4, "collection_ratio"] - ours.loc[3, "collection_ratio"]
+    ends = mean_interval(gaps)
+    assert pairs.loc[2, ["difference", "low", "high"]].tolist() == pytest.approx(list(ends))
+    assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
+    assert set(pairs["n"]) == {20}
+
+
+def test_intervals_that_hold_at_once_are_wider(results, table):
+    """By Bonferroni: three pairs, each at 1 - 0.05 / 3."""
+    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = ours.loc[4, "collection_ratio"] - ours.loc[3, "collection_ratio"]
+    _, low, high = mean_interval(gaps, 1 - 0.05 / 3)
+    assert pairs.loc[2, ["wide_low", "wide_high"]].tolist() == pytest.approx([low, high])
+    assert (pairs["wide_low"] < pairs["low"]).all() and (pairs["high"] < pairs["wide_high"]).all()
+
+
+def test_a_name_inside_a_sentence():
+    assert parameter("charge_start").within == "charging start capacity C_S"
+    assert parameter("quota").within == "quota"
+
+
+def test_successes_are_compared_as_shares(results, table):
+    """So that equal outcomes still have an interval."""
+    pairs = main_effects.changes(results, table, "greedy", "uavs", "success")
+    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    of = (ours.loc[point, "success"].to_numpy(float) for point in (1, 0))
+    expected = paired(*of, np.random.default_rng(1), share=True)
+    assert pairs.loc[0, ["low", "high"]].tolist() == pytest.approx([expected.low, expected.high])
+    assert expected.low < pairs.loc[0, "difference"] < expected.high
+
+
+@pytest.mark.parametrize(
+    ("steps", "words", "peaks"),
+    [
+        ([0, 0, 0], LEVELS, (0, 1, 2, 3)),
+        ([1, 0, 1], RISES, (3,)),
+        ([1, 0, 0], RISES, (1, 2, 3)),
+        ([0, -1, -1], FALLS, (0, 1)),
+        ([1, 1, -1], PEAK, (2,)),
+        ([1, 0, -1], PEAK, (1, 2)),
+        ([-1, -1, 1], VALLEY, ()),
+        ([1, -1, 1], IRREGULAR, ()),
+    ],
+)
+def test_shapes(steps, words, peaks):
+    assert main_effects.shape(pairs_of(steps)) == main_effects.Shape(words, peaks)
+    assert main_effects.shape(pairs_of(steps, sure=False)).words == LEVELS
+
+
+def test_many_small_steps_make_a_rise():
+    """No two neighbours differ, but the ends do."""
+    pairs = pairs_of([0.4, 0.4, 0.4], half=1.0)
+    assert pairs.loc[pairs["second"] - pairs["first"] == 1, "p_adjusted"].eq(1).all()
+    assert main_effects.shape(pairs).words == RISES
+
+
+def test_best_at():
+    assert main_effects.best_at(pairs_of([1, 1]), 2) == HOLDS
+    assert main_effects.best_at(pairs_of([1, -2]), 1) == HOLDS
+    assert main_effects.best_at(pairs_of([1, 1]), 1) == REFUTED
+    assert main_effects.best_at(pairs_of([1, 0]), 2) == OPEN  # as high as the one before
+    assert main_effects.best_at(pairs_of([1, 1], sure=False), 2) == OPEN
+
+
+def test_no_lower():
+    assert main_effects.no_lower(pairs_of([0, 0, 0]), [0, 1], 0.01) == HOLDS
+    assert main_effects.no_lower(pairs_of([0, -1, 0]), [0, 1], 0.01) == HOLDS
+    assert main_effects.no_lower(pairs_of([0, 1, 0]), [0, 1], 0.01) == REFUTED
+    assert main_effects.no_lower(pairs_of([0, -1, 0]), [2, 3], 0.01) == REFUTED
+    assert main_effects.no_lower(pairs_of([0, 0, 0], half=0.02), [0, 1], 0.01) == OPEN
+    assert main_effects.no_lower(pairs_of([1, 0, 0]), [0, 1], 0.01) == REFUTED  # the first is lower
+    assert (
+        main_effects.no_lower(pairs_of([0, 0.005, 0]), [0, 1], 0.01) == HOLDS
+    )  # by less than matters
+
+
+def test_no_lower_is_refuted_beyond_the_margin_alone():
+    """Surely lower, but perhaps by less than matters; or beyond, but not with all at once."""
+    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.015), [0, 1], 0.01) == OPEN
+    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.006), [0, 1], 0.01) == OPEN
+    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.004), [0, 1], 0.01) == REFUTED
+
+
+def test_alike():
+    assert main_effects.alike(pairs_of([0, 0.005]), 0.01) == HOLDS
+    assert main_effects.alike(pairs_of([0.005, 0.005]), 0.01) == OPEN  # it might be a little more
+    assert main_effects.alike(pairs_of([0, 0.05]), 0.01) == REFUTED
+    assert main_effects.alike(pairs_of([0, -0.05]), 0.01) == REFUTED
+
+
+def test_alike_is_refuted_beyond_the_margin_alone():
+    """The differences are sure, and by their means beyond the margin: that is not enough."""
+    assert main_effects.alike(pairs_of([0, 0.02], half=0.015), 0.01) == OPEN
+    assert main_effects.alike(pairs_of([0, 0.02], half=0.006), 0.01) == OPEN  # not all at once
+    assert main_effects.alike(pairs_of([0, 0.02], half=0.004), 0.01) == REFUTED
+
+
+def test_peaks_at():
+    assert main_effects.peaks_at(pairs_of([1, 1, -1]), 2) == HOLDS
+    assert main_effects.peaks_at(pairs_of([1, 1, -1]), 1) == REFUTED
+    assert main_effects.peaks_at(pairs_of([1, 1, 0]), 2) == OPEN  # nothing is seen to fall
+    assert main_effects.peaks_at(pairs_of([0, 0, 0]), 2) == OPEN
+
+
+def test_rises():
+    assert main_effects.rises(pairs_of([0, 1])) == HOLDS
+    assert main_effects.rises(pairs_of([0, 0])) == OPEN
+    assert main_effects.rises(pairs_of([0, -1])) == main_effects.rises(pairs_of([1, -1])) == REFUTED

@@ -1,0 +1,184 @@
+import warnings
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm
+
+from analysis.questions.sensitivity import METRICS, sensitivity
+from analysis.study.design import NOISE, Saltelli
+from dess import InputError
+from dess.record import MISSION_RECORD
+
+FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
+INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
+
+
+def noise_of(replication):
+    """A number in [0, 1) of a replication, as good as random (splitmix64)."""
+    z = np.asarray(replication, np.uint64) + np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return ((z ^ (z >> np.uint64(31))) >> np.uint64(11)) * 2.0**-53
+
+
+def unit(number, base, seed=0):
+    """A design of so many fields, each on [0, 1]."""
+    return Saltelli(ranges={field: [0, 1] for field in FIELDS[:number]}, base=base, seed=seed)
+
+
+def evaluated(design, **functions):
+    """A mission per point: its metrics are functions of the fields and of the noise."""
+    replication = [point.replication for point in design.points]
+    x = np.array([list(point.values.values()) for point in design.points]).T
+    metrics = {name: metric(*x, noise_of(replication)) for name, metric in functions.items()}
+    return pd.DataFrame({"point": range(len(replication)), "replication": replication} | metrics)
+
+
+def ishigami(x, y, z, noise):
+    return np.sin(x) + 7 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+
+def test_ishigami():
+    design = Saltelli(ranges={field: [-np.pi, np.pi] for field in FIELDS}, base=2048)
+    table = sensitivity(design, evaluated(design, y=ishigami), ["y"])
+    assert table["parameter"].tolist() == [*FIELDS, NOISE]
+    first, total = [0.3139, 0.4424, 0.0, 0.0], [0.5576, 0.4424, 0.2437, 0.0]
+    assert table["first"].to_numpy() == pytest.approx(first, abs=0.02)
+    assert table["total"].to_numpy() == pytest.approx(total, abs=0.02)
+    assert table["first"].between(table["first_low"], table["first_high"]).all()
+    assert table["total"].between(table["total_low"], table["total_high"]).all()
+    # The replication changes nothing here, and that is found exactly.
+    assert (table.loc[3, INDICES] == 0).all()
+
+
+# x, y and the noise e are uniform on [0, 1]: each has variance 1/12.
+KNOWN = {
+    # Variances 1 : 4. Nothing interacts, so total = first.
+    "additive": (lambda x, e: x + 2 * e, [1 / 5, 4 / 5], [1 / 5, 4 / 5]),
+    "two fields": (
+        lambda x, y, e: x + 2 * y + 3 * e,
+        [1 / 14, 4 / 14, 9 / 14],
+        [1 / 14, 4 / 14, 9 / 14],
+    ),
+    # Variance E[x^2] / 12 = 1/36. The mean does not depend on x: its first is 0.
+    # E[. | e] = (e - 1/2) / 2 has variance 1/48, 3/4 of it; all of it is gone once e is known.
+    "spread": (lambda x, e: x * (e - 1 / 2), [0, 3 / 4], [1 / 4, 1]),
+    # A success with probability x: variance 1/4, of which E[. | x] = x explains 1/12, as does
+    # E[. | e] = 1 - e.
+    "success": (lambda x, e: (e < x).astype(int), [1 / 3, 1 / 3], [2 / 3, 2 / 3]),
+}
+
+
+@pytest.mark.parametrize("case", KNOWN)
+def test_known_shares_of_parameters_and_noise(case):
+    function, first, total = KNOWN[case]
+    design = unit(len(first) - 1, base=2048)
+    table = sensitivity(design, evaluated(design, y=function), ["y"], level=0.999)
+    for index, truth in (("first", first), ("total", total)):
+        low, high = table[f"{index}_low"], table[f"{index}_high"]
+        assert ((low <= truth) & (truth <= high)).all()
+        assert (high - low < 0.25).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", [0.8, 0.95])
+@pytest.mark.parametrize("case", KNOWN)
+def test_intervals_cover_what_they_claim(case, level):
+    function, *truths = KNOWN[case]
+    runs = 600
+    hits = np.zeros((2, len(truths[0])))
+    for seed in range(runs):
+        design = unit(len(truths[0]) - 1, base=256, seed=seed)
+        missions = evaluated(design, y=function)
+        table = sensitivity(design, missions, ["y"], level=level, resamples=200, seed=seed)
+        for row, (index, truth) in enumerate(zip(("first", "total"), truths, strict=True)):
+            hits[row] += (table[f"{index}_low"] <= truth) & (truth <= table[f"{index}_high"])
+    # Four standard errors of the binomial. Intervals of smooth parameters are wider than need be:
+    # the design is more even than the resamples know. The noise has no such help.
+    error = 4 * np.sqrt(level * (1 - level) / runs)
+    assert (hits / runs > level - error).all()
+    assert hits[0, -1] / runs < level + error
+
+
+def test_the_table_is_tidy():
+    assert set(METRICS) < set(MISSION_RECORD.names)
+    design = unit(2, base=16)
+    missions = evaluated(design, **{m: lambda x, y, e: x + e for m in METRICS})
+    table = sensitivity(design, missions)
+    assert list(table.columns) == ["metric", "parameter", *INDICES, "n"]
+    assert table["metric"].tolist() == [metric for metric in METRICS for _ in range(3)]
+    assert table["parameter"].tolist() == ["edge_snr", "arrival_rate", NOISE] * len(METRICS)
+    assert (table["n"] == 16 * 5).all()
+
+
+def test_intervals_are_symmetric_and_scale_with_the_level():
+    design = unit(2, base=64)
+    missions = evaluated(design, y=lambda x, y, e: x * y + e)
+    narrow, wide = (sensitivity(design, missions, ["y"], level=level) for level in (0.5, 0.99))
+    for index in ("first", "total"):
+        half = wide[f"{index}_high"] - wide[index]
+        assert (half > 0).all()
+        assert half.to_numpy() == pytest.approx((wide[index] - wide[f"{index}_low"]).to_numpy())
+        ratio = half / (narrow[f"{index}_high"] - narrow[index])
+        assert ratio.to_numpy() == pytest.approx(norm.ppf(0.995) / norm.ppf(0.75))
+
+
+def test_a_metric_without_variance_has_no_shares():
+    design = unit(2, base=16)
+    missions = evaluated(
+        design,
+        always=lambda x, y, e: np.ones(x.size),
+        tenth=lambda x, y, e: np.full(x.size, 0.1),
+        # Only outside of A and B, which measure the variance.
+        elsewhere=lambda x, y, e: np.arange(x.size) % 5 == 2,
+        y=lambda x, y, e: x + e,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        table = sensitivity(design, missions, ["always", "tenth", "elsewhere", "y"])
+    assert table.loc[table["metric"] != "y", INDICES].isna().all(axis=None)
+    assert table.loc[table["metric"] == "y", INDICES].notna().all(axis=None)
+
+
+@pytest.mark.parametrize("point", range(5))
+def test_a_single_failure_is_no_trouble(point):
+    design = unit(2, base=16)
+    missions = evaluated(design, success=lambda x, y, e: np.arange(x.size) != point)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        table = sensitivity(design, missions, ["success"])
+    assert table[INDICES].isna().all(axis=None) == (point not in (0, 4))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_intervals_depend_on_their_seed_alone(seed):
+    design = unit(1, base=64)
+    missions = evaluated(design, other=lambda x, e: x * e, y=lambda x, e: x + e)
+    np.random.seed(1)
+    alone = sensitivity(design, missions, ["y"], seed=seed)
+    np.random.seed(2)
+    both = sensitivity(design, missions, ["other", "y"], seed=seed)
+    pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
+    others = sensitivity(design, missions, ["y"], seed=seed + 1)
+    estimates = ["first", "total"]
+    pd.testing.assert_frame_equal(alone[estimates], others[estimates])
+    assert (alone["first_low"] != others["first_low"]).all()
+
+
+WRONG = {
+    "too few": lambda missions: missions.iloc[:-1],
+    "two policies": lambda missions: pd.concat([missions, missions]),
+    "another order": lambda missions: missions.iloc[::-1],
+    "another design": lambda missions: missions.assign(replication=missions["replication"] + 1),
+    "none": lambda missions: missions.iloc[:0],
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_missions_must_be_those_of_the_design(wrong):
+    design = unit(1, base=4)
+    missions = WRONG[wrong](evaluated(design, y=lambda x, e: x + e))
+    with pytest.raises(InputError, match="one for each of its 16 points") as error:
+        sensitivity(design, missions, ["y"])
+    assert "\n" not in str(error.value)

@@ -1,0 +1,132 @@
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import compare, run_study
+from analysis.names import PRODUCT
+from analysis.questions import summary
+from analysis.stats.intervals import mean_interval
+from dess import simulate
+from policies import load, load_team
+from policies.ddqn.checkpoint import save_policy
+from policies.ddqn.training import Training
+from reports import cli
+from tests.analysis.small import grid, small_study, write_scenario
+from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    study = small_study(folder, design=grid(uavs=[1, 2], quota=[20, 60]), missions=20)
+    return run_study(study, folder / "out")
+
+
+def test_means_are_of_a_policy_at_a_point(results):
+    table = summary.means(results).set_index(["policy", "point", "metric"])
+    cell = results.missions.query("policy == 'random' and point == 2")
+    ends = ["mean", "low", "high"]
+    assert tuple(table.loc[("random", 2, "reward"), ends]) == mean_interval(cell["reward"])
+    assert len(table) == 2 * 4 * 4
+
+
+def test_settings_are_in_words(results, tmp_path):
+    assert summary.settings(results)[1:3] == ["uavs 1, quota 60", "uavs 2, quota 20"]
+    design = grid(initial_data=[5, [5, 7.5]])
+    study = small_study(tmp_path, missions=1, design=design)
+    words = summary.settings(run_study(study, tmp_path / "out"))
+    assert words == ["initial_data 5", "initial_data 5..7.5"]
+
+
+def test_the_worst_missions_come_with_commands_that_replay_them(results, tmp_path, capsys):
+    table = summary.worst(results, "random", 3)
+    ours = results.missions.query("policy == 'random'")
+    assert table[PRODUCT].tolist() == sorted(ours[PRODUCT])[:3]
+    for row in table.itertuples():
+        space = results.scenario(row.point)
+        alone = simulate(space, load_team("random"), 7, row.replication)
+        assert alone.metrics["reward"] == row.reward
+        words = row.command.split()
+        assert words[:2] == ["dess", "simulate"]
+        assert words[-2:] == ["--replication", str(row.replication)]
+
+
+def test_a_replay_command_gives_the_row(results, tmp_path, monkeypatch, capsys):
+    small_study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    worst = summary.worst(results, "random", 1).iloc[0]
+    assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
+    told = capsys.readouterr().out
+    assert f'"collection_ratio": {float(worst["collection_ratio"])!r}' in told
+
+
+def test_the_best_policy_is_compared_with_the_others(results):
+    best = summary.best_policy(results)
+    table = summary.comparisons(results).set_index("metric")
+    assert set(table["baseline"]) == {best} == {"greedy"}
+    assert (table["policy"] == "random").all()
+    missions = results.missions.groupby("policy")[PRODUCT].mean()
+    expected = missions["random"] - missions["greedy"]
+    assert table.loc[PRODUCT, "difference"] == pytest.approx(expected)
+    assert table.loc[PRODUCT, "n"] == 20  # replications: points share their sea
+    alone = compare(results.missions, "greedy", np.random.default_rng(7), table.index.tolist())
+    either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
+    assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
+
+
+def test_one_policy_is_compared_with_nothing(tmp_path):
+    study = small_study(tmp_path, policies=["greedy"])
+    results = run_study(study, tmp_path / "out")
+    assert summary.comparisons(results).empty
+    assert summary.learned_against_heuristic(results).empty
+    assert summary.selections(results).empty
+
+
+@pytest.fixture
+def trained_twice(tmp_path):
+    """Folders of two trainings that differ in their seed, and of one that does not learn alike."""
+    scenario, folders = str(write_scenario(tmp_path)), []
+    for seed, discount in ((1, 0.99), (2, 0.99), (1, 0.9)):
+        phases = [PHASES[1] | {"ticks": 3}]
+        config = tiny(scenario=scenario, seed=seed, discount=discount, prefill=5, phases=phases)
+        training = Training(config, CPU)
+        training.run(2)
+        folders.append(str(tmp_path / f"{seed}-{discount}"))
+        weights = training.learner.online.state_dict()
+        save_policy(Path(folders[-1]), weights, config, training.space)
+    return folders
+
+
+def test_checkpoints_of_one_learner_are_one_learner(tmp_path, trained_twice):
+    first, second, other = trained_twice
+    assert load(first).learner == load(second).learner != load(other).learner
+    policies = ["greedy", "random", first, second]
+    results = run_study(small_study(tmp_path, policies=policies), tmp_path / "out")
+    assert summary.learners(results) == {"tiny": [first, second]}
+    policies = ["greedy", first, other, f"{first},greedy"]
+    mixed = run_study(small_study(tmp_path, policies=policies), tmp_path / "mixed")
+    assert sorted(summary.learners(mixed).values()) == sorted([[first], [other]])
+    table = summary.learned_against_heuristic(results)
+    assert set(table["about"]) == {"the learner"}
+    assert set(table["trainings"]) == {2}
+    alone = run_study(small_study(tmp_path, policies=["greedy", first]), tmp_path / "alone")
+    assert set(summary.learned_against_heuristic(alone)["about"]) == {"this checkpoint"}
+
+
+def test_what_was_selected_and_its_check(tmp_path):
+    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 2000, "check": 9}
+    study = small_study(tmp_path, selection=rule, design=grid(quota=[20, 40, 80]))
+    results = run_study(study, tmp_path / "out")
+    table = summary.selections(results)
+    assert table["policy"].tolist() == ["greedy", "random"]
+    for row in table.itertuples():
+        assert row.setting == f"quota {study.points[row.point].values['quota']}"
+        counts = results.missions.query("policy == @row.policy").groupby("point").size()
+        assert row.missions == counts.sum()
+    checks = summary.checks(results).set_index(["policy", "metric"])
+    assert set(checks["n"]) == {9}
+    mine = results.checks.query("policy == 'greedy'")["reward"]
+    assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(mine))
+    assert summary.comparisons(results).empty  # each policy has missions of its own

@@ -1,0 +1,397 @@
+"""The scorecard says what the results say, whatever results there are."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import fly, load_study, run_study
+from analysis.names import METRICS, PRODUCT
+from analysis.questions import main_effects, node_shares
+from analysis.replication import claims, paper
+from analysis.replication import scorecard as module
+from analysis.replication.rules import NO_RESULTS, VERDICTS
+from analysis.replication.scorecard import Row, departures, of_policy, scorecard
+from analysis.results.tables import Results
+from analysis.stats.intervals import Interval, summary
+from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED
+from policies.registry import TRAINED
+from tests.analysis.small import grid, small_study
+
+NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
+POLICIES = ["greedy", "ddqn"]
+RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
+NONE = pd.DataFrame()
+
+
+@pytest.fixture(scope="module")
+def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
+    """Tiny results of all studies that are read."""
+    folder = tmp_path_factory.mktemp("results")
+    corners = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
+    changes = {
+        "table4": {"missions": 30},
+        "fig4": {"missions": 4},
+        "fig5": {"missions": 3},
+        "sweet-spot": {"selection": RULE, "design": corners},
+    }
+    return {
+        name: run_study(load_study(name, policies=POLICIES, **own), folder / name)
+        for name, own in changes.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def trainings() -> pd.DataFrame:
+    """Learning with transfer surely wins, in trainings as long as the paper's."""
+    return trained({module.VARIANTS[0]: (0.8, 0.8), module.VARIANTS[1]: (0.4, 0.4)})
+
+
+def trained(tops: dict[str, tuple[float, float]], length: int = 2 * paper.CROSSING) -> pd.DataFrame:
+    """Three trainings of each variant, from one level to another."""
+    rows = [
+        {
+            "variant": variant,
+            "seed": seed,
+            "phase": "battery",
+            "updates": length * step // 8,
+            "evaluation_reward": np.interp(step, (1, 8), ends) + seed / 1000,
+            f"evaluation_{PRODUCT}": np.interp(step, (1, 8), ends) + seed / 1000,
+        }
+        for variant, ends in tops.items()
+        for seed in (1, 2, 3)
+        for step in range(1, 9)
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="module")
+def rows(studies: dict[str, Results], trainings: pd.DataFrame) -> list[Row]:
+    return scorecard(studies, trainings, flights=2)
+
+
+def row_of(rows: list[Row], words: str) -> Row:
+    (row,) = (row for row in rows if words in row.claim)
+    return row
+
+
+def changed(results: Results, **values: object) -> Results:
+    """The same missions of ddqn with other figures."""
+    of_policy = results.missions["policy"] == "ddqn"
+    missions = results.missions.copy()
+    for column, value in values.items():
+        missions[column] = missions[column].mask(of_policy, value).astype(float)
+    return replace(results, missions=missions)
+
+
+def with_uavs(results: Results, metric: str, values: dict[int, float]) -> Results:
+    """The same missions with a metric that the number of UAVs alone decides."""
+    return changed(results, **{metric: results.missions["uavs"].map(values)})
+
+
+def test_every_claim_is_told_whole(rows: list[Row]) -> None:
+    assert len(rows) >= 25
+    assert len({row.claim for row in rows}) == len(rows)
+    for row in rows:
+        assert row.part and row.place and row.rule.count("olds if") >= 1
+        page, _, section = row.evidence.partition(".html#")
+        assert f'<a id="{section}"></a>' in (NOTEBOOKS / f"{page}.py").read_text()
+        assert {row.learned.verdict, row.papers_network.verdict} <= {*VERDICTS}
+
+
+def test_every_claim_has_a_verdict_by_the_learned_policy(rows: list[Row]) -> None:
+    for row in rows:
+        assert row.learned.verdict != NO_RESULTS, row.learned.note
+        assert row.learned.quantities
+        assert row.learned.policy == ("" if row.part.startswith("Fig. 3") else "ddqn")
+
+
+def test_the_papers_network_has_none_where_the_study_lacks_it(rows: list[Row]) -> None:
+    for row in rows:
+        assert row.papers_network.verdict == NO_RESULTS
+        if row.part.startswith("Fig. 3"):
+            assert row.papers_network.note.startswith("no trainings of this policy")
+        else:
+            assert "has no policy ddqn-paper" in row.papers_network.note
+
+
+def test_it_is_the_same_every_time(
+    rows: list[Row], studies: dict[str, Results], trainings: pd.DataFrame
+) -> None:
+    assert scorecard(dict(reversed(studies.items())), trainings, flights=2) == rows
+
+
+def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:
+    empty = scorecard({}, NONE)
+    assert [row.claim for row in empty] == [row.claim for row in rows]
+    for row in empty:
+        for finding in (row.learned, row.papers_network):
+            assert finding.verdict == NO_RESULTS and finding.note
+
+
+@pytest.mark.parametrize("name", ["table4", "fig4", "fig5", "sweet-spot"])
+def test_a_study_alone_is_judged_alone(
+    studies: dict[str, Results], rows: list[Row], name: str
+) -> None:
+    margin = module.margin(studies)
+    alone = scorecard({name: studies[name]}, NONE, flights=2)
+    judged = [row for row in alone if row.learned.verdict != NO_RESULTS]
+    assert judged
+    for row in judged:
+        if "point" not in row.rule or margin == 0.01:  # the margin is the sweet spot's
+            assert row.learned == row_of(rows, row.claim).learned
+
+
+def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
+    assert "2 points" in row_of(rows, "All values of C_C").rule
+    assert "within 1 point;" in row_of(scorecard({}, NONE), "All values of C_C").rule
+
+
+def test_printed_figures_are_beside_our_means(rows: list[Row], studies: dict[str, Results]) -> None:
+    own = studies["table4"].missions.query("policy == 'ddqn'")
+    means = summary(own).set_index("metric")
+    for metric, name in METRICS.items():
+        row = row_of(rows, f"{name} over random")
+        assert row.printed[0].value == paper.TABLE_IV[metric]
+        assert (row.printed[0].low is not None) == (metric == "success")  # a share of missions
+        (ours,) = row.learned.quantities
+        assert [*ours.interval, ours.n] == means.loc[metric, ["mean", "low", "high", "n"]].tolist()
+    low, high = means.loc["collection_ratio", ["low", "high"]]
+    against = row_of(rows, "Collection ratio over random").learned.against
+    assert against == paper.verdict(low, high, paper.TABLE_IV["collection_ratio"])
+
+
+@pytest.mark.parametrize(("ratio", "verdict"), [(0.9, HOLDS), (0.76, IN_PART), (0.5, REFUTED)])
+def test_other_figures_turn_verdicts(
+    studies: dict[str, Results], ratio: float, verdict: str
+) -> None:
+    table4 = changed(studies["table4"], success=1, collection_ratio=ratio)
+    found = scorecard({"table4": table4}, NONE)
+    assert row_of(found, "Collection ratio over random").learned.verdict == verdict
+    assert row_of(found, "Successful communication over random").learned.verdict == HOLDS
+
+
+def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
+    """Half of them collect nothing: the interval reaches far to both sides of the paper's."""
+    halves = studies["table4"].missions["replication"] % 2
+    table4 = changed(studies["table4"], success=halves, collection_ratio=halves)
+    found = scorecard({"table4": replace(table4, missions=table4.missions.head(60))}, NONE)
+    assert row_of(found, "Successful communication over").learned.verdict == REFUTED
+    wide = changed(studies["table4"], collection_ratio=halves * 0.4 + 0.6)
+    few = wide.missions[wide.missions["replication"] < 6]
+    found = scorecard({"table4": replace(wide, missions=few)}, NONE)
+    assert row_of(found, "Collection ratio over").learned.verdict == OPEN
+
+
+def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
+    alone = studies["table4"].missions.query("replication == 0")
+    for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
+        assert row.learned.verdict == (OPEN if row.part.startswith("Table IV") else NO_RESULTS)
+
+
+def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
+    all_of_it = changed(studies["table4"], collection_ratio=1)
+    row = row_of(scorecard({"table4": all_of_it}, NONE), "below 100 %")
+    assert row.learned.verdict == REFUTED
+
+
+@pytest.mark.parametrize(
+    ("ratios", "dramatic", "further", "best"),
+    [
+        ({1: 0.6, 2: 0.9, 3: 0.95}, HOLDS, HOLDS, HOLDS),
+        ({1: 0.6, 2: 0.7, 3: 0.69}, IN_PART, REFUTED, REFUTED),
+        ({1: 0.6, 2: 0.5, 3: 0.6}, REFUTED, HOLDS, OPEN),
+    ],
+)
+def test_what_one_more_uav_changes(
+    studies: dict[str, Results],
+    ratios: dict[int, float],
+    dramatic: str,
+    further: str,
+    best: str,
+) -> None:
+    fig4 = with_uavs(studies["fig4"], "collection_ratio", ratios)
+    fig4 = with_uavs(fig4, PRODUCT, ratios)
+    # Few missions leave doubts that equal differences of many do not.
+    many = pd.concat(
+        [fig4.missions.assign(replication=fig4.missions["replication"] + 4 * k) for k in range(9)]
+    )
+    found = scorecard({"fig4": replace(fig4, missions=many)}, NONE, flights=1)
+    assert row_of(found, "dramatically").learned.verdict == dramatic
+    assert row_of(found, "further").learned.verdict == further
+    assert row_of(found, "All else given").learned.verdict == best
+    change = row_of(found, "dramatically").learned.quantities[0]
+    assert change.value == pytest.approx(ratios[2] - ratios[1])
+    assert row_of(found, "dramatically").printed[0].value == pytest.approx(0.894 - 0.634)
+
+
+def test_verdicts_on_parameters_are_those_of_their_page(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    fig5 = studies["fig5"]
+    table = main_effects.effects(fig5)
+
+    def pairs(field: str, metric: str) -> pd.DataFrame:
+        return main_effects.changes(fig5, table, "ddqn", field, metric)
+
+    expected = {
+        "best with three UAVs": main_effects.best_at(pairs("uavs", PRODUCT), 2),
+        "no lower at C_S": main_effects.no_lower(pairs("charge_start", "success"), [0, 1], 0.02),
+        "All values of C_C": main_effects.alike(pairs("charge_complete", PRODUCT), 0.02),
+        "More initial data": main_effects.peaks_at(pairs("initial_data", PRODUCT), 4),
+        "More flying time": main_effects.rises(pairs("flying_time", PRODUCT)),
+    }
+    for words, verdict in expected.items():
+        assert row_of(rows, words).learned.verdict == verdict
+
+
+def test_any_policy_is_judged_by_the_same_rules(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    own = of_policy(studies, "ddqn", claims.FIG_5)
+    expected = [row for row in rows if row.part == claims.FIG_5]
+    assert [finding for _, finding in own] == [row.learned for row in expected]
+    others = of_policy(studies, "greedy", claims.FIG_5)
+    assert {finding.policy for _, finding in others} == {"greedy"}
+
+
+def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:
+    means = studies["fig5"].missions.query("policy == 'ddqn'").groupby("point")
+    product, ratio = means[PRODUCT].mean()[:3], means["collection_ratio"].mean()[:3]  # 1, 2, 3 UAVs
+    ahead = row_of(rows, "best with three UAVs").learned.quantities[0]
+    assert ahead.value == pytest.approx(product[2] - max(product[:2]))
+    below = row_of(rows, "A lone UAV is an extreme").learned.quantities[0]
+    assert below.value == pytest.approx(min(ratio[1:]) - ratio[0])
+
+
+def test_the_sweet_spot_is_judged_by_its_check(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    sweet = studies["sweet-spot"]
+    checks = sweet.checks.query("policy == 'ddqn'")
+    row = row_of(rows, "Collection ratio with every parameter")
+    assert row.learned.quantities[0].value == checks["collection_ratio"].mean()
+    assert row.learned.quantities[0].n == RULE["check"]
+    choice = sweet.choice("ddqn")
+    assert choice is not None
+    chosen = row_of(rows, "sweet spot is one of").learned.quantities[0]
+    assert chosen.value == sweet.store.manifest.points[choice.best].values["uavs"]
+    unchecked = replace(sweet, checks=sweet.checks[:0])
+    found = row_of(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
+    assert found.learned.verdict == NO_RESULTS
+
+
+def test_where_they_fly_is_seen_by_flying_again(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    """Points 0 and 1 have one and two UAVs; two missions of each are flown."""
+    alone, two = (
+        [fly(studies["fig4"], "ddqn", point, number) for number in (0, 1)] for point in (0, 1)
+    )
+    nodes = np.array(alone[0].scenario.nodes)
+    far = node_shares.far_edges(nodes)
+    left = [node_shares.left_behind(flight.events, 1, 25) for flight in alone]
+    still = [node_shares.left_behind(flight.events, 2, 25) for flight in two]
+    data = [node_shares.collected(flight.events, 2, 25) for flight in two]
+    charges = [(flight.events["event"] == "charge_start").sum() for flight in alone]
+
+    def values(words: str) -> list[float]:
+        return [quantity.value for quantity in row_of(rows, words).learned.quantities]
+
+    assert values("charges once") == [np.mean(np.array(charges) == 1)]
+    expected = np.mean(left, axis=0)
+    assert values("ignores the leftmost") == pytest.approx(
+        [expected[far].mean(), expected[~far].mean()]
+    )
+    reached = 1 - np.mean(still, axis=0)[far].mean()
+    more = reached - (1 - expected[far].mean())
+    assert values("reach the nodes far") == pytest.approx([more, reached])
+    own, chance, most = values("two sectors")
+    assert own == pytest.approx(np.mean([node_shares.sectors(each, nodes) for each in data]))
+    assert most == pytest.approx(np.mean([node_shares.division(each) for each in data]))
+    assert 0.5 < chance < own
+
+
+def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
+    higher, passes, levels = (row for row in rows if row.part.startswith("Fig. 3"))
+    assert higher.learned.verdict == passes.learned.verdict == levels.learned.verdict == HOLDS
+    assert passes.learned.quantities[0].value == pytest.approx(0.4)
+    assert higher.learned.note == "trainings quick and no transfer: above at every step"
+
+
+def test_learning_that_fails_is_told() -> None:
+    """It ends below, and what it should beat levels off, but not low."""
+    using, without = module.VARIANTS
+    curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
+    *both, levels = (row for row in scorecard({}, curves) if row.part.startswith("Fig. 3"))
+    assert [row.learned.verdict for row in both] == [REFUTED, REFUTED]
+    assert levels.learned.verdict == IN_PART
+
+
+@pytest.mark.parametrize("tops", [(0.8, 0.4), (0.4, 0.8)])
+def test_short_trainings_cannot_tell(tops: tuple[float, float]) -> None:
+    curves = trained({v: (0, top) for v, top in zip(module.VARIANTS, tops, strict=True)}, 12_000)
+    found = [row.learned for row in scorecard({}, curves) if row.part.startswith("Fig. 3")]
+    assert [each.verdict for each in found] == 3 * [OPEN]
+    assert all(each.note.endswith("too short to tell") for each in found)
+
+
+def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
+    """Of several learners that with the higher product, never a heuristic."""
+    study = load_study("table4", policies=["greedy", "ddqn", "ddqn-paper"], missions=2)
+    table4 = run_study(study, tmp_path / "table4")
+    row = row_of(scorecard({"table4": table4}, NONE), "Collection ratio over")
+    assert (row.learned.policy, row.papers_network.policy) == ("ddqn", "ddqn-paper")
+    poor = changed(table4, **{PRODUCT: 0.0})
+    row = row_of(scorecard({"table4": poor}, NONE), "Collection ratio over")
+    assert row.learned == row.papers_network and row.learned.policy == "ddqn-paper"
+
+
+def test_without_a_learned_policy_there_are_no_results(tmp_path: Path) -> None:
+    study = load_study("table4", policies=["greedy"], missions=4)
+    for row in scorecard({"table4": run_study(study, tmp_path / "table4")}, NONE):
+        assert row.learned.verdict == row.papers_network.verdict == NO_RESULTS
+        if row.part.startswith("Table IV"):
+            assert row.learned.note == "the study table4 has no learned policy"
+
+
+def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
+    """One number of UAVs, two fields at a time, a single mission."""
+    designs = {"fig4": grid(uavs=[2], flying_time=[70, 80]), "fig5": grid(uavs=[2])}
+    changes = {"policies": ["ddqn"], "missions": 1}
+    others = {
+        name: run_study(load_study(name, design=design, **changes), tmp_path / name)
+        for name, design in designs.items()
+    }
+    found = scorecard(others, NONE, flights=1)
+    assert row_of(found, "dramatically").learned.verdict == NO_RESULTS
+    assert row_of(found, "best with three UAVs").learned.verdict == NO_RESULTS
+    assert row_of(found, "two sectors").learned.verdict in VERDICTS
+    small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
+    assert all(row.learned.verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
+
+
+def test_missions_that_fly_otherwise_now_are_no_evidence(studies: dict[str, Results]) -> None:
+    fig4 = changed(studies["fig4"], reward=0)
+    row = row_of(scorecard({"fig4": fig4}, NONE, flights=1), "two sectors")
+    assert row.learned.verdict == NO_RESULTS and row.learned.note
+
+
+def test_what_the_paper_names(rows: list[Row]) -> None:
+    assert "15–17.5" in row_of(rows, "More initial data").claim
+    crossing = row_of(rows, "passes that without").printed[0]
+    assert crossing.interval == Interval(*3 * [paper.CROSSING])
+
+
+def test_what_of_the_paper_s_network_is_ours() -> None:
+    config = json.loads((TRAINED / module.PAPERS_NETWORK / "config.json").read_text("utf-8"))
+    training = config["training"]
+    words = ", ".join(departures(training))
+    assert "return guard" in words and f"{training['steps']}-step returns" in words
+    assert f"{training['lanes']} missions" in words and "early returns" not in words
+    papers = {"guard": False, "steps": 1, "lanes": 1, "average_rate": 1.0, "loss": "mse"}
+    softmax = {"phases": [{"temperature": 0.1}]}
+    assert departures(training | papers | softmax) == []

@@ -1,0 +1,102 @@
+"""The tables of an event log agree with the record of the same mission."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+
+import dess
+import policies
+from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
+from tests import drawn
+
+# A queue for one pad; an odd number of communication slots; a mission that is truncated.
+CASES: list[dict[str, Any]] = [
+    {},
+    {"pads": 1, "zone": [26, 2, 4, 1]},
+    {"uavs": 3, "pads": 1, "communication_slots": 3, "quota": 700, "max_slots": 200},
+]
+
+
+def logged(policy: str, replication: int = 0, **fields: Any) -> tuple[Any, pd.DataFrame]:
+    """The record of a mission of the ``fig4`` scenario, and its event log."""
+    space = dess.load_scenario("fig4", **fields)
+    record = dess.simulate(space, policies.load(policy), 1, replication, events=True)
+    return record, pd.DataFrame(record.events.columns())
+
+
+def assert_agree(record: Any, log: pd.DataFrame) -> None:
+    slots = uav_slots(log)
+    own = slots.groupby("uav")
+    assert own["charging"].sum().tolist() == record.uavs["slots_charging"].tolist()
+    assert own["waiting"].sum().tolist() == record.uavs["slots_waiting"].tolist()
+    flying = (~slots["charging"]).groupby(slots["uav"]).sum()
+    assert flying.tolist() == record.uavs["slots_flying"].tolist()
+    assert own["battery"].last().tolist() == record.uavs["battery"].tolist()
+    assert not (slots["charging"] & (slots["waiting"] | slots["moved"])).any()
+    assert duration(log) == record.slots == slots["slot"].max() + 1
+    end = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
+    assert np.allclose(residual_data(log).iloc[-1], end["value"], atol=1e-9, rtol=0)
+
+
+@pytest.mark.parametrize("fields", CASES)
+@pytest.mark.parametrize("policy", ["greedy", "random"])
+def test_tables_agree_with_the_record(policy: str, fields: dict[str, Any]) -> None:
+    record, log = logged(policy, **fields)
+    assert_agree(record, log)
+    if fields:
+        assert record.uavs["slots_waiting"].sum() > 0  # the case is the one it is meant to be
+
+
+@given(drawn.spaces(), drawn.seeds)
+def test_tables_agree_on_any_scenario(space: dess.ScenarioSpace, seed: int) -> None:
+    record = dess.simulate(space, policies.load("random"), seed, events=True)
+    assert_agree(record, pd.DataFrame(record.events.columns()))
+
+
+def test_steps_are_one_cell_long_and_join() -> None:
+    slots = uav_slots(logged("greedy", uavs=3)[1])
+    length = (slots["x"] - slots["from_x"]).abs() + (slots["y"] - slots["from_y"]).abs()
+    assert (length == slots["moved"]).all()
+    for _, own in slots.groupby("uav"):
+        assert own["slot"].tolist() == list(range(len(own)))
+        assert (own["from_x"].iloc[1:].to_numpy() == own["x"].iloc[:-1].to_numpy()).all()
+
+
+def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
+    log = {
+        "time": [0, 0, 0, 0.25, 0.5, 0.75, 1.0, 1, 1.25, 1.5, 1.75, 2.0, 2, 3],
+        "event": ["mission_start"] * 2
+        + ["move"]
+        + ["communication"] * 4
+        + ["move"]
+        + ["communication"] * 4
+        + ["move", "mission_end"],
+        "uav": [0, -1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0],
+        "node": [-1, 0, -1, 2, 2, 2, 1, -1, 1, 2, 2, 1, -1, -1],
+        "value": [9, 5, 8, 1, 1, 1, 1, 7, 1, 1, 1, 1, 6, 6],
+        "x": [0] * 14,
+        "y": [0] * 14,
+    }
+    assert uav_slots(log)["node"].tolist() == [2, 1, -1]
+
+
+def test_batteries_start_full_and_move_by_a_flight_or_a_charge() -> None:
+    record, log = logged("greedy", uavs=3)
+    levels = battery_levels(log)
+    for uav, own in levels.groupby("uav"):
+        assert own["battery"].iloc[0] == record.flying_time
+        assert own["battery"].iloc[-1] == record.uavs["battery"][uav]
+        steps = own["battery"].diff().iloc[1:]
+        assert (steps == -1).sum() == record.uavs["slots_flying"][uav]
+        assert (steps > 0).sum() == record.uavs["slots_charging"][uav]
+
+
+def test_residual_data_starts_with_the_initial_and_ends_with_the_rest() -> None:
+    record, log = logged("greedy")
+    total = residual_data(log).sum(axis=1)
+    assert len(total) == record.slots + 1
+    assert total.iloc[0] == pytest.approx(record.initial, abs=1e-9)
+    assert total.iloc[-1] == pytest.approx(record.residual, abs=1e-9)

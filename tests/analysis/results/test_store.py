@@ -1,0 +1,357 @@
+import json
+import shutil
+import signal
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import dess
+from analysis import load_results, run_study
+from analysis.results import manifest
+from analysis.results.chunks import Chunk, Part, gaps, split
+from analysis.results.manifest import Cell
+from analysis.results.store import Failure, Store
+from dess import InputError, simulate_batch
+from dess.files import replacing
+from policies import load
+from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
+
+
+@pytest.fixture
+def out(tmp_path):
+    """A results folder."""
+    run_study(small_study(tmp_path, logged=1), tmp_path / "out")
+    return tmp_path / "out"
+
+
+def test_the_manifest_says_what_was_run(out):
+    data = load_results(out).manifest
+    assert data == json.loads((out / "manifest.json").read_text())
+    assert data["version"] == dess.__version__
+    assert data["seed"] == 7
+    assert data["study"]["name"] == "trial"
+    assert data["scenario"]["grid"] == 8
+    assert data["points"] == [{"values": {}, "replication": 0}]
+    assert data["missions"] == [[10], [10]]
+    assert data["complete"]
+    assert [team["policy"] for team in data["policies"]] == ["greedy", "random"]
+    assert data["policies"][0]["members"][0]["class"] == "policies.heuristics:Greedy"
+    assert data["libraries"].keys() == {"python", *manifest.LIBRARIES}
+
+
+def _cut(path):
+    path.write_bytes(path.read_bytes()[:-9])
+
+
+def _flip(path):
+    content = bytearray(path.read_bytes())
+    content[40] ^= 1  # in the first data page
+    path.write_bytes(content)
+
+
+def _empty(path):
+    path.write_bytes(b"")
+
+
+def _text(path):
+    path.write_text("nothing like parquet")
+
+
+@pytest.mark.parametrize("kind", ["missions", "uavs", "events"])
+@pytest.mark.parametrize("damage", [_cut, _flip, _empty, _text])
+def test_a_damaged_file_is_noticed_and_computed_again(kind, damage, out, tmp_path):
+    whole = files_of(out)
+    path = next((out / kind).rglob("*.parquet"))
+    damage(path)
+    with pytest.raises(InputError, match="run the study again|no event log"):
+        results = load_results(out)
+        for policy in ("greedy", "random"):
+            results.events(policy)
+    run_study(small_study(tmp_path, logged=1), out)
+    assert files_of(out) == whole
+
+
+@pytest.mark.parametrize("other", [1, 3])
+def test_a_file_in_the_place_of_another_does_not_pass(other, out):
+    files = sorted((out / "missions").rglob("*.parquet"))  # three of one policy, then the other's
+    files[0].write_bytes(files[other].read_bytes())
+    with pytest.raises(InputError, match="damaged"):
+        load_results(out)
+
+
+def _rewrite(out, **changes):
+    path = out / "manifest.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | changes))
+
+
+FOREIGN = {
+    "truncated": (lambda out: _cut(out / "manifest.json"), "cannot be read"),
+    "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "cannot be read"),
+    "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
+    "other version": (
+        lambda out: _rewrite(out, version="0.0.9"),
+        r"made by dess 0\.0\.9 \(schema 2\), not",
+    ),
+    "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
+    "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
+    "no study": (lambda out: _rewrite(out, study={}), "study: is not the data of a study"),
+}
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_a_foreign_manifest_is_refused(case, out, tmp_path):
+    spoil, line = FOREIGN[case]
+    spoil(out)
+    before = files_of(out)
+    for use in (lambda: load_results(out), lambda: run_study(small_study(tmp_path), out)):
+        with pytest.raises(InputError, match=line) as error:
+            use()
+        assert str(error.value).startswith(str(out / "manifest.json"))
+        assert "allowed: another --out" in str(error.value)
+        assert "\n" not in str(error.value)
+    assert files_of(out) == before
+
+
+OTHERS = {
+    "holds seed 7, not 8": {"seed": 8},
+    "holds study trial, not other": {"name": "other"},
+    "holds other scenarios": {"set": {"quota": 50}},
+    "holds other scenarios than": {"design": grid(uavs=[1, 2])},
+    "holds policy random, which study trial has not": {"policies": ["greedy", "tour"]},
+}
+
+
+@pytest.mark.parametrize("line", OTHERS)
+def test_another_study_is_refused(line, out, tmp_path):
+    before = files_of(out)
+    with pytest.raises(InputError, match=line):
+        run_study(small_study(tmp_path, **OTHERS[line]), out)
+    assert files_of(out) == before
+
+
+def test_the_scenario_counts_not_its_name(out, tmp_path):
+    study = small_study(tmp_path)
+    write_scenario(tmp_path, quota=50)
+    with pytest.raises(InputError, match="holds other scenarios"):
+        run_study(small_study_again(tmp_path), out)
+    write_scenario(tmp_path).rename(tmp_path / "renamed.toml")
+    run_study(small_study_again(tmp_path, scenario=str(tmp_path / "renamed.toml")), out)
+    assert study.points[0].scenario == load_results(out).scenario()
+
+
+def small_study_again(folder, **changes):
+    from analysis import load_study
+
+    return load_study(folder / "trial.toml", **changes)
+
+
+def test_other_code_is_refused(out, tmp_path):
+    _rewrite(out, code="0" * 64)
+    with pytest.raises(InputError, match="made by other code of the same version"):
+        run_study(small_study(tmp_path), out)
+
+
+def test_other_code_of_a_policy_is_refused(out, tmp_path):
+    teams = json.loads((out / "manifest.json").read_text())["policies"]
+    teams[1]["members"][0]["code"] = "0" * 64
+    _rewrite(out, policies=teams)
+    with pytest.raises(InputError, match="made by other code of policy random"):
+        run_study(small_study(tmp_path), out)
+
+
+def test_no_results_folder(tmp_path):
+    for path in (tmp_path, tmp_path / "none", write_scenario(tmp_path)):
+        with pytest.raises(InputError, match="no such file; allowed: a results folder"):
+            load_results(path)
+
+
+def test_an_output_that_cannot_be_written(tmp_path):
+    study = small_study(tmp_path)
+    before = files_of(tmp_path)
+    for path in (tmp_path / "trial.toml", tmp_path / "trial.toml" / "out"):
+        with pytest.raises(InputError, match=f"{path}: cannot be written"):
+            run_study(study, path)
+    with pytest.raises(InputError, match="holds other files and no manifest.json"):
+        run_study(study, tmp_path)
+    assert files_of(tmp_path) == before
+
+
+def test_what_a_killed_run_leaves_does_not_matter(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / ".manifest.json.1.tmp").touch()
+    assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
+
+
+def test_two_runs_of_one_folder_at_once(tmp_path):
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out"):
+        for other in (study, small_study(tmp_path, missions=20)):
+            with pytest.raises(InputError, match="in use by another run; allowed: another --out"):
+                run_study(other, tmp_path / "out")
+    assert len(run_study(study, tmp_path / "out").missions) == 20
+
+
+def test_a_run_that_was_killed_leaves_no_lock(tmp_path):
+    small_study(tmp_path)
+    script = (
+        "import os, signal; from analysis import load_study; "
+        "from analysis.results.store import Store; "
+        "store = Store.open(load_study('trial.toml'), 'out'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment())
+    assert done.returncode == -signal.SIGKILL
+    assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
+
+
+RECORDS = {
+    "other replications": ("replication", 3, "not of the replications"),
+    "another seed": ("seed", 8, "not of seed 7"),
+    "no number": ("reward", float("nan"), "a reward that is no number"),
+}
+
+
+@pytest.mark.parametrize("case", RECORDS)
+def test_records_that_were_not_asked_for_do_not_enter(case, tmp_path):
+    field, value, line = RECORDS[case]
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out") as store:
+        cell = store.manifest.cells[0][0]
+        chunk = Chunk(0, (Part(cell, range(2)),))
+        records = simulate_batch(study.points[0].scenario, load("greedy"), 7, 2)
+        records.missions[field][0] = value
+        before = files_of(tmp_path)
+        with pytest.raises(ValueError, match=line):
+            store.write(chunk, records)
+        assert files_of(tmp_path) == before
+        assert store.missing(chunk) == chunk
+
+
+def test_folders_that_were_put_together_count_once(tmp_path):
+    few, more = small_study(tmp_path), small_study(tmp_path, missions=13)
+    run_study(few, tmp_path / "out")
+    expected = run_study(more, tmp_path / "more")
+    for kind in ("missions", "uavs"):
+        shutil.copytree(tmp_path / "out" / kind, tmp_path / "more" / kind, dirs_exist_ok=True)
+    together = load_results(tmp_path / "more")
+    pd.testing.assert_frame_equal(together.missions, expected.missions)
+    pd.testing.assert_frame_equal(together.uavs, expected.uavs)
+
+
+def test_a_file_under_another_name_does_not_pass(out):
+    path = sorted((out / "missions").rglob("*.parquet"))[0]
+    path.rename(path.with_name("0" * 16 + path.name[16:]))
+    with pytest.raises(InputError, match="damaged"):
+        load_results(out)
+
+
+def test_foreign_files_stay(out, tmp_path):
+    notes = next((out / "missions").iterdir()) / "my-notes.parquet"
+    notes.write_text("mine")
+    (out / "missions" / "policy=greedy" / ".x.parquet.1.tmp").touch()  # of a killed run
+    run_study(small_study(tmp_path, logged=1), out)
+    assert notes.read_text() == "mine"
+    assert not [*out.rglob("*.tmp")]
+
+
+def test_a_long_team_has_a_short_folder(tmp_path):
+    team = ",".join(["greedy", "random"] * 30)
+    results = run_study(small_study(tmp_path, policies=[team], missions=1), tmp_path / "out")
+    assert results.policies == [team]
+    assert len(load_results(tmp_path / "out").missions) == 1
+
+
+MANIFESTS = {
+    "missions": [[0], [10]],
+    "selected": [9, None],
+    "policies": [],
+    "points": [],
+}
+
+
+@pytest.mark.parametrize("field", MANIFESTS)
+def test_a_manifest_that_makes_no_sense(field, out):
+    _rewrite(out, **{field: MANIFESTS[field]})
+    with pytest.raises(InputError, match="manifest.json"):
+        load_results(out)
+
+
+@pytest.mark.parametrize("part", ["set", "design", "precision", "selection"])
+def test_a_manifest_whose_study_makes_no_sense(part, out):
+    study = json.loads((out / "manifest.json").read_text())["study"]
+    _rewrite(out, study=study | {part: 3})
+    with pytest.raises(InputError, match=f"study: has a {part} that is none"):
+        load_results(out)
+
+
+def test_a_failure_is_forgotten_once_its_chunk_is_there(tmp_path):
+    study = small_study(tmp_path)
+    with Store.open(study, tmp_path / "out") as store:
+        chunk = Chunk(0, (Part(store.manifest.cells[0][0], range(2)),))
+        path = store.write_failure(chunk, Failure("greedy", 2, "no", "dess", ""))
+        assert path.exists()
+        store.write(chunk, simulate_batch(study.points[0].scenario, load("greedy"), 7, 2))
+        assert not path.exists()
+
+
+def test_chunks_have_their_size_and_one_team():
+    cells = [Cell(team, point, f"{team}{point}", 0) for team in (0, 1) for point in (0, 1, 2)]
+    chunks = [*split([Part(cell, range(3)) for cell in cells], 4)]
+    assert [chunk.missions for chunk in chunks] == [4, 4, 1, 4, 4, 1]
+    assert [(c.team, c.rows) for c in chunks[:2]] == [
+        (0, [("00", 0, 3), ("01", 0, 1)]),
+        (0, [("01", 1, 3), ("02", 0, 2)]),
+    ]
+    rows = [(key, r) for chunk in chunks for key, a, b in chunk.rows for r in range(a, b)]
+    assert rows == [(cell.key, r) for cell in cells for r in range(3)]
+
+
+@given(
+    st.tuples(st.integers(0, 30), st.integers(0, 30)),
+    st.lists(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=6),
+)
+def test_gaps_are_what_is_in_no_other_range(wanted, present):
+    ranges = [range(*sorted(each)) for each in present]
+    missing = gaps(range(*sorted(wanted)), ranges)
+    there = {r for each in ranges for r in each}
+    assert [r for gap in missing for r in gap] == [
+        r for r in range(*sorted(wanted)) if r not in there
+    ]
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = tmp_path / "file"
+    path.write_text("old")
+    with pytest.raises(ZeroDivisionError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise ZeroDivisionError
+    assert files_of(tmp_path) == {"file": b"old"}
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    assert files_of(tmp_path) == {"file": b"new"}
+    with pytest.raises(InputError, match="is a folder"), replacing(tmp_path):
+        pass
+
+
+def test_fingerprints_follow_the_sources(tmp_path, monkeypatch):
+    package = tmp_path / "pack"
+    package.mkdir()
+    for name in ("__init__", "brain", "other"):
+        (package / f"{name}.py").write_text("")
+    (tmp_path / "alone.py").write_text("")
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def fingerprints():
+        manifest.fingerprint.cache_clear()
+        return manifest.fingerprint("pack.brain"), manifest.fingerprint("alone")
+
+    before = fingerprints()
+    (package / "other.py").write_text("x = 1")  # brain may import it
+    after = fingerprints()
+    assert after[0] != before[0]
+    assert after[1] == before[1]
+    (tmp_path / "alone.py").write_text("x = 1")
+    assert fingerprints()[1] != before[1]

@@ -1,0 +1,295 @@
+from collections import Counter
+
+import numpy as np
+import pytest
+import tomli_w
+from pydantic import BaseModel, ConfigDict, ValidationError
+from scipy.stats import qmc
+
+from analysis.study.design import (
+    MAX_SIZE,
+    Design,
+    DesignPoint,
+    Grid,
+    LatinHypercube,
+    OneAtATime,
+    Saltelli,
+    Sobol,
+    Table,
+)
+from dess.files import parse_toml
+from dess.scenario import load_scenario, validation_line
+from dess.streams import MAX_REPLICATION, MAX_SEED
+
+
+class Plan(BaseModel):
+    """What holds a design, as a study does."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    design: Design = Grid()
+
+
+def plan(text):
+    return Plan.model_validate(parse_toml(text, "plan")).design
+
+
+def values_of(design):
+    return [point.values for point in design.points]
+
+
+TOML = {
+    "grid": """
+        [design]
+        kind = "grid"
+        values = {quota = [300, 440], initial_data = [[5, 7.5], [7.5, 10]]}
+        """,
+    "one-at-a-time": """
+        [design]
+        kind = "one-at-a-time"
+        [design.values]
+        uavs = [1, 2, 3]
+        initial_data = [5, [7.5, 10]]
+        """,
+    "table": """
+        [design]
+        kind = "table"
+        rows = [{uavs = 1, initial_data = [5, 10]}, {uavs = [1, 2]}, {}]
+        """,
+    "latin-hypercube": """
+        [design]
+        kind = "latin-hypercube"
+        ranges = {uavs = [1, 3], pads = [1, 16], arrival_rate = [0, 0.1]}
+        size = 20
+        """,
+    "sobol": """
+        [design]
+        kind = "sobol"
+        ranges = {charge_start = [10, 50], edge_snr = [-30.0, -20.0]}
+        size = 16
+        seed = 7
+        """,
+    "saltelli": """
+        [design]
+        kind = "saltelli"
+        ranges = {charge_start = [10, 50], initial_data = [5, 20]}
+        base = 4
+        replications = 1000
+        """,
+}
+
+
+@pytest.mark.parametrize("kind", TOML)
+def test_every_kind_is_written_in_toml_and_makes_scenarios(kind):
+    design = plan(TOML[kind])
+    assert design.kind == kind
+    assert design.points
+    for point in design.points:
+        load_scenario("paper", **point.values)
+        hash(tuple(point.values.values()))  # values group missions
+    written = tomli_w.dumps(Plan(design=design).model_dump(mode="json"))
+    assert plan(written) == design
+    assert plan(written).points == design.points
+
+
+def test_a_grid_is_the_product_with_the_last_field_fastest():
+    assert values_of(plan(TOML["grid"])) == [
+        {"quota": 300, "initial_data": (5, 7.5)},
+        {"quota": 300, "initial_data": (7.5, 10)},
+        {"quota": 440, "initial_data": (5, 7.5)},
+        {"quota": 440, "initial_data": (7.5, 10)},
+    ]
+
+
+def test_without_values_a_grid_is_the_scenario_as_it_is():
+    assert Plan().design.points == (DesignPoint({}, 0),)
+
+
+def test_one_at_a_time_fixes_one_field_per_point():
+    assert values_of(plan(TOML["one-at-a-time"])) == [
+        {"uavs": 1},
+        {"uavs": 2},
+        {"uavs": 3},
+        {"initial_data": 5},
+        {"initial_data": (7.5, 10)},
+    ]
+
+
+def test_a_table_is_its_rows():
+    rows = [{"uavs": 1, "initial_data": (5, 10)}, {"uavs": (1, 2)}, {}]
+    assert values_of(plan(TOML["table"])) == rows
+
+
+def test_only_saltelli_points_name_their_replication():
+    first = {kind: {p.replication for p in plan(text).points} for kind, text in TOML.items()}
+    assert len(first.pop("saltelli")) > 1
+    assert all(replications == {0} for replications in first.values())
+
+
+def test_a_latin_hypercube_has_one_point_per_stratum_of_every_field():
+    size, ranges = 50, {"edge_snr": (-30, -20), "arrival_rate": (0.0, 0.1)}
+    points = values_of(LatinHypercube(ranges=ranges, size=size))
+    strata = {
+        field: [int((values[field] - low) / (high - low) * size) for values in points]
+        for field, (low, high) in ranges.items()
+    }
+    for numbers in strata.values():
+        assert sorted(numbers) == list(range(size))
+    assert strata["edge_snr"] != strata["arrival_rate"]
+
+
+@pytest.mark.parametrize("columns", [1, 2, 4, 8, 16, 32, 64])
+def test_a_sobol_sequence_is_balanced(columns):
+    # 64 points of two dimensions are a (0, 6, 2)-net: one in each of 64 boxes, of whatever shape.
+    ranges = {"edge_snr": (-30, -20), "arrival_rate": (0, 2)}
+    rows = 64 // columns
+    boxes = {
+        (int((v["edge_snr"] + 30) / 10 * columns), int(v["arrival_rate"] / 2 * rows))
+        for v in values_of(Sobol(ranges=ranges, size=64))
+    }
+    assert len(boxes) == 64
+
+
+@pytest.mark.parametrize(
+    ("design", "times"),
+    [
+        (LatinHypercube(ranges={"uavs": (1, 3), "pads": (5, 10)}, size=300), {3: 100, 6: 50}),
+        (Sobol(ranges={"uavs": (1, 4), "charge_start": (10, 17)}, size=64), {4: 16, 8: 8}),
+    ],
+)
+def test_integers_are_equally_frequent_both_ends_included(design, times):
+    for field, (low, high) in design.ranges.items():
+        drawn = [values[field] for values in values_of(design)]
+        assert {type(value) for value in drawn} == {int}
+        number = high - low + 1
+        assert Counter(drawn) == dict.fromkeys(range(low, high + 1), times[number])
+
+
+def test_other_fields_get_floats_within_the_range():
+    for values in values_of(LatinHypercube(ranges={"arrival_rate": (0, 1)}, size=20)):
+        assert type(values["arrival_rate"]) is float
+        assert 0 <= values["arrival_rate"] <= 1
+
+
+def test_the_far_end_of_the_unit_interval_stays_in_the_range(monkeypatch):
+    # Strata of a Latin hypercube are open below and closed above: 1.0 is a possible draw.
+    monkeypatch.setattr(qmc.LatinHypercube, "random", lambda self, n: np.ones((n, self.d)))
+    ranges = {"uavs": (1, 3), "edge_snr": (-0.1, 0.2)}
+    (values,) = values_of(LatinHypercube(ranges=ranges, size=1))
+    assert values == {"uavs": 3, "edge_snr": 0.2}
+
+
+def test_a_range_of_one_is_a_constant():
+    for values in values_of(Sobol(ranges={"uavs": (2, 2), "edge_snr": (-25, -25)}, size=8)):
+        assert values == {"uavs": 2, "edge_snr": -25.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"), [(LatinHypercube, "size"), (Sobol, "size"), (Saltelli, "base")]
+)
+def test_a_sample_depends_on_its_seed_alone(kind, size):
+    def points(seed):
+        return kind(ranges={"edge_snr": (0, 1)}, seed=seed, **{size: 4}).points
+
+    samples = []
+    for seed in (0, 1, 2, MAX_SEED):
+        np.random.seed(3)  # numpy's own state must not matter
+        samples.append(points(seed))
+        assert points(seed) == samples[-1]
+        assert samples[-1] not in samples[:-1]
+    assert kind(ranges={"edge_snr": (0, 1)}, **{size: 4}).points == samples[0]
+
+
+def saltelli(**changes):
+    ranges = {"edge_snr": (0, 1), "arrival_rate": (0, 1)}
+    return Saltelli(**({"ranges": ranges, "base": 8, "seed": 0} | changes))
+
+
+def test_saltelli_blocks_are_a_then_one_factor_from_b_each_then_b():
+    design = saltelli()
+    rows = [(*point.values.values(), point.replication) for point in design.points]
+    assert len(rows) == 8 * (3 + 2)
+    for start in range(0, len(rows), 5):
+        a, *mixed, b = rows[start : start + 5]
+        assert all(x != y for x, y in zip(a, b, strict=True))
+        for factor, row in enumerate(mixed):
+            assert row == (*a[:factor], b[factor], *a[factor + 1 :])
+
+
+def test_the_noise_is_a_factor_over_all_replications():
+    number = 4
+    replications = [point.replication for point in saltelli(base=64, replications=number).points]
+    assert all(type(replication) is int for replication in replications)
+    for sample in (replications[0::5], replications[4::5]):  # A and B
+        assert Counter(sample) == dict.fromkeys(range(number), 16)
+
+
+def test_no_replication_is_beyond_the_last():
+    most = max(p.replication for p in saltelli(replications=MAX_REPLICATION + 1, base=64).points)
+    assert MAX_REPLICATION * 0.9 < most <= MAX_REPLICATION
+    assert {p.replication for p in saltelli(replications=1).points} == {0}
+
+
+def test_designs_are_frozen():
+    with pytest.raises(ValidationError, match="frozen"):
+        Grid().values = {}
+    design = OneAtATime(values={"uavs": [1]})
+    assert Plan(design=design).design is design
+    assert Table(rows=[{"uavs": 1}]).points == design.points
+
+
+HEAD = 'ranges = {arrival_rate = [0, 1]}\nkind = "'
+BAD = {
+    "design = 3": ["design: ", "not 3"],
+    "[design]\nsize = 3": ["kind: None is unknown", "allowed: grid, one-at-a-time, table, latin"],
+    "[design]\nkind = 'sobel'": ["kind: 'sobel' is unknown", "sobol, saltelli"],
+    "[design]\nkind = ['grid']": ["kind: ['grid'] is unknown"],
+    "kind = 'grid'\nsize = 3": ["grid: size: unknown key; allowed: kind, values"],
+    "kind = 'grid'\nvalues = {uavs = []}": ["grid: values: uavs has no values; allowed: one"],
+    "kind = 'grid'\nvalues = {uavs = 3}": ["grid: values.uavs: 3", "field -> values"],
+    "kind = 'grid'\nvalues = 3": ["grid: values: ", "not 3"],
+    "kind = 'one-at-a-time'\nvalues = {}": ["one-at-a-time: values: ", "at least 1"],
+    "kind = 'one-at-a-time'": ["one-at-a-time: values: ", "field -> values"],
+    "kind = 'table'\nrows = []": ["table: rows: ", "at least 1"],
+    "kind = 'table'\nrows = [3]": ["table: rows.0: ", "not 3"],
+    "kind = 'sobol'\nsize = 8\nranges = {}": ["sobol: ranges: ", "at least 1"],
+    HEAD + 'sobol"\nsize = 12': ["sobol: size: 12 is no power of two; allowed: 1, 2, 4"],
+    HEAD + 'sobol"\nsize = 0': ["sobol: size: ", "greater than or equal to 1"],
+    HEAD + 'sobol"\nsize = true': ["sobol: size: ", "valid integer"],
+    HEAD + 'latin-hypercube"\nsize = 0': ["latin-hypercube: size: ", "equal to 1, not 0"],
+    HEAD + f'latin-hypercube"\nsize = {MAX_SIZE + 1}': ["size: ", f"equal to {MAX_SIZE}"],
+    HEAD + 'latin-hypercube"\nsize = 4\nseed = -1': ["seed: ", "equal to 0, not -1"],
+    HEAD + 'saltelli"\nbase = 1': ["saltelli: base: ", "equal to 2, not 1"],
+    HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is no power of two"],
+    HEAD + 'saltelli"\nbase = 4\nreplications = 0': ["replications: ", "equal to 1, not 0"],
+    HEAD + f'saltelli"\nbase = 4\nreplications = {MAX_REPLICATION + 2}': ["replications: "],
+}
+NO_RANGES = {
+    "uavs = [3, 1]": "uavs: [3, 1]",
+    "arrival_rate = [0.2, 0.1]": "arrival_rate: [0.2, 0.1]",
+    "uavs = [1, 2.5]": "uavs: [1, 2.5]",
+    "uavs = [1.0, 2.0]": "uavs: [1.0, 2.0]",
+    "pads = [1, 2.5]": "pads: [1, 2.5]",
+    "uavs = [1, 2, 3]": "uavs: [1, 2, 3]",
+    "uavs = 3": "uavs: 3",
+    "uavs = 'ab'": "uavs: 'ab'",
+    "arrival_rate = [false, true]": "arrival_rate: [False, True]",
+    "arrival_rate = [0, nan]": "arrival_rate: [0, nan]",
+    "arrival_rate = [0, inf]": "arrival_rate: [0, inf]",
+    f"arrival_rate = [0, {10**400}]": "arrival_rate: [0, 10000",
+}
+BAD |= {
+    f"kind = 'sobol'\nsize = 8\nranges = {{{text}}}": [f"sobol: ranges: {what}", "is no range"]
+    for text, what in NO_RANGES.items()
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_design_gets_one_line(text):
+    with pytest.raises(ValidationError) as error:
+        plan(text if "design" in text else f"[design]\n{text}")
+    line = validation_line(error.value, "plan")
+    assert line.startswith("plan: design: ")
+    assert "\n" not in line
+    for part in BAD[text]:
+        assert part in line

@@ -1,0 +1,386 @@
+import json
+import math
+from statistics import variance
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from analysis.study import selection
+from analysis.study.selection import Selection
+
+METRIC = "collection_ratio"
+
+
+def rule(procedure="kn", **fields):
+    defaults = {"metric": METRIC, "first": 10, "budget": 10**9}
+    if procedure != "ocba":
+        defaults["indifference"] = 0.5
+    return Selection.model_validate(defaults | {"procedure": procedure} | fields)
+
+
+def samples_of(data, counts):
+    return [{METRIC: row[:count]} for row, count in zip(data, counts, strict=True)]
+
+
+def finished(rule, data):
+    """The samples with which the rule is content, from ones of ``first`` missions each."""
+    counts = [rule.first] * len(data)
+    while (wanted := rule.wanted(samples_of(data, counts))) != counts:
+        counts = wanted
+    samples = samples_of(data, counts)
+    assert [len(sample[METRIC]) for sample in samples] == counts, "the data are too short"
+    return samples
+
+
+def chosen(rule, data):
+    choice = rule.choice(finished(rule, data))
+    assert choice.done
+    return choice
+
+
+def normal(seed, means, missions=3000, correlation=0.0, spread=1.0):
+    """(k, missions) values; ``correlation`` comes from what all points share in a mission."""
+    generator = np.random.default_rng(seed)
+    shared, own = generator.normal(size=missions), generator.normal(size=(len(means), missions))
+    noise = math.sqrt(correlation) * shared + math.sqrt(1 - correlation) * own
+    return np.asarray(means)[:, None] + spread * noise
+
+
+def slow_race(data, first, delta, alpha, bounded=False):
+    """Kim and Nelson's procedure, a mission and a pair at a time: best, stage, who left when."""
+    k = len(data)
+    eta = 0.5 * ((2 * alpha / (k - 1)) ** (-2 / (first - 1)) - 1)
+    h2 = 2 * eta * (first - 1)
+    rare = 2 * math.log((k - 1) / alpha) / 3 if bounded else 0.0
+
+    def squares(r):
+        pairs = [(i, j) for i in range(k) for j in range(k) if i != j]
+        return {(i, j): variance(data[i][:r] - data[j][:r]) for i, j in pairs}
+
+    inside, left_at, r = list(range(k)), {}, first
+    known, renewal = squares(first), first + first // 2
+    while True:
+        means = [sum(row[:r].tolist()) / r for row in data]
+
+        def width(i, j, r=r, known=known):
+            return max(0.0, delta / (2 * r) * (h2 * known[i, j] / delta**2 - r) + rare / r)
+
+        out = [
+            i for i in inside if any(means[i] < means[j] - width(i, j) for j in inside if j != i)
+        ]
+        left_at |= dict.fromkeys(out, r)
+        inside = [i for i in inside if i not in out]
+        best = max(inside, key=lambda i: means[i])
+        ends = [
+            h2 * known[i, j] / delta**2 + 2 * rare / delta for i in inside for j in inside if i != j
+        ]
+        if len(inside) == 1 or r > max(ends):
+            return best, r, left_at
+        if bounded and r == renewal:
+            known, renewal = squares(r), r + r // 2
+        r += 1
+
+
+def mixed(seed):
+    """Two to six points of any means."""
+    generator = np.random.default_rng(seed)
+    means = generator.normal(0.0, 0.3, generator.integers(2, 7))
+    return normal([1, seed], means, correlation=0.5 * (seed % 2))
+
+
+def in_pairs(seed):
+    """Six points, two by two almost alike: margins of very different widths."""
+    means = np.random.default_rng(seed).normal(0.0, 0.2, 3)
+    pairs = np.repeat(normal([2, seed], means), 2, axis=0)
+    return pairs + normal([3, seed], np.zeros(6), spread=0.3)
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded"])
+@pytest.mark.parametrize("draw", [mixed, in_pairs])
+@pytest.mark.parametrize("seed", [*range(8), 16, 40])
+def test_the_race_is_the_one_of_the_paper(procedure, draw, seed):
+    data = draw(seed)
+    first, alpha = (4, 0.3) if draw is in_pairs else (5 + seed, [0.01, 0.05, 0.3][seed % 3])
+    best, stage, left_at = slow_race(data, first, 0.4, alpha, procedure == "kn-bounded")
+    race = rule(procedure, first=first, indifference=0.4, confidence=1 - alpha)
+    choice = chosen(race, data)
+    assert (choice.best, choice.stage) == (best, stage)
+    assert set(choice.survivors) == set(range(len(data))) - left_at.keys()
+    assert all(choice.counts[i] >= r for i, r in left_at.items())
+    assert choice.counts[best] == max(choice.counts) >= stage
+    assert choice.guaranteed
+
+
+def test_a_race_by_hand():
+    # k = 2, n0 = 3, alpha = 0.1: eta = (0.2^-1 - 1) / 2 = 2, h2 = 2 * 2 * 2 = 8. The first three
+    # differences have variance 1: W(r) = (8 - r) / (2 r), above their mean at r = 3, 4, 5
+    # (0, 0, 0.2 against 0.833, 0.5, 0.3) and below it at r = 6 (0.333 against 0.167).
+    ahead = np.array([1.0, 0.0, -1.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    by_hand = rule(first=3, indifference=1.0, confidence=0.9)
+    choice = chosen(by_hand, np.stack([np.zeros(8), ahead]))
+    assert (choice.best, choice.stage, choice.survivors) == (1, 6, (1,))
+    assert chosen(by_hand, np.stack([np.zeros(8), -ahead])).best == 0
+    # nothing but noise: the margin is zero at r = 8, and the race over after it
+    level = np.array([1.0, 0.0, -1.0, 0.0, 0.5, 0.0, 0.0, -0.4, 0.0])
+    assert chosen(by_hand, np.stack([np.zeros(9), level])).stage == 8
+    level[7] = -0.5
+    choice = chosen(by_hand, np.stack([np.zeros(9), level]))
+    assert (choice.stage, choice.best, choice.survivors) == (9, 0, (0, 1))
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded"])
+def test_the_decision_does_not_depend_on_the_rounds(procedure, monkeypatch):
+    data = normal(2, np.linspace(0.0, 0.3, 8), correlation=0.5, spread=0.7)
+    race = rule(procedure, indifference=0.1, first=15)
+    whole = chosen(race, data)
+    assert whole.stage > 300
+    assert whole.rounds > 5
+    monkeypatch.setattr(selection, "_BLOCK", 7)
+    assert chosen(race, data) == whole
+    if procedure == "kn":
+        monkeypatch.setattr(selection, "_grown", lambda count: count + 3)
+        small = chosen(race, data)
+        assert (small.best, small.stage) == (whole.best, whole.stage)
+        assert small.stage <= max(small.counts) <= small.stage + 3
+        assert small.missions < whole.missions
+
+
+RULES = {
+    "kn": {"indifference": 0.2},
+    "kn-bounded": {"indifference": 0.2},
+    "kn out of budget": {"procedure": "kn", "indifference": 0.1, "budget": 1000},
+    "ocba": {"budget": 1000},
+}
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_interruptions_leave_no_trace(name):
+    data = normal(3, np.linspace(0.0, 0.5, 6), correlation=0.3)
+    whole = rule(**({"procedure": name} | RULES[name]))
+    choice = chosen(whole, data)
+    assert choice.rounds > 3
+    generator = np.random.default_rng(4)
+    counts = [0] * len(data)
+    while (wanted := whole.wanted(samples_of(data, counts))) != counts:
+        assert all(w >= count for w, count in zip(wanted, counts, strict=True))
+        counts = [
+            int(generator.integers(count, w + 1)) for count, w in zip(counts, wanted, strict=True)
+        ]
+    assert tuple(counts) == choice.counts
+    assert whole.choice(samples_of(data, counts)) == choice
+
+
+@pytest.mark.parametrize("name", RULES)
+def test_more_than_is_needed_changes_nothing(name):
+    data = normal(3, np.linspace(0.0, 0.5, 6), correlation=0.3)
+    whole = rule(**({"procedure": name} | RULES[name]))
+    samples = samples_of(data, [len(data[0])] * len(data))
+    assert whole.wanted(samples) == [len(data[0])] * len(data)
+    assert whole.choice(samples) == chosen(whole, data)
+
+
+def rate(rule, draw, trials):
+    """How often the last point, the best, is selected."""
+    choices = [chosen(rule, draw(seed)) for seed in range(trials)]
+    return np.mean([choice.best == len(choice.counts) - 1 for choice in choices])
+
+
+def least(trials, promised=0.95):
+    """The promised rate, less three binomial errors."""
+    return promised - 3 * math.sqrt(promised * (1 - promised) / trials)
+
+
+def slippage(k, lead, **fields):
+    """The hardest means that the promise is for: all but the best are ``lead`` behind."""
+    return lambda seed: normal([5, seed], [0.0] * (k - 1) + [lead], **fields)
+
+
+def missions_that_fail(k, failures, lead):
+    """1 or 0; the best fails with probability ``failures``, the others with ``lead`` more."""
+    rates = np.array([1 - failures - lead] * (k - 1) + [1 - failures])
+    return lambda seed: np.random.default_rng(seed).random((k, 20_000)) < rates[:, None]
+
+
+@pytest.mark.parametrize("k, correlation", [(5, 0.0), (10, 0.7)])
+def test_the_promise_is_kept(k, correlation):
+    draw = slippage(k, 0.5, missions=2000, correlation=correlation)
+    assert rate(rule(), draw, 300) >= least(300)
+
+
+def test_common_random_numbers_save_missions():
+    alone, common = (
+        np.mean([chosen(rule(), slippage(8, 0.5, correlation=c)(s)).missions for s in range(20)])
+        for c in (0.0, 0.8)
+    )
+    assert common < alone / 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_the_promise_is_kept_among_twenty(correlation):
+    draw = slippage(20, 0.4, correlation=correlation)
+    assert rate(rule(indifference=0.4, first=20), draw, 2000) >= least(2000)
+
+
+@pytest.mark.slow
+def test_the_promise_is_kept_where_missions_often_fail():
+    draw = missions_that_fail(20, 0.4, 0.2)
+    assert rate(rule(indifference=0.2, first=30), draw, 2000) >= least(2000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("failures, lead", [(0.05, 0.05), (0.01, 0.03), (0.001, 0.02)])
+def test_the_promise_is_kept_where_missions_seldom_fail(failures, lead):
+    draw = missions_that_fail(20, failures, lead)
+    assert rate(rule("kn-bounded", indifference=lead, first=20), draw, 500) >= least(500)
+
+
+@pytest.mark.slow
+def test_rare_failures_need_the_bounded_race():
+    draw = missions_that_fail(6, 0.01, 0.04)
+    fields = {"indifference": 0.04, "first": 20}
+    assert rate(rule("kn", **fields), draw, 100) < least(100)
+    assert rate(rule("kn-bounded", **fields), draw, 100) >= least(100)
+
+
+@pytest.mark.parametrize("procedure", ["kn", "ocba"])
+def test_the_budget_is_kept(procedure):
+    data = normal(6, np.linspace(0.0, 0.05, 7))
+    fields = {"indifference": 0.01} if procedure == "kn" else {}
+    choice = chosen(rule(procedure, budget=1234, **fields), data)
+    assert 1234 - len(choice.survivors) < choice.missions <= 1234
+    assert not choice.guaranteed
+    assert choice.guarantee.startswith("none")
+    means = [row[:n].mean() for row, n in zip(data, choice.counts, strict=True)]
+    assert choice.means == pytest.approx(means)
+    assert choice.best == max(choice.survivors, key=lambda i: means[i])
+
+
+def test_ocba_spends_its_budget_exactly():
+    assert chosen(rule("ocba", budget=1234), normal(6, [0.0, 0.1, 0.3])).missions == 1234
+
+
+def test_ocba_keeps_the_known_ratios():
+    # leads 1 and 2 and variance 1: n_2 : n_3 = 1 : 1/4, n_1 = sqrt(1 + 1/16)
+    signs = np.tile([1.0, -1.0], 5000)
+    choice = chosen(rule("ocba", budget=10_000), np.array([[3.0], [2.0], [1.0]]) + signs)
+    ratios = np.array([math.sqrt(17 / 16), 1.0, 0.25])
+    assert choice.counts == pytest.approx(10_000 * ratios / ratios.sum(), rel=0.01)
+    assert choice.probability == pytest.approx(1.0)
+    # variances 1, 4, 9 and leads 1, 2: n_2 : n_3 = 4 : 9/4, n_1 = sqrt(16/4 + (81/16)/9)
+    scaled = np.array([[3.0], [2.0], [1.0]]) + np.array([[1.0], [2.0], [3.0]]) * signs
+    ratios = np.array([math.sqrt(4 + 9 / 16), 4.0, 9 / 4])
+    counts = chosen(rule("ocba", budget=10_000), scaled).counts
+    assert counts == pytest.approx(10_000 * ratios / ratios.sum(), rel=0.01)
+
+
+def test_the_probability_of_ocba_by_hand():
+    # 8 missions each: leads 1 and 2, variances 8/7: scores 1, 2 over sqrt(2/7) = 1.871, 3.742;
+    # 1 - 0.03068 - 0.00009
+    signs = np.tile([1.0, -1.0], 4)
+    choice = chosen(rule("ocba", first=8, budget=24), np.array([[3.0], [2.0], [1.0]]) + signs)
+    assert choice.probability == pytest.approx(0.96923, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_ocba_beats_equal_shares_of_the_budget():
+    k, trials, budget = 10, 200, 600
+    by_ocba = by_equal = 0
+    for seed in range(trials):
+        data = normal([7, seed], np.linspace(0.0, 1.8, k), missions=budget)
+        by_ocba += chosen(rule("ocba", budget=budget), data).best == k - 1
+        by_equal += int(np.argmax(data[:, : budget // k].mean(axis=1))) == k - 1
+    # three binomial errors of a difference of two shares near 0.9
+    assert (by_ocba - by_equal) / trials > 3 * math.sqrt(2 * 0.9 * 0.1 / trials)
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded", "ocba"])
+def test_a_single_point_needs_no_selection(procedure):
+    choice = chosen(rule(procedure), normal(8, [0.3]))
+    assert (choice.best, choice.counts, choice.guaranteed) == (0, (10,), True)
+    assert "only" in choice.guarantee
+
+
+def test_points_that_are_alike_tie_and_the_first_wins():
+    row = normal(9, [0.8], spread=0.1)[0]
+    choice = chosen(rule(indifference=0.05), np.stack([row - 0.5, row, row]))
+    assert (choice.best, choice.survivors, choice.stage) == (1, (1, 2), 10)
+    assert "the best is among 2 that tie, it included" in choice.guarantee
+    choice = chosen(rule("ocba", budget=300), np.stack([row - 0.5, row, row]))
+    assert choice.best in (1, 2)
+    assert choice.probability == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_tie_is_decided_by_what_came_before_it():
+    data = normal(14, [0.0, 0.5])
+    data = np.stack([*data, data[1]])
+    tied = chosen(rule(), data)
+    assert (tied.best, tied.survivors) == (1, (1, 2))
+    assert 10 < tied.stage < max(tied.counts)
+    data[2, tied.stage :] += 1.0  # too late
+    assert chosen(rule(), data).best == 1
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded", "ocba"])
+def test_values_without_spread(procedure):
+    whole = rule(procedure, indifference=0.1) if procedure != "ocba" else rule("ocba", budget=500)
+    levels = np.array([0.1, 0.5, 0.9])
+    assert chosen(whole, np.repeat(levels[:, None], 3000, axis=1)).best == 2
+    choice = chosen(whole, np.full((3, 3000), 0.5))
+    assert (choice.best, choice.survivors) == (0, (0, 1, 2))
+
+
+def test_what_is_said_of_a_selection():
+    data = normal(10, [0.0, 1.0, 2.0])
+    assert chosen(rule(), data).guarantee == (
+        "with probability at least 0.95 it is the best, "
+        "if the best is better than every other by 0.5 or more"
+    )
+    begun = rule(indifference=0.01).choice(samples_of(data, [10, 10, 10]))
+    assert (begun.done, begun.guaranteed) == (False, False)
+    assert "more missions" in begun.guarantee
+    assert "probability that it is the best" in chosen(rule("ocba", budget=90), data).guarantee
+
+
+def test_a_choice_needs_the_missions_of_round_one():
+    data = normal(10, [0.0, 1.0])
+    assert rule().wanted(samples_of(data, [10, 0])) == [10, 10]
+    for samples in ([], samples_of(data, [10, 9])):
+        with pytest.raises(ValueError, match="10 or more missions each"):
+            rule().choice(samples)
+
+
+def test_hundreds_of_points_are_thinned_out_early():
+    data = normal(11, np.linspace(0.0, 1.0, 400), correlation=0.5, spread=0.2)
+    choice = chosen(rule(first=20, indifference=0.05), data)
+    assert data.mean(axis=1)[choice.best] >= data.mean(axis=1).max() - 0.05
+    assert np.median(choice.counts) == 20
+
+
+@pytest.mark.parametrize(
+    "fields, complaint",
+    [
+        ({}, "procedure"),
+        ({"procedure": "best"}, "'kn', 'kn-bounded' or 'ocba'"),
+        ({"procedure": "kn"}, "indifference: is missing"),
+        ({"procedure": "ocba", "indifference": 0.1}, "indifference: belongs to kn"),
+        ({"procedure": "ocba", "confidence": 0.9}, "confidence: belongs to kn"),
+        ({"procedure": "kn-bounded", "indifference": 1.0, "metric": "reward"}, "not bounded"),
+        ({"procedure": "kn", "indifference": 0.0}, "greater than 0"),
+        ({"procedure": "kn", "indifference": 0.1, "confidence": 0.5}, "greater than 0.5"),
+        ({"procedure": "kn", "indifference": 0.1, "confidence": 1.0}, "less than 1"),
+        ({"procedure": "kn", "indifference": 0.1, "first": 1}, "first"),
+        ({"procedure": "kn", "indifference": 0.1, "metric": "speed"}, "metric"),
+        ({"procedure": "kn", "indifference": 0.1, "delta": 0.1}, "delta"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(fields, complaint):
+    with pytest.raises(ValidationError, match=complaint):
+        Selection.model_validate(fields)
+
+
+@pytest.mark.parametrize("procedure", ["kn", "kn-bounded", "ocba"])
+def test_a_rule_survives_being_written_down(procedure):
+    whole = rule(procedure)
+    assert Selection.model_validate_json(json.dumps(whole.model_dump(mode="json"))) == whole

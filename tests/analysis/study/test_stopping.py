@@ -1,0 +1,276 @@
+import json
+from itertools import pairwise
+from typing import get_args
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from analysis.names import MEANS, SHARES
+from analysis.stats.intervals import mean_interval, wilson
+from analysis.study import stopping
+from analysis.study.stopping import Metric, Precision, running_interval
+
+
+def rule(**fields):
+    return Precision.model_validate({"first": 2, "look_ahead": 0} | fields)
+
+
+def finished(rule, data, rounds=None):
+    """The samples with which the rule is content, from one that begins with ``first`` missions."""
+    count = rule.first
+    while True:
+        samples = [{metric: values[:count] for metric, values in data.items()}]
+        (wanted,) = rule.wanted(samples)
+        if rounds is not None:
+            rounds.append(count)
+        if wanted == count:
+            return samples
+        count = wanted
+
+
+def reached(rule, **data):
+    """The only row, and the number of missions."""
+    samples = finished(rule, {metric: np.array(values) for metric, values in data.items()})
+    (row,) = rule.reached(samples)
+    return row
+
+
+def slow_stop(rule, data):
+    """The definition of the stopping point, word for word."""
+
+    def holds(n):
+        for metric, target in rule.targets.items():
+            values = data[metric][:n]
+            share = metric in SHARES
+            interval = wilson(values.sum(), n) if share else mean_interval(values)
+            half = (interval.high - interval.low) / 2
+            if n == 1 and not share:
+                return False
+            relative = target.relative is not None and half <= target.relative * abs(interval.mean)
+            if not relative and (target.absolute is None or half > target.absolute):
+                return False
+        return True
+
+    held = [holds(n) for n in range(1, rule.budget + 1)]
+    for n in range(rule.first, rule.budget - rule.look_ahead + 1):
+        if all(held[n - 1 : n + rule.look_ahead]):
+            return n
+    return None
+
+
+def test_the_metrics_are_those_of_the_statistics():
+    assert get_args(Metric) == SHARES + MEANS
+
+
+@pytest.mark.parametrize("metric", SHARES + MEANS)
+def test_running_intervals_are_those_of_the_statistics(metric):
+    generator = np.random.default_rng(1)
+    share = metric in SHARES
+    values = generator.integers(0, 2, 300) if share else 1e6 + generator.normal(size=300)
+    means, widths = running_interval(metric, values)
+    for n in (1, 2, 3, 10, 300):
+        sample = values[:n]
+        interval = wilson(sample.sum(), n) if share else mean_interval(sample)
+        half = (interval.high - interval.low) / 2 if share or n > 1 else np.inf
+        assert (means[n - 1], widths[n - 1]) == pytest.approx((interval.mean, half), rel=1e-9)
+
+
+def test_a_constant_has_an_interval_without_length():
+    _, widths = running_interval("reward", np.full(50, 0.1))
+    assert widths[0] == np.inf
+    assert not widths[1:].any()
+
+
+def test_a_stopping_point_by_hand():
+    # 0, 2, 1, 1, 1, ...: squares of deviations add up to 2; t sqrt(2 / (n (n - 1))) is
+    # 2.484, 1.299, 0.878 for n = 3, 4, 5 with t = 4.30265, 3.18245, 2.77645
+    values = [0.0, 2.0] + [1.0] * 20
+    row = reached(rule(targets={"reward": {"absolute": 1.0}}), reward=values)
+    assert (row.stop, row.missions, row.met) == (5, 5, True)
+    assert (row.mean, row.half_width) == pytest.approx((1.0, 0.87799), abs=1e-5)
+    row = reached(rule(targets={"reward": {"absolute": 1.0}}, look_ahead=3), reward=values)
+    assert (row.stop, row.missions) == (5, 8)
+
+
+def test_the_look_ahead_refuses_a_lucky_beginning():
+    # three equal values have an interval without length; with the fourth it is
+    # 3.18245 / 2 = 1.591, then 2.77645 sqrt(0.16) = 1.111, then 2.57058 / 3 = 0.857
+    values = [1.0, 1.0, 1.0, 3.0] + [1.0] * 20
+    targets = {"reward": {"absolute": 1.0}}
+    assert reached(rule(targets=targets), reward=values).missions == 2
+    row = reached(rule(targets=targets, look_ahead=2), reward=values)
+    assert (row.stop, row.missions) == (6, 8)
+
+
+def test_nothing_stops_before_the_first_check():
+    row = reached(rule(first=7, targets={"reward": {"absolute": 1.0}}), reward=[1.0] * 30)
+    assert (row.stop, row.missions) == (7, 7)
+
+
+def test_a_negative_mean_is_as_hard_as_its_mirror_image():
+    # half-width / mean would be negative, and "met" from the start
+    values = np.random.default_rng(2).normal(100.0, 40.0, 2000)
+    relative = rule(first=3, targets={"reward": {"relative": 0.05}})
+    up, down = reached(relative, reward=values), reached(relative, reward=-values)
+    assert down.stop == up.stop > 100
+    assert 0 < down.half_width <= down.target == pytest.approx(0.05 * abs(down.mean))
+
+
+def test_a_mean_of_zero_meets_no_relative_target():
+    relative = rule(budget=400, targets={"reward": {"relative": 0.5}})
+    row = reached(relative, reward=[1.0, -1.0] * 300)
+    assert (row.missions, row.stop, row.met, row.target) == (400, None, False, 0.0)
+    assert reached(relative, reward=[0.0] * 300).missions == 2  # certain, as far as it shows
+
+
+def test_either_kind_of_target_will_do():
+    values = np.random.default_rng(3).normal(100.0, 40.0, 2000)
+    both = {"absolute": 10.0, "relative": 0.001}
+    by_absolute = reached(rule(first=10, targets={"reward": both}), reward=values)
+    both = {"absolute": 0.001, "relative": 0.1}
+    by_relative = reached(rule(first=10, targets={"reward": both}), reward=values)
+    alone = reached(rule(first=10, targets={"reward": {"absolute": 10.0}}), reward=values)
+    assert by_absolute == alone
+    assert by_absolute.stop == pytest.approx(by_relative.stop, abs=10)
+
+
+def test_all_targets_must_hold_and_every_one_is_reported():
+    generator = np.random.default_rng(4)
+    data = {"success": generator.random(3000) < 0.9, "reward": generator.normal(size=3000)}
+    targets = {"success": {"absolute": 0.05}, "reward": {"absolute": 0.2}}
+    stops = {
+        m: reached(rule(first=30, targets={m: t}), **{m: data[m]}).stop for m, t in targets.items()
+    }
+    both = rule(first=30, targets=targets)
+    samples = finished(both, data)
+    rows = both.reached(samples + samples[:1])
+    assert [(row.point, row.metric) for row in rows] == [
+        (point, metric) for point in (0, 1) for metric in targets
+    ]
+    assert rows[0].stop >= max(stops.values()) > min(stops.values())
+    assert all(row.met and row.half_width <= row.target for row in rows)
+
+
+def test_where_the_budget_ends_it_says_what_was_missed():
+    generator = np.random.default_rng(5)
+    data = {"success": generator.random(900) < 0.5, "reward": generator.normal(size=900)}
+    targets = {"success": {"absolute": 0.01}, "reward": {"absolute": 0.5}}
+    narrow = rule(first=30, look_ahead=10, budget=200, targets=targets)
+    success, reward = narrow.reached(finished(narrow, data))
+    assert success.missions == reward.missions == narrow.budget
+    assert success.stop is reward.stop is None
+    assert (success.met, reward.met) == (False, True)
+    assert success.half_width > success.target
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_stopping_point_is_the_one_of_the_definition(seed):
+    generator = np.random.default_rng(seed)
+    look_ahead = int(generator.integers(0, 20))
+    data = {"reward": generator.exponential(size=300), "success": generator.random(300) < 0.8}
+    targets = {"reward": {"relative": 0.25, "absolute": 0.2}, "success": {"absolute": 0.08}}
+    cautious = rule(first=5, look_ahead=look_ahead, budget=300, targets=targets)
+    samples = finished(cautious, data)
+    stop = cautious.reached(samples)[0].stop
+    assert stop == slow_stop(cautious, data)
+    assert len(samples[0]["reward"]) == (300 if stop is None else stop + look_ahead)
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.3, 8.0])
+def test_the_stopping_point_does_not_depend_on_the_rounds(growth, monkeypatch):
+    values = np.random.default_rng(6).normal(1.0, 0.5, 5000)
+    fine = rule(first=30, look_ahead=20, targets={"reward": {"relative": 0.03}})
+    stop = reached(fine, reward=values).stop
+    monkeypatch.setattr(stopping, "_GROWTH", growth)
+    assert reached(fine, reward=values).stop == stop > 500
+
+
+def test_the_rounds_are_few_and_do_not_lead_past_the_stopping_point():
+    fine = rule(first=30, look_ahead=50, targets={"reward": {"absolute": 0.02}})
+    for seed in range(10):
+        values = np.random.default_rng(seed).normal(size=(1, 5000)) * 0.4
+        (row,) = fine.reached(finished(fine, {"reward": values[0]}, rounds := []))
+        assert row.missions == row.stop + fine.look_ahead
+        assert len(rounds) < 15
+        assert all(later <= 2 * earlier + 51 for earlier, later in pairwise(rounds))
+
+
+def test_interruptions_leave_no_trace():
+    generator = np.random.default_rng(7)
+    values = generator.normal(1.0, 0.4, 5000)
+    fine = rule(first=30, look_ahead=20, targets={"reward": {"relative": 0.03}})
+    whole = reached(fine, reward=values).missions
+    count = 0
+    while (wanted := fine.wanted([{"reward": values[:count]}])[0]) > count:
+        count = int(generator.integers(count + 1, wanted + 1))  # killed somewhere in the round
+    assert count == whole
+    assert fine.wanted([{"reward": values[: whole + 100]}]) == [whole + 100]  # nothing is lost
+
+
+def test_every_point_is_judged_alone():
+    generator = np.random.default_rng(8)
+    samples = [{"reward": scale * generator.normal(size=40)} for scale in (0.01, 1.0, 0.01)]
+    fine = rule(first=30, look_ahead=5, targets={"reward": {"absolute": 0.1}})
+    narrow, wide, also = fine.wanted(samples)
+    assert (narrow, also) == (40, 40)
+    assert wide > 40
+
+
+def covered(rule, metric, mean, draw, trials):
+    """The share of trials whose interval, after stopping, holds the mean."""
+    hits = 0
+    for seed in range(trials):
+        (sample,) = finished(rule, {metric: draw(np.random.default_rng(seed))})
+        values = sample[metric]
+        share = metric in SHARES
+        interval = wilson(values.sum(), len(values)) if share else mean_interval(values)
+        hits += interval.low <= mean <= interval.high
+    return hits / trials
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "metric, mean, draw",
+    [
+        ("reward", -1.0, lambda generator: generator.normal(-1.0, 0.4, 2000)),
+        ("success", 0.9, lambda generator: generator.random(2000) < 0.9),
+    ],
+)
+def test_intervals_cover_the_mean_after_stopping(metric, mean, draw):
+    # 95 %; the binomial error of 2000 trials is 0.5 %
+    by_default = Precision.model_validate({"targets": {metric: {"relative": 0.05}}})
+    assert 0.93 <= covered(by_default, metric, mean, draw, 2000) <= 0.97
+
+
+@pytest.mark.slow
+def test_intervals_of_skewed_values_cover_the_mean_after_stopping():
+    by_default = Precision.model_validate({"targets": {"reward": {"relative": 0.05}}})
+    coverage = covered(by_default, "reward", 1.0, lambda g: g.exponential(1.0, 5000), 2000)
+    assert 0.93 <= coverage <= 0.97
+
+
+@pytest.mark.parametrize(
+    "fields, complaint",
+    [
+        ({"targets": {}}, "targets"),
+        ({"targets": {"speed": {"absolute": 1.0}}}, "'success', 'collection_ratio'"),
+        ({"targets": {"reward": {}}}, "allowed: absolute, relative, or both"),
+        ({"targets": {"reward": {"absolute": 0.0}}}, "greater than 0"),
+        ({"targets": {"reward": {"relative": float("inf")}}}, "finite"),
+        ({"targets": {"reward": {"absolut": 1.0}}}, "absolut"),
+        ({"targets": {"reward": {"absolute": 1.0}}, "first": 1}, "first"),
+        (
+            {"targets": {"reward": {"absolute": 1.0}}, "first": 30, "look_ahead": 50, "budget": 79},
+            "allowed: 80 or more",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_refused(fields, complaint):
+    with pytest.raises(ValidationError, match=complaint):
+        Precision.model_validate(fields)
+
+
+def test_a_rule_survives_being_written_down():
+    whole = Precision.model_validate({"targets": {"success": {"absolute": 0.02}}})
+    assert Precision.model_validate_json(json.dumps(whole.model_dump(mode="json"))) == whole

@@ -1,0 +1,216 @@
+"""The maps hold what eq. 19-22 put in them: by hand, and against maps that are built in full."""
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+from dess.errors import InputError
+from policies.ddqn.observations.maps import (
+    BATTERY_SCALE,
+    DATA,
+    DATA_SCALE,
+    FLYING_TIME,
+    STATUS,
+    ZONE,
+    Maps,
+)
+from policies.ddqn.observations.states import (
+    ACTIVE,
+    BATTERY,
+    Layout,
+    Snapshots,
+    X,
+    Y,
+    empty_snapshots,
+)
+
+GRID = 32  # centred: 63 cells a side with the UAV at 31; global: 21 cells with the UAV's at 10
+ZONE_CELLS = (26, 2, 4, 4)
+
+
+class Observed(NamedTuple):
+    """The observation of one UAV."""
+
+    near: np.ndarray
+    far: np.ndarray
+    own: np.ndarray
+
+
+def _team(*uavs: tuple[int, int, int, int], residual: tuple[float, ...] = ()) -> Snapshots:
+    """The snapshot of one mission with UAVs (x, y, battery, active)."""
+    snapshots = empty_snapshots(1, len(uavs), len(residual))
+    snapshots.uavs[0][:, [X, Y, BATTERY, ACTIVE]] = uavs
+    snapshots.residual[0] = residual
+    return snapshots
+
+
+def _layout(*nodes: tuple[int, int]) -> Layout:
+    return Layout(GRID, np.array(ZONE_CELLS), np.array(nodes, np.int64).reshape(-1, 2))
+
+
+def _observe(layout: Layout, snapshots: Snapshots, uav: int = 0) -> Observed:
+    near, far, own = Maps(layout).encode(snapshots, np.array([0]), np.array([uav]))
+    return Observed(near[0], far[0], own[0])
+
+
+def _filled(layer: np.ndarray) -> dict[tuple[int, int], float]:
+    """The cells (x, y) of a layer that are not zero."""
+    return {(int(x), int(y)): float(layer[y, x]) for y, x in np.argwhere(layer)}
+
+
+def test_a_node_under_the_uav_is_in_the_middle() -> None:
+    seen = _observe(_layout((5, 20)), _team((5, 20, 60, 1), residual=(10.0,)))
+    assert _filled(seen.near[DATA]) == {(8, 8): 0.5}
+    assert _filled(seen.far[DATA]) == {(10, 10): pytest.approx(0.5 / 9)}
+    assert seen.own == pytest.approx(0.6)
+
+
+def test_the_local_map_ends_eight_cells_away() -> None:
+    nodes = [(18, 10), (19, 10), (10, 2), (10, 1), (2, 18)]
+    seen = _observe(_layout(*nodes), _team((10, 10, 60, 1), residual=(20.0,) * len(nodes)))
+    assert _filled(seen.near[DATA]) == {(16, 8): 1.0, (8, 0): 1.0, (0, 16): 1.0}
+
+
+def test_the_nodes_of_one_global_cell_share_its_mean() -> None:
+    # Relative cells (-1, 0) and (1, 1) lie with the UAV in global cell (10, 10), (2, 0) does not.
+    nodes = [(9, 10), (11, 11), (12, 10)]
+    seen = _observe(_layout(*nodes), _team((10, 10, 60, 1), residual=(20.0, 10.0, 20.0)))
+    assert _filled(seen.near[DATA]) == {(7, 8): 1.0, (9, 9): 0.5, (10, 8): 1.0}
+    shares = {(10, 10): pytest.approx(1.5 / 9), (11, 10): pytest.approx(1 / 9)}
+    assert _filled(seen.far[DATA]) == shares
+
+
+def test_from_a_corner_the_opposite_corner_is_at_the_rim() -> None:
+    layout = _layout((31, 31), (0, 0))
+    seen = _observe(layout, _team((0, 0, 60, 1), residual=(20.0, 20.0)))
+    assert _filled(seen.far[DATA]) == {
+        (20, 20): pytest.approx(1 / 9),
+        (10, 10): pytest.approx(1 / 9),
+    }
+    seen = _observe(layout, _team((31, 31, 60, 1), residual=(20.0, 20.0)))
+    assert _filled(seen.far[DATA]) == {
+        (0, 0): pytest.approx(1 / 9),
+        (10, 10): pytest.approx(1 / 9),
+    }
+    assert _filled(seen.near[DATA]) == {(8, 8): 1.0}
+
+
+def test_the_zone_partly_in_the_local_map() -> None:
+    # Seen from (20, 11) the zone spans relative x 6 to 9 and y -9 to -6; the map ends at 8.
+    seen = _observe(_layout(), _team((20, 11, 60, 1)))
+    assert _filled(seen.near[ZONE]) == {(x, y): 1.0 for x in (14, 15, 16) for y in (0, 1, 2)}
+    # Centred it spans columns 37 to 40 and rows 22 to 25: 2 and 2 cells of global columns 12 and
+    # 13, and 2 and 2 of rows 7 and 8.
+    shares = {(12, 7): 2 * 2, (13, 7): 2 * 2, (12, 8): 2 * 2, (13, 8): 2 * 2}
+    assert _filled(seen.far[ZONE]) == {cell: pytest.approx(n / 9) for cell, n in shares.items()}
+
+
+def test_a_whole_global_cell_of_zone_counts_one() -> None:
+    # Seen from (25, 1) the zone begins one cell right of and below the own one: row, column 32.
+    seen = _observe(_layout(), _team((25, 1, 60, 1)))
+    assert seen.far[ZONE][11, 11] == pytest.approx(1)
+    assert seen.far[ZONE].sum() * 9 == pytest.approx(16)
+    assert seen.far[ZONE][10, 10] == pytest.approx(1 / 9)
+
+
+def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
+    snapshots = _team((10, 10, 60, 1), (12, 7, 35, 1), (11, 10, 50, 0), (0, 0, 0, 0))
+    seen = _observe(_layout(), snapshots)
+    assert _filled(seen.near[FLYING_TIME]) == pytest.approx({(8, 8): 0.6, (10, 5): 0.35})
+    assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (10, 5): 1.0}
+    assert _filled(seen.far[STATUS]) == pytest.approx({(10, 10): 1 / 9, (11, 9): 1 / 9})
+    # The other one sees the first from its own place, and its own battery.
+    seen = _observe(_layout(), snapshots, uav=1)
+    assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (6, 11): 1.0}
+    assert seen.own == pytest.approx(0.35)
+    # Who is done is not even on its own map.
+    seen = _observe(_layout(), snapshots, uav=2)
+    assert _filled(seen.near[STATUS]) == {(7, 8): 1.0, (9, 5): 1.0}
+    assert seen.own == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("settings", "line"),
+    [
+        ({"crop": 16}, "crop: must be an odd number of 1 to 63, not 16"),
+        ({"crop": 65}, "crop: must be an odd number of 1 to 63, not 65"),
+        ({"crop": -1}, "crop: must be an odd number of 1 to 63, not -1"),
+        ({"pool": 0}, "pool: must be 1 to 63, not 0"),
+        ({"pool": 64}, "pool: must be 1 to 63, not 64"),
+    ],
+)
+def test_refuses_maps_that_do_not_fit(settings: dict[str, int], line: str) -> None:
+    with pytest.raises(InputError, match=re.escape(line)):
+        Maps(_layout(), **settings)
+
+
+def test_no_rows() -> None:
+    maps = Maps(_layout())
+    none = np.zeros(0, np.int64)
+    encoded = maps.encode(_team((0, 0, 60, 1)), none, none)
+    assert [a.shape for a in encoded] == [(0, *shape) for shape in maps.shapes]
+
+
+@st.composite
+def _worlds(draw: st.DrawFn) -> tuple[Maps, Snapshots, np.ndarray, np.ndarray]:
+    """Any layout, map sizes, three missions of a team, and rows of them."""
+    grid = draw(st.integers(2, 12))
+    width, height = draw(st.integers(1, grid)), draw(st.integers(1, grid))
+    x, y = draw(st.integers(0, grid - width)), draw(st.integers(0, grid - height))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    nodes = rng.integers(0, grid, (draw(st.integers(1, 5)), 2))
+    layout = Layout(grid, np.array([x, y, width, height]), nodes)
+    crop = 2 * draw(st.integers(0, grid - 1)) + 1
+    maps = Maps(layout, crop, draw(st.integers(1, 2 * grid - 1)))
+
+    snapshots = empty_snapshots(3, draw(st.integers(1, 4)), len(nodes))
+    fleet = snapshots.uavs.shape[:2]
+    snapshots.uavs[..., [X, Y]] = rng.integers(0, grid, (*fleet, 2))
+    snapshots.uavs[..., BATTERY] = rng.integers(0, 101, fleet)
+    snapshots.uavs[..., ACTIVE] = rng.integers(0, 2, fleet)
+    snapshots.residual[:] = rng.uniform(0, 20, snapshots.residual.shape)
+    missions, uavs = (rng.integers(0, most, 7) for most in fleet)
+    return maps, snapshots, missions, uavs
+
+
+def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The map (4, M, M) of a mission, before any centring."""
+    layers = np.zeros((4, layout.grid, layout.grid))
+    x, y, width, height = layout.zone
+    layers[ZONE, y : y + height, x : x + width] = 1
+    np.add.at(layers[DATA], (layout.nodes[:, 1], layout.nodes[:, 0]), residual / DATA_SCALE)
+    active = team[team[:, ACTIVE] != 0]
+    cells = active[:, Y], active[:, X]
+    np.add.at(layers[FLYING_TIME], cells, active[:, BATTERY] / BATTERY_SCALE)
+    np.add.at(layers[STATUS], cells, 1)
+    return layers
+
+
+@given(_worlds())
+def test_the_maps_are_those_cut_from_the_whole_centred_map(
+    world: tuple[Maps, Snapshots, np.ndarray, np.ndarray],
+) -> None:
+    maps, snapshots, missions, uavs = world
+    grid, crop, pool, width = maps.layout.grid, maps.crop, maps.pool, maps.width
+    encoded = maps.encode(snapshots, missions, uavs)
+    assert [a.shape[1:] for a in encoded] == list(maps.shapes)
+    assert all(a.dtype == np.float32 for a in encoded)
+    event(f"cells left out {(2 * grid - 1) % pool > 0}")
+
+    for near, far, own, mission, uav in zip(*encoded, missions, uavs, strict=True):
+        team = snapshots.uavs[mission]
+        layers = _layers(maps.layout, team, snapshots.residual[mission])
+        x, y = team[uav, X], team[uav, Y]
+        padded = np.pad(layers, ((0, 0), (grid - 1, grid - 1), (grid - 1, grid - 1)))
+        centred = padded[:, y : y + 2 * grid - 1, x : x + 2 * grid - 1]
+        edge = (2 * grid - 1 - crop) // 2
+        cut = centred[:, edge : edge + crop, edge : edge + crop]
+        blocks = centred[:, : width * pool, : width * pool]
+        pooled = blocks.reshape(4, width, pool, width, pool).mean((2, 4))
+        np.testing.assert_allclose(near, cut, rtol=1e-6)
+        np.testing.assert_allclose(far, pooled, rtol=1e-5)
+        np.testing.assert_allclose(own, team[uav, BATTERY] / BATTERY_SCALE, rtol=1e-6)

@@ -1,0 +1,142 @@
+"""Snapshots tell of the UAVs what the view tells, the mask of the guard included."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+
+import policies
+from dess.batch import simulate_batch
+from dess.env.stepper import Lanes
+from dess.mission import simulate
+from dess.scenario import ScenarioSpace, load_scenario
+from dess.state import HOVER, State
+from dess.view import View
+from policies.ddqn.observations import states as columns
+from policies.ddqn.observations.maps import Maps
+from policies.ddqn.observations.states import (
+    ACTIVE,
+    BATTERY,
+    CHARGING,
+    HOME,
+    LATCH,
+    MUST_CHARGE,
+    NEEDED,
+    Snapshots,
+    X,
+    Y,
+    empty_snapshots,
+    layout_of,
+    masks,
+    snapshot,
+)
+from policies.guard import guard
+from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces, teams
+
+FIELDS = {
+    X: "x",
+    Y: "y",
+    BATTERY: "battery",
+    ACTIVE: "active",
+    LATCH: "latch",
+    CHARGING: "charging",
+}
+
+
+class _Compared:
+    """Another policy; on the way it compares what it sees with the snapshots."""
+
+    def __init__(self, policy: Any):
+        self.policy, self.name = policy, policy.name
+        self.charging = 0
+
+    def act(self, view: View) -> np.ndarray:
+        guarded, free = snapshot(view.state, True), snapshot(view.state, False)
+        assert (masks(guarded, view.mission, view.uav) == guard(view)).all()
+        assert (masks(free, view.mission, view.uav) == view.legal).all()
+        for states in (guarded, free):
+            self._compare(view.state, states)
+        return self.policy.act(view)
+
+    def _compare(self, state: State, states: Snapshots) -> None:
+        present = np.arange(state.uavs.shape[1]) < state.missions["uavs"][:, None]
+        assert not states.uavs[~present].any()
+        for column, field in FIELDS.items():
+            assert (states.uavs[..., column][present] == state.uavs[field][present]).all()
+        assert (states.residual == state.residual.astype(np.float32)).all()
+        assert (states.missions[:, columns.CHARGE_START] == state.missions["charge_start"]).all()
+        finish = states.missions[:, columns.CHARGE_COMPLETE]
+        assert (finish == state.missions["charge_complete"]).all()
+        # Who charges, and who is done, can only hover.
+        idle = np.nonzero(present & (state.uavs["charging"] | ~state.uavs["active"]))
+        only_hover = np.arange(5) == HOVER
+        assert (masks(states, *idle) == only_hover).all()
+        self.charging += int(state.uavs["charging"].sum())
+
+
+@given(spaces(), teams, seeds, replications)
+def test_snapshots_tell_what_the_view_tells(
+    space: ScenarioSpace, team: list[Any], seed: int, replication: int
+) -> None:
+    compared = [_Compared(policy) for policy in team]
+    simulate(space, compared, seed, replication)
+    event(f"somebody charged {any(policy.charging for policy in compared)}")
+
+
+def test_snapshots_of_many_missions() -> None:
+    compared = _Compared(policies.load("greedy"))
+    simulate_batch(load_scenario("paper"), compared, 51, 20)
+    assert compared.charging > 0
+
+
+def _state(uavs: list[dict[str, Any]], **scenario: Any) -> State:
+    """One mission with UAVs in given states, 400 communications short of the quota."""
+    space = ScenarioSpace.of(**({"uavs": len(uavs), "charge_start": 30} | scenario))
+    lanes = Lanes(space, 1, 1)
+    lanes.launch(lanes.numbers)
+    for u, values in zip(lanes.state.uavs[0], uavs, strict=True):
+        for name, value in ({"battery": 60, "communications": 40} | values).items():
+            u[name] = value
+    return lanes.state
+
+
+def test_a_uav_far_out_by_hand() -> None:
+    # 6 + 5 slots from the nearest zone cell (26, 5), 11 % in hand: only the ways home are left.
+    states = snapshot(_state([{"x": 20, "y": 10, "battery": 12}]), True)
+    row = states.uavs[0, 0]
+    assert [row[X], row[Y], row[BATTERY]] == [20, 10, 12]
+    assert [row[NEEDED], row[MUST_CHARGE], row[HOME]] == [100, 1, 11]
+    (mask,) = masks(states, np.array([0]), np.array([0]))
+    assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
+    # Four communications, one slot, are left: no need to charge, all is open.
+    states = snapshot(_state([{"x": 20, "y": 10, "battery": 3, "communications": 436}]), True)
+    assert [states.uavs[0, 0, NEEDED], states.uavs[0, 0, MUST_CHARGE]] == [1, 0]
+    assert masks(states, np.array([0]), np.array([0])).all()
+
+
+def test_each_has_its_own_parking_cell() -> None:
+    # Both are nearest to (26, 5); the one with less battery chooses first.
+    first, second = {"x": 23, "y": 5, "battery": 20}, {"x": 26, "y": 8, "battery": 19}
+    states = snapshot(_state([first, second]), True)
+    assert states.uavs[0, :, HOME].tolist() == [3 + 1, 3]
+
+
+def test_without_the_guard_only_the_edge_closes() -> None:
+    states = snapshot(_state([{"x": 31, "y": 0, "battery": 1}]), False)
+    (mask,) = masks(states, np.array([0]), np.array([0]))
+    assert np.nonzero(mask)[0].tolist() == [SOUTH, WEST, HOVER]
+
+
+def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
+    states = snapshot(_state([{}], quota=1_000_000, communication_slots=1), True)
+    assert states.uavs[0, 0, NEEDED] == np.iinfo(np.int16).max
+
+
+@pytest.mark.parametrize("uavs", [1, 3])
+def test_a_snapshot_takes_a_few_bytes(uavs: int) -> None:
+    paper = load_scenario("paper")
+    one = sum(part.nbytes for part in empty_snapshots(1, uavs, len(paper.nodes)))
+    assert one == 2 * 2 + 10 * 2 * uavs + 4 * 25  # thresholds, UAVs, nodes
+    maps = sum(4 * int(np.prod(shape)) for shape in Maps(layout_of(paper)).shapes)
+    assert 80 * one < uavs * maps

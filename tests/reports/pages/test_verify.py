@@ -1,0 +1,279 @@
+"""Pages and results can be checked by whoever has them; what was altered is found."""
+
+import json
+import re
+import shutil
+from hashlib import sha256
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from analysis import load_study, run_study
+from analysis.results.evidence import Evidence, learned_files, verify
+from analysis.results.tables import load_results
+from dess.errors import InputError
+from policies.registry import TRAINED
+from reports.cli import main
+from reports.pages import html as pieces
+from reports.pages.html import STUDY, embedded
+from reports.pages.render import _index, _pages, render
+from reports.pages.verify import sealed, verify_page, verify_results
+
+ALL = 10**6
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small results of two studies."""
+    folder = tmp_path_factory.mktemp("results")
+    for name in ("table4", "fig4"):
+        study = load_study(name, missions=12, policies=["random", "greedy"])
+        run_study(study, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A page on both."""
+    out = tmp_path_factory.mktemp("out")
+    render(["performance"], results, out)
+    return out / "performance.html"
+
+
+def lines_of(path: Path, missions: int = ALL, seed: int = 0) -> list[str]:
+    """What is found to differ."""
+    check = verify_results if path.is_dir() else verify_page
+    return [line for verdict in check(path, missions, seed) for line in verdict.differing]
+
+
+def altered(path: Path, old: str, new: str, out: Path) -> Path:
+    html = path.read_text("utf-8")
+    assert old in html
+    out.write_text(html.replace(old, new, 1), "utf-8")
+    return out
+
+
+def test_pages_and_results_that_nobody_altered_agree(results: Path, page: Path) -> None:
+    for path in (page, page.with_name("index.html"), results, results / "fig4"):
+        assert lines_of(path) == []
+    compared = {verdict.what: verdict.compared for verdict in verify_page(page, ALL, 0)}
+    assert compared == {"page": 1, "table4": 24, "fig4": 32}
+    compared = {verdict.what: verdict.compared for verdict in verify_results(results, ALL, 0)}
+    assert compared == {"table4": 24, "fig4": 72, "fig4, event logs": 6}
+
+
+def test_another_number_on_a_page_is_found(page: Path, tmp_path: Path) -> None:
+    (shown,) = set(re.findall(r"<td>(\d+\.\d %)</td>", page.read_text("utf-8"))[:1])
+    digit = "1" if shown[0] != "1" else "2"
+    forged = altered(page, f"<td>{shown}", f"<td>{digit}{shown[1:]}", tmp_path / "page.html")
+    assert lines_of(forged) == ["the page has been altered"]
+
+
+def test_a_page_whose_missions_were_altered_is_found_by_flying_them(
+    page: Path, tmp_path: Path
+) -> None:
+    """Even where the checksum was made anew."""
+    text = embedded(STUDY, page.read_text("utf-8"))[0]
+    evidence = json.loads(text)
+    mission = evidence["sample"][3]
+    mission["record"]["collected"] += 1e-9
+    forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+    forged.write_text(sealed(forged.read_text("utf-8")), "utf-8")
+    (line,) = lines_of(forged)
+    assert line.startswith(f"collected is {mission['record']['collected']} and ")
+    assert f"--policy {mission['policy']} " in line
+    assert line.endswith(f"--seed 2022 --replication {mission['replication']}")
+
+
+def test_a_file_of_results_that_was_altered_is_found(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results / "fig4", tmp_path / "fig4")
+    for kind in ("missions", "uavs", "events"):
+        path = sorted((folder / kind).rglob("*.parquet"))[0]
+        whole = path.read_bytes()
+        path.write_bytes(whole[:-20] + bytes([whole[-20] ^ 1]) + whole[-19:])
+        assert lines_of(folder) == [f"{path}: is not what was written"]
+        path.write_bytes(whole)
+    assert lines_of(folder) == []
+
+
+def test_a_forged_record_is_found_by_flying_its_mission(results: Path, tmp_path: Path) -> None:
+    """A file that is sound in itself, with the name that belongs to its bytes."""
+    folder = shutil.copytree(results / "table4", tmp_path / "table4")
+    path = sorted((folder / "missions").rglob("*.parquet"))[0]
+    table = pq.read_table(path, partitioning=None)
+    column = table.schema.get_field_index("collection_ratio")
+    better = [min(ratio + 0.01, 1.0) for ratio in table["collection_ratio"].to_pylist()]
+    forged = table.set_column(column, table.schema.field(column), [better])
+    path.unlink()
+    pq.write_table(forged, path)
+    resealed(path, path.stem)
+    found = lines_of(folder)
+    assert len(found) == sum(ratio < 1 for ratio in table["collection_ratio"].to_pylist())
+    assert all(line.startswith("collection_ratio is ") for line in found)
+
+
+def resealed(path: Path, name: str) -> None:
+    """A parquet file with the name that belongs to its bytes."""
+    digest = sha256(path.read_bytes()).hexdigest()[:16]
+    path.rename(path.with_name(f"{name.rpartition('-')[0]}-{digest}.parquet"))
+
+
+def test_a_forged_uav_and_a_forged_log_are_found(results: Path, tmp_path: Path) -> None:
+    for kind, column, found in (("uavs", "slots_charging", 36), ("events", "value", 1)):
+        folder = shutil.copytree(results / "fig4", tmp_path / kind)
+        path = sorted((folder / kind).rglob("*.parquet"))[0]
+        table = pq.read_table(path, partitioning=None)
+        number = table.schema.get_field_index(column)
+        other = [value + 1 for value in table[column].to_pylist()]
+        path.unlink()
+        pq.write_table(table.set_column(number, table.schema.field(number), [other]), path)
+        resealed(path, path.stem)
+        lines = lines_of(folder)
+        assert len(lines) == found
+        assert all((f"uav 1 {column}" in line) == (kind == "uavs") for line in lines)
+
+
+def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results / "table4", tmp_path / "table4")
+    path = sorted((folder / "missions").rglob("*.parquet"))[0]
+    table = pq.read_table(path, partitioning=None)
+    number = table.schema.get_field_index("reward")
+    other = [value + 1 for value in table["reward"].to_pylist()]
+    second = path.with_name("second.parquet")
+    pq.write_table(table.set_column(number, table.schema.field(number), [other]), second)
+    resealed(second, path.stem)
+    lines = lines_of(folder)
+    assert len(lines) == 2 and f"{path}: is not what was written" in lines
+    with pytest.raises(InputError, match="incomplete"):
+        load_results(folder)
+
+
+def test_a_page_without_missions_or_with_few_fields_says_so(page: Path, tmp_path: Path) -> None:
+    bare = tmp_path / "bare.html"
+    bare.write_text(sealed('<meta name="dess-checksum" content="">'))
+    (verdict,) = verify_page(bare, ALL, 0)
+    assert verdict.notes == ["carries no missions to fly again"]
+    text = embedded(STUDY, page.read_text("utf-8"))[0]
+    for field, value in (("sample", []), ("policies", json.loads(text)["policies"][1:])):
+        evidence = json.loads(text) | {field: value}
+        forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+        with pytest.raises(InputError, match="sample"):
+            verify_page(forged, ALL, 0)
+    evidence = json.loads(text)
+    del evidence["sample"][0]["record"]["slots"]
+    forged = altered(page, text, json.dumps(evidence), tmp_path / "page.html")
+    with pytest.raises(InputError, match="has no slots"):
+        verify_page(forged, ALL, 0)
+
+
+def test_an_altered_page_does_not_get_into_the_index(
+    page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    folder = shutil.copytree(page.parent, tmp_path / "out")
+    assert {*_pages(folder)} == {"performance.html"}
+    altered(page, "Performance", "Perfection", folder / "performance.html")
+    (folder / "comparison.html").write_bytes(b"\xff")
+    old = page.read_text("utf-8").replace(embedded(STUDY, page.read_text("utf-8"))[0], "{}")
+    (folder / "mission.html").write_text(sealed(old), "utf-8")
+    assert not _pages(folder)
+    told = {record.args[0].name for record in caplog.records}
+    assert told == {"comparison.html", "performance.html", "mission.html"}
+    caplog.clear()
+    assert not _pages(folder, but=told) and not caplog.records  # what is made anew is not missed
+    assert "performance.html" not in _index(_pages(folder))
+
+
+def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(results, tmp_path / "results")
+    manifest = folder / "fig4" / "manifest.json"
+    manifest.write_text(manifest.read_text().replace('"complete": true', '"complete": false'))
+    fig4, table4 = verify_results(folder, ALL, 0)
+    assert fig4.notes == ["incomplete, so not checked"] and table4.compared == 24
+    manifest.write_text("{}")
+    assert len(verify_results(folder, ALL, 0)[0].differing) == 1
+
+
+def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = shutil.copytree(TRAINED, tmp_path / "trained")
+    html = f'<meta name="dess-checksum" content="">{pieces.weights(folder).data}'
+    path = tmp_path / "page.html"
+    path.write_text(sealed(html), "utf-8")
+    assert lines_of(path) == []
+    weights = folder / "ddqn" / "model.safetensors"
+    weights.write_bytes(weights.read_bytes() + b" ")
+    assert learned_files(folder) != learned_files()
+    path.write_text(sealed(html.replace(*_digests(folder))), "utf-8")
+    assert lines_of(path) == ["ddqn/model.safetensors: is another one here"]
+
+
+def _digests(folder: Path) -> tuple[str, str]:
+    """The hash of the shipped weights, and that of those in a folder."""
+    name = "ddqn/model.safetensors"
+    return learned_files()[name], learned_files(folder)[name]
+
+
+def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: Path) -> None:
+    evidence = Evidence.of(load_results(results / "table4"))
+    assert verify(evidence, ALL, 0).notes == []
+    team = evidence.policies[0]
+    member = team.members[0].model_copy(update={"code": "other"})
+    other = team.model_copy(update={"members": [member]})
+    changes = {"code": "other", "policies": [other, *evidence.policies[1:]]}
+    found = verify(evidence.model_copy(update=changes), ALL, 0)
+    assert found.notes == ["made by other code of dess", "made by other code or weights of random"]
+    assert found.differing == []
+    older = evidence.model_copy(update={"version": "0.0.1"})
+    assert verify(older, ALL, 0).notes[0].startswith("made by dess 0.0.1, not ")
+
+
+def test_the_sample_is_drawn_at_random(results: Path) -> None:
+    loaded = load_results(results / "fig4")
+    few = [
+        {(m.policy, str(m.values), m.replication) for m in Evidence.of(loaded, 20, seed).sample}
+        for seed in (1, 1, 2)
+    ]
+    assert few[0] == few[1] != few[2]
+    assert [len(sample) for sample in few] == [20, 20, 20]
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_the_command_says_what_it_found(
+    page: Path, tmp_path: Path, as_json: bool, capsys: pytest.CaptureFixture
+) -> None:
+    options = ["--seed", "5", *(["--json"] if as_json else [])]
+    assert main(["verify", str(page), *options]) == 0
+    out = capsys.readouterr().out
+    if as_json:
+        checks = json.loads(out)["checks"]
+        assert [check["what"] for check in checks] == ["page", "table4", "fig4"]
+        assert [check["compared"] for check in checks] == [1, 20, 20]
+    else:
+        assert re.search(r"table4 +20 +0", out)
+    forged = altered(page, "Performance", "Perfection", tmp_path / "page.html")
+    assert main(["verify", str(forged), *options]) == 1
+    captured = capsys.readouterr()
+    assert "the page has been altered" in captured.err.splitlines()[0]
+    assert captured.err.splitlines()[-1].endswith("1 of 41 differ (--seed 5)")
+    if as_json:
+        assert json.loads(captured.out)["checks"][0]["differing"]
+
+
+def test_what_is_neither_a_page_nor_results_is_refused(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / "text").write_text("no page")
+    (tmp_path / "empty").mkdir()
+    broken = shutil.copytree(results / "fig4", tmp_path / "broken")
+    for path in (broken / "missions").rglob("*.parquet"):
+        path.unlink()
+    for name, message in {
+        "text": "is no page of dess",
+        "absent": "cannot be read",
+        "empty": "holds no results and is no page",
+        "broken": "incomplete",
+    }.items():
+        assert main(["verify", str(tmp_path / name)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1
+        assert message in captured.err and "allowed: " in captured.err
