@@ -15,11 +15,11 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, Percent
 from analysis.execution.decision_time import Cost
 from analysis.figures.missions import DPI, INK, MUTED, policy_colours, style
 from analysis.names import parameter
-from analysis.questions.head_to_head import AHEAD, BEHIND, OPEN, Pair
+from analysis.questions.head_to_head import AHEAD, BEHIND, INCONCLUSIVE, Pair
 from analysis.stats.intervals import LEVEL
 
 # Blue is ahead, orange behind, on all figures; a mean that cannot be told is hollow.
-COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", OPEN: MUTED}
+COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: MUTED}
 EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
 
 
@@ -46,7 +46,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
                 fmt="o",
                 markersize=6,
                 color=colour,
-                markerfacecolor="white" if row.verdict == OPEN else colour,
+                markerfacecolor="white" if row.verdict == INCONCLUSIVE else colour,
                 capsize=4,
                 elinewidth=1.8,
                 gid=row.verdict,
@@ -85,7 +85,7 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
         for row in table.itertuples():
             text = f"{100 * row.mean:+.1f}".replace("-", "−")
             ax.annotate(
-                f"({text})" if row.verdict == OPEN else text,
+                f"({text})" if row.verdict == INCONCLUSIVE else text,
                 (row.position_2 + 0.5, row.position + 0.5),
                 ha="center",
                 va="center",

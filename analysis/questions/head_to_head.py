@@ -17,13 +17,13 @@ from analysis.questions.summary import learners
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL, Interval, wilson
 from analysis.stats.paired import adjust, compare, paired
-from analysis.stats.verdict import OPEN
+from analysis.stats.verdict import INCONCLUSIVE
 from dess.errors import InputError
 from dess.scenario import Scenario
 
 PARAMETERS = ("uavs", "flying_time", "charge_start", "charge_complete", "initial_data")
 
-AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be OPEN
+AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be INCONCLUSIVE
 
 BINS = 5  # of a parameter, at most
 DEPTH, LEAST, SHARE = 3, 20, 0.05  # of the tree: its depth, and the missions in a leaf at least
@@ -348,7 +348,7 @@ def _compared(
 def _verdicts(table: pd.DataFrame) -> list[str]:
     sure = table["p_adjusted"] <= 1 - LEVEL
     return [
-        (AHEAD if mean > 0 else BEHIND) if told else OPEN
+        (AHEAD if mean > 0 else BEHIND) if told else INCONCLUSIVE
         for mean, told in zip(table["mean"], sure, strict=True)
     ]
 

@@ -18,7 +18,7 @@ from scipy import stats
 from analysis.replication.paper import CROSSING
 from analysis.stats.intervals import LEVEL, Interval, mean_interval
 from analysis.stats.paired import adjust
-from analysis.stats.verdict import OPEN, above, judged
+from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
@@ -34,7 +34,7 @@ class Transfer:
 
     Attributes:
         verdict: Of ``verdicts``, whether the mean curve with transfer ends above, by the interval
-            of the last difference; ``OPEN`` if the trainings are too short to tell.
+            of the last difference; ``INCONCLUSIVE`` if the trainings are too short to tell.
         since: The first training step from which the mean curve stays above; none if it ends below.
         throughout: Whether that is the first step that both can be compared at.
         last: Difference of the curves at the last step, with its interval.
@@ -113,7 +113,7 @@ def transfer(
     since = int(steps[first]) if first < len(steps) else None
     last = difference(a.loc[steps[-1]].to_numpy(), b.loc[steps[-1]].to_numpy(), level)[0]
     length = int(steps[-1])
-    verdict = judged(above(last)) if length >= shortest else OPEN
+    verdict = judged(above(last)) if length >= shortest else INCONCLUSIVE
     return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
 
 

@@ -16,7 +16,7 @@ from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import adjust, paired
-from analysis.stats.verdict import HOLDS, OPEN, REFUTED
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.errors import InputError
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
@@ -132,7 +132,7 @@ def best_at(pairs: pd.DataFrame, position: int) -> str:
     above = {b for a, b in ups if a == position} | {a for a, b in downs if b == position}
     if above:
         return REFUTED
-    return HOLDS if below == others else OPEN
+    return HOLDS if below == others else INCONCLUSIVE
 
 
 def no_lower(pairs: pd.DataFrame, positions: Iterable[int], margin: float) -> str:
@@ -149,7 +149,7 @@ def no_lower(pairs: pd.DataFrame, positions: Iterable[int], margin: float) -> st
     tops = rows["wide_high"].where(upwards, -rows["wide_low"])
     if (tops < -margin).any():
         return REFUTED
-    return HOLDS if (lows > -margin).all() else OPEN
+    return HOLDS if (lows > -margin).all() else INCONCLUSIVE
 
 
 def alike(pairs: pd.DataFrame, margin: float) -> str:
@@ -160,7 +160,7 @@ def alike(pairs: pd.DataFrame, margin: float) -> str:
     if ((pairs["wide_low"] > margin) | (pairs["wide_high"] < -margin)).any():
         return REFUTED
     within = (pairs["low"] >= -margin) & (pairs["high"] <= margin)
-    return HOLDS if within.all() else OPEN
+    return HOLDS if within.all() else INCONCLUSIVE
 
 
 def peaks_at(pairs: pd.DataFrame, position: int) -> str:
@@ -168,13 +168,13 @@ def peaks_at(pairs: pd.DataFrame, position: int) -> str:
     found = shape(pairs)
     if position not in found.peaks:
         return REFUTED
-    return HOLDS if found.words == PEAK else OPEN
+    return HOLDS if found.words == PEAK else INCONCLUSIVE
 
 
 def rises(pairs: pd.DataFrame) -> str:
     """Whether the metric rises along the values."""
     found = shape(pairs).words
-    return {RISES: HOLDS, LEVELS: OPEN}.get(found, REFUTED)
+    return {RISES: HOLDS, LEVELS: INCONCLUSIVE}.get(found, REFUTED)
 
 
 def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:

@@ -24,6 +24,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL, summary
 from analysis.stats.paired import compare
+from analysis.stats.verdict import INCONCLUSIVE
 from analysis.study.study import Study
 from dess import simulate_batch
 from dess.errors import InputError
@@ -45,7 +46,7 @@ MEASURES = {
     "dry": "UAVs run dry in 100 missions",
 }
 
-HIGHER, LOWER, OPEN = "higher", "lower", "cannot be told"
+HIGHER, LOWER = "higher", "lower"
 
 # Probability of telling a difference of the size that was seen, for ``missions_to_tell``.
 POWER = 0.8
@@ -243,7 +244,7 @@ def verdict(answer: Any) -> str:
     known = answer.low < answer.high or answer.p <= 1 - LEVEL
     if known and answer.low > 0:
         return HIGHER
-    return LOWER if known and answer.high < 0 else OPEN
+    return LOWER if known and answer.high < 0 else INCONCLUSIVE
 
 
 def missions_to_tell(answer: Any, power: float = POWER) -> float:

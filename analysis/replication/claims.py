@@ -28,7 +28,7 @@ from analysis.replication.evidence_of_policy import (
 )
 from analysis.results.resimulate import Flight
 from analysis.stats.intervals import Interval, mean_interval
-from analysis.stats.verdict import OPEN
+from analysis.stats.verdict import INCONCLUSIVE
 
 Judge = Callable[[Case], Finding]
 
@@ -508,7 +508,7 @@ def _levels_off(case: Case) -> Finding:
     settled = Quantity(int(since), unit="steps", name="level from")
     verdict = rules.levels_off(since / mean["updates"].iloc[-1], found.last)
     if found.length < paper.CROSSING:
-        verdict = OPEN
+        verdict = INCONCLUSIVE
     note = f"trainings {without}{_short(found)}"
     return Finding(verdict, quantities=(settled, *_last(found, "points")), note=note)
 

@@ -1,7 +1,7 @@
 """Claims of the paper, and the rules by which figures of ours judge them.
 
 A rule is a function from figures to a verdict, beside its words. A claim holds, or does not, where
-whole intervals say so, and in part where a part of it is shown; else it cannot be told. Intervals
+whole intervals say so, and in part where a part of it is shown; else it is inconclusive. Intervals
 are of 95 %, differences are taken mission by mission, unless a rule says otherwise.
 """
 
@@ -11,11 +11,11 @@ from math import hypot
 from analysis.questions.learning import BAND
 from analysis.replication.paper import CROSSING
 from analysis.stats.intervals import Interval
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED, Part, above, judged
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED, Part, above, judged
 from analysis.study.selection import Choice
 
 NO_RESULTS = "no results"
-VERDICTS = (HOLDS, IN_PART, OPEN, REFUTED, NO_RESULTS)
+VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
 
 # A figure that is surely less than this below a printed one is near it; a small change is less.
 NEAR = 0.05
@@ -23,7 +23,7 @@ NEAR = 0.05
 MARGIN = 0.01
 
 _NEAR = f"{100 * NEAR:g} points"
-_ELSE = "else it cannot be told."
+_ELSE = "else it is inconclusive."
 
 
 def gap(ours: Interval, printed: Interval) -> Interval:
@@ -50,7 +50,7 @@ def reached(difference: Interval) -> str:
     near = difference.low > -NEAR
     if difference.high < 0:
         return IN_PART if near else REFUTED
-    return HOLDS if near else OPEN
+    return HOLDS if near else INCONCLUSIVE
 
 
 GAINED = (
@@ -99,7 +99,7 @@ def slightly_lower(difference: Interval) -> str:
     if difference.low > 0 or difference.high <= -NEAR:
         return REFUTED
     if difference.high >= 0:
-        return OPEN
+        return INCONCLUSIVE
     return HOLDS if difference.low > -NEAR else IN_PART
 
 

@@ -14,7 +14,7 @@ from analysis.replication.claims import Claim, section_v
 from analysis.replication.evidence_of_policy import Case, Finding, MissingError, Quantity, Studies
 from analysis.replication.rules import MARGIN, NO_RESULTS
 from analysis.results.tables import Results
-from analysis.stats.verdict import OPEN
+from analysis.stats.verdict import INCONCLUSIVE
 from dess.errors import InputError
 
 # By learner: that with the paper's observation, network and algorithm.
@@ -119,7 +119,7 @@ def _judged(claim: Claim, case: Case) -> Finding:
     try:
         found = claim.judge(case)
         alone = any(quantity.n == 1 for quantity in found.quantities)
-        return replace(found, verdict=OPEN) if alone else found
+        return replace(found, verdict=INCONCLUSIVE) if alone else found
     except MissingError as missing:
         return Finding(NO_RESULTS, note=str(missing))
     except InputError:  # another design, or missions that this code flies in another way

@@ -5,7 +5,7 @@ A part of a claim is shown (true) or refuted (false) by a whole interval; else i
 
 from analysis.stats.intervals import Interval
 
-HOLDS, IN_PART, OPEN, REFUTED = "holds", "holds in part", "cannot be told", "does not hold"
+HOLDS, IN_PART, INCONCLUSIVE, REFUTED = "holds", "holds in part", "inconclusive", "does not hold"
 
 Part = bool | None
 
@@ -22,4 +22,4 @@ def judged(*parts: Part) -> str:
     """
     if any(parts):
         return HOLDS if all(parts) else IN_PART
-    return REFUTED if False in parts else OPEN
+    return REFUTED if False in parts else INCONCLUSIVE

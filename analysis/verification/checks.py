@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.questions.main_effects import HOLDS, OPEN, REFUTED
+from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.stats.paired import adjust
 
 # The chance that any check of chance fails although all that is known holds.
@@ -49,12 +49,12 @@ def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
 
     Returns:
         A row per check: its fields, ``p_adjusted`` and ``verdict``, one of ``effects.HOLDS``,
-        ``REFUTED`` and ``OPEN``.
+        ``REFUTED`` and ``INCONCLUSIVE``.
     """
     table = pd.DataFrame(checks, columns=Check._fields).astype({"p": float, "error": float})
     chance = table["p"].notna()
     table.loc[chance, "p_adjusted"] = adjust(table.loc[chance, "p"].to_numpy(), "holm")
     fails = (table["p_adjusted"] <= alpha) | (table["error"] > table["bound"])
     told = chance | table["error"].notna()
-    verdicts = np.select([fails, told], [REFUTED, HOLDS], OPEN)
+    verdicts = np.select([fails, told], [REFUTED, HOLDS], INCONCLUSIVE)
     return table.assign(verdict=verdicts)

@@ -26,7 +26,7 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import fly, load_results, summary
+from analysis import fly, load_results, numbers, summary
 from analysis.execution import decision_time as timing
 from analysis.figures import comparison as drawings
 from analysis.figures import missions as figures
@@ -35,7 +35,7 @@ from analysis.questions import head_to_head as regions
 from analysis.questions import summary as findings
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import CHECKPOINT
-from reports.pages import html as page
+from reports.pages import html
 
 study = load_results(Path(results) / "comparison")
 times = timing.read(Path(results) / "timing")
@@ -44,7 +44,7 @@ pair = regions.pair_of(study, learned, heuristic)
 policy, baseline = pair.policy, pair.baseline
 missions = regions.duels(study, pair)
 seed = study.manifest["seed"]
-level, risk = page.level(LEVEL), page.level(1 - LEVEL)
+level, risk = numbers.level(LEVEL), numbers.level(1 - LEVEL)
 means = summary(study.missions, by=["policy"])
 ranked = means[means["metric"] == PRODUCT].sort_values("mean", ascending=False, kind="stable")[
     "policy"
@@ -54,7 +54,7 @@ taught = {name: names for names in members.values() for name in names}
 
 
 def points(row, mean="mean"):
-    return page.points(row[mean], row["low"], row["high"])
+    return numbers.points(row[mean], row["low"], row["high"])
 
 
 def plural(n, one, many):
@@ -132,7 +132,7 @@ def told(rows, name, base):
         verdict = ("ahead of" if row["difference"] > 0 else "behind") if sure else [*groups][2]
         groups[verdict].append(f"{metric_name(row['metric'])} ({points(row, 'difference')} points)")
     parts = [
-        f"{verdict} {base} in {page.words(those)}" for verdict, those in groups.items() if those
+        f"{verdict} {base} in {numbers.words(those)}" for verdict, those in groups.items() if those
     ]
     return f"**{name}** is {'; '.join(parts)}."
 
@@ -142,12 +142,12 @@ lines = [told(versus[versus["learner"] == name], called(name), base) for name, b
 one = [name for name, _, about in shown if about == CHECKPOINT]
 more = [name for name, *_ in shown if name not in one]
 caveats = [
-    f"Of {page.words(one)} there is one training{' each' * (len(one) > 1)}: the claim is about "
+    f"Of {numbers.words(one)} there is one training{' each' * (len(one) > 1)}: the claim is about "
     f"{'this checkpoint' if len(one) == 1 else 'these checkpoints'}, and another training of the "
     "same learner may turn out better or worse."
     if one
     else "",
-    f"Of {page.words(more)} there are several trainings: the claim is about the learner, trainings "
+    f"Of {numbers.words(more)} there are several trainings: the claim is about the learner, trainings "
     "to come included."
     if more
     else "",
@@ -193,7 +193,7 @@ def by_metric(rows, name):
     for who, own in rows.groupby(name, sort=False):
         own = own.set_index("metric").loc[[*METRICS]]
         cells = [
-            (points(row, "difference"), page.p_value(row["p_adjusted"]))
+            (points(row, "difference"), numbers.p_value(row["p_adjusted"]))
             for _, row in own.iterrows()
         ]
         base = own["baseline"].iloc[0]
@@ -207,7 +207,7 @@ how = (
 )
 if len(versus):
     display(
-        page.table(
+        html.table(
             by_metric(versus.assign(learner=versus["learner"].map(called)), "learner"),
             f"Every learner against the best heuristic, n = {versus['n'].min():,} missions: {how} "
             "best heuristic",
@@ -216,7 +216,7 @@ if len(versus):
 best = findings.comparisons(study)
 if len(best):
     display(
-        page.table(
+        html.table(
             by_metric(best, "policy"),
             f"Every policy against the best one, n = {best['n'].min():,} missions: {how} best",
         )
@@ -234,7 +234,7 @@ only = {
 
 
 def share(outcome):
-    return page.interval(*counts.loc[outcome, ["share", "low", "high"]])
+    return numbers.interval(*counts.loc[outcome, ["share", "low", "high"]])
 
 
 display(
@@ -246,15 +246,15 @@ display(
         f"{plural(only[baseline], 'mission', 'missions')} it is the other way round."
     )
 )
-page.figure(
+html.figure(
     drawings.distribution(missions, pair),
     f"Distribution of the difference between {policy} and {baseline} over the missions",
     f"Share of the missions (n = {len(missions):,}) in which the difference in collection ratio "
     f"and communication is at most the value below. The {level} band holds the whole "
     "curve. Where the curve crosses 0 is the share of missions that are lost. Up to "
-    f"{page.level(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
-    f"{page.difference(missions['difference'].min(), 0)} points, the highest "
-    f"{page.difference(missions['difference'].max(), 0)}.",
+    f"{numbers.level(drawings.EDGE)} of the missions lie beyond each end of the axis; the lowest is "
+    f"{numbers.difference(missions['difference'].min(), 0)} points, the highest "
+    f"{numbers.difference(missions['difference'].max(), 0)}.",
 )
 
 # %% [markdown]
@@ -266,7 +266,7 @@ depends = regions.dependence(missions)
 fields = regions.varied(missions)
 overall = missions["difference"].mean()
 order = lead.sort_values("mean", kind="stable")
-verdicts = {v: int((lead["verdict"] == v).sum()) for v in ("ahead", "behind", regions.OPEN)}
+verdicts = {v: int((lead["verdict"] == v).sum()) for v in ("ahead", "behind", regions.INCONCLUSIVE)}
 
 
 def place(row):
@@ -278,8 +278,8 @@ def spread(field):
     rows = lead[lead["field"] == field]
     low, high = rows.loc[rows["mean"].idxmin()], rows.loc[rows["mean"].idxmax()]
     return (
-        f"the {parameter(field).within} ({page.difference(low['mean'], 0)} at {low['value']}, "
-        f"{page.difference(high['mean'], 0)} at {high['value']})"
+        f"the {parameter(field).within} ({numbers.difference(low['mean'], 0)} at {low['value']}, "
+        f"{numbers.difference(high['mean'], 0)} at {high['value']})"
     )
 
 
@@ -292,11 +292,11 @@ if len(lead):
             f"Every parameter is cut into at most {regions.BINS} bins with about as many missions; "
             "the initial data are the mean of a mission's nodes. "
             f"Of these {len(lead)} bins, {policy} is ahead in {verdicts['ahead']} and behind in "
-            f"{verdicts['behind']}; of {verdicts[regions.OPEN]} it cannot be told (at "
+            f"{verdicts['behind']}; of {verdicts[regions.INCONCLUSIVE]} it cannot be told (at "
             f"the {risk} level, after Holm's correction for all of them). The difference is lowest "
             f"with {place(order.iloc[0])}, highest with {place(order.iloc[-1])}."
-            + (f"\n\nIt depends on {page.words(named)}." if named else "")
-            + (f" That it depends on {page.words(unnamed)} is not shown." if unnamed else "")
+            + (f"\n\nIt depends on {numbers.words(named)}." if named else "")
+            + (f" That it depends on {numbers.words(unnamed)} is not shown." if unnamed else "")
             + " (Alexander and Govern's test of equal means, Holm's correction for the number of "
             "parameters.) In the figures, blue is ahead, orange behind; what cannot be told is "
             "hollow and grey."
@@ -304,7 +304,7 @@ if len(lead):
     )
 
 # %%
-page.gallery(
+html.gallery(
     [
         (
             drawings.lead(lead, field, overall),
@@ -329,8 +329,8 @@ if len(strongest) > 1 and len(telling):
     display(
         Markdown(
             "The two parameters that explain most of the difference were sought on the missions of "
-            f"even replications: the {names[0]} ({page.percent(strongest['explained'][0])} of its "
-            f"variance) and the {names[1]} ({page.percent(strongest['explained'][1])}). Both at "
+            f"even replications: the {names[0]} ({numbers.percent(strongest['explained'][0])} of its "
+            f"variance) and the {names[1]} ({numbers.percent(strongest['explained'][1])}). Both at "
             "once are shown by the missions of odd replications, which had no part in that choice: "
             f"{policy} is ahead in {sure['ahead']} of {len(cells)} cells, behind in "
             f"{sure['behind']}. The lowest mean is {points(low)} points, with "
@@ -339,7 +339,7 @@ if len(strongest) > 1 and len(telling):
         )
     )
     display(
-        page.figure(
+        html.figure(
             drawings.heat(cells, first, second),
             f"Mean difference over {names[0]} and {names[1]}",
             f"{policy} − {baseline}, mean difference in points of collection ratio and "
@@ -359,7 +359,7 @@ if len(strongest) > 1 and len(telling):
 # %%
 found = regions.rules(missions, pair.candidates)
 behind = found[found["verdict"] == "behind"]
-unsure = found[found["verdict"] == regions.OPEN]
+unsure = found[found["verdict"] == regions.INCONCLUSIVE]
 
 
 def region(row):
@@ -382,15 +382,15 @@ else:
 if len(unsure):
     text += ". Which of the two is ahead cannot be told in: " + "; ".join(unsure["rule"])
 display(Markdown(f"{text}."))
-page.table(
+html.table(
     pd.DataFrame(
         [
             [
                 row["rule"],
                 points(row),
-                page.p_value(row["p_adjusted"]),
+                numbers.p_value(row["p_adjusted"]),
                 row["verdict"],
-                page.interval(row["behind"], row["behind_low"], row["behind_high"]),
+                numbers.interval(row["behind"], row["behind_low"], row["behind_high"]),
                 f"{row['n']:,}",
             ]
             for _, row in found.iterrows()
@@ -415,7 +415,7 @@ def side(row, name, end):
     return [
         "yes" if row[f"success{end}"] else "no",
         regions.quotas(study, name, int(row["replication"])),
-        page.percent(row[f"collection_ratio{end}"]),
+        numbers.percent(row[f"collection_ratio{end}"]),
     ]
 
 
@@ -429,7 +429,7 @@ def listed(rows):
         [
             f"{row['replication']:.0f}",
             *(f"{row[field]:.3g}" for field in regions.PARAMETERS),
-            page.difference(row["difference"], 0),
+            numbers.difference(row["difference"], 0),
             *side(row, policy, ""),
             *side(row, baseline, "_baseline"),
         ]
@@ -463,7 +463,7 @@ display(
         )
     )
 )
-page.table(
+html.table(
     listed(lowest),
     f"The worst missions of {policy}, seed {seed}; points are the difference in the product",
 )
@@ -478,7 +478,7 @@ if len(lost):
         )
     )
     display(
-        page.table(
+        html.table(
             listed(lost),
             f"The greatest losses to {baseline} otherwise, seed {seed}",
         )
@@ -489,7 +489,7 @@ numbers = pd.concat([lowest, lost])["replication"].tolist()
 display(
     Markdown(
         "Each can be flown again:\n\n"
-        + page.commands(study.replay(policy, 0, number) for number in numbers)
+        + html.commands(study.replay(policy, 0, number) for number in numbers)
         + f"\n\nWith `--policy {baseline}` instead, it is the other policy in the same mission."
     )
 )
@@ -524,7 +524,7 @@ def pictured(name, number):
 
 for number in numbers[: min(DRAWN, len(lowest))]:
     display(Markdown(f"**Mission {number}**: {policy}, and {baseline} in the same mission."))
-    display(page.gallery([pictured(name, number) for name in (policy, baseline)]))
+    display(html.gallery([pictured(name, number) for name in (policy, baseline)]))
 
 # %% [markdown]
 # An arrow is the move of one mission slot, in the colour of the node that is served; a cross is a
@@ -540,8 +540,8 @@ shown = [costs[name] for name in study.policies if name in costs]
 untimed = [name for name in study.policies if name not in costs]
 changed = timing.unlike(times, study.store.manifest)
 remarks = [
-    f"Not timed: {page.words(untimed)}." if untimed else "",
-    f"Timed with other code or weights than those of the study: {page.words(changed)}."
+    f"Not timed: {numbers.words(untimed)}." if untimed else "",
+    f"Timed with other code or weights than those of the study: {numbers.words(changed)}."
     if changed
     else "",
 ]
@@ -561,16 +561,16 @@ display(
         "will differ on another." + ratio + "".join(f" {remark}" for remark in remarks if remark)
     )
 )
-page.figure(
+html.figure(
     drawings.decision_time(shown or times.costs, study.policies),
     "Time of a decision of every policy, for one mission and in the batch",
     f"n = {min(cost.calls for cost in shown or times.costs):,} calls or more per policy, on a "
-    f"logarithmic axis. A line goes from the median to what {page.level(timing.SLOW)} of the calls "
+    f"logarithmic axis. A line goes from the median to what {numbers.level(timing.SLOW)} of the calls "
     "keep below: the spread of the calls, not an interval of their mean.",
 )
 
 # %%
-page.table(
+html.table(
     pd.DataFrame(
         [
             [
@@ -603,7 +603,7 @@ display(
         "Is that fast enough? A decision must be ready within a mission slot. The model gives a "
         f"slot no length in seconds; but in one, a UAV flies a cell of {cell:g} m, so a UAV of v "
         f"m/s gives {cell:g}/v seconds to decide. The slowest policy here, {slowest.policy}, needs "
-        f"no more than {drawings.duration(slowest.slow)} in {page.level(timing.SLOW)} of its "
+        f"no more than {drawings.duration(slowest.slow)} in {numbers.level(timing.SLOW)} of its "
         f"calls: enough up to about {float(f'{cell / slowest.slow:.2g}'):,.0f} m/s, on this "
         "processor."
     )
@@ -613,10 +613,10 @@ display(
 # ## Where the figures come from
 
 # %%
-page.provenance([study])
+html.provenance([study])
 
 # %%
-page.table(
+html.table(
     pd.DataFrame(
         {
             "Scenario": times.scenario,

@@ -25,6 +25,7 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
+from analysis import numbers
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import learning as curves
@@ -33,13 +34,13 @@ from analysis.replication.claims import curve_verdict
 from analysis.replication.paper import CROSSING
 from analysis.stats.intervals import LEVEL
 from policies.ddqn.config import config_of, learner_of
-from reports.pages import html as page
+from reports.pages import html
 
 folder = Path(trained or str(files("policies") / "trained"))
 trainings = pd.read_parquet(folder / "curves.parquet")
 each = trainings.groupby(["variant", "seed"]).last()  # the end of every training
 seeds = each.groupby("variant").size()
-level, band_level = page.level(LEVEL), page.level(curves.BAND)
+level, band_level = numbers.level(LEVEL), numbers.level(curves.BAND)
 baseline = "quick"
 
 pairs = {  # what a training has besides -> the variants with and without transfer learning
@@ -95,7 +96,7 @@ def captioned(name, metric):
 fig3 = ("evaluation_reward", f"evaluation_{PRODUCT}")
 shown = [*pairs][:1] + [*pairs][1:][-1:]
 for name in shown:
-    display(page.gallery([captioned(name, metric) for metric in fig3]))
+    display(html.gallery([captioned(name, metric) for metric in fig3]))
 
 # %%
 averages = {metric: curves.smoothed(trainings, metric) for metric in fig3}
@@ -113,7 +114,7 @@ counted = [
 
 def told(metric, transfer):
     """Where the curve with transfer learning lies, in words."""
-    scale = page.points if metric != fig3[0] else "{:+.0f} [{:+.0f}, {:+.0f}]".format
+    scale = numbers.points if metric != fig3[0] else "{:+.0f} [{:+.0f}, {:+.0f}]".format
     gap = scale(*transfer.last).replace("-", "−")
     if transfer.last.low == transfer.last.high:
         gap = f"{gap.split()[0]}, the same in all trainings"
@@ -133,7 +134,7 @@ display(
         "training levels off early and low. **The rules here**, with Welch's t over the trainings:"
         f"\n\n- of the reward: {claims.THROUGHOUT}\n- of collection ratio and communication: "
         f"{claims.PASSES}\n\nBy these rules the claim "
-        f"{page.words(counted)} of {len(found)} comparisons."
+        f"{numbers.words(counted)} of {len(found)} comparisons."
     )
 )
 
@@ -200,7 +201,7 @@ last = curves.finals(trainings)
 table = curves.ablation(last, f"final_{PRODUCT}", baseline)
 table = table.sort_values("mean", ascending=False, kind="stable").reset_index(drop=True)
 single = table[table["n"] == 1]
-page.figure(
+html.figure(
     learning_figures.ablation(table, last, f"final_{PRODUCT}", baseline),
     "Collection ratio and communication that the trainings of every variant reach",
     f"Dots are trainings, n of them; a diamond is their mean, with its {level} interval "
@@ -217,18 +218,18 @@ def line(row):
     return [
         row["variant"],
         row["n"],
-        page.interval(row["mean"], row["low"], row["high"])
+        numbers.interval(row["mean"], row["low"], row["high"])
         if row["low"] < row["high"]
-        else page.percent(row["mean"]),
-        "" if same else page.points(row["difference"], *ends),
-        "" if same else page.p_value(row["p_adjusted"]),
-        *map(page.percent, others.mean()),
+        else numbers.percent(row["mean"]),
+        "" if same else numbers.points(row["difference"], *ends),
+        "" if same else numbers.p_value(row["p_adjusted"]),
+        *map(numbers.percent, others.mean()),
     ]
 
 
 *others, name = METRICS.values()
 head = ["Variant", "n", name, f"To {baseline} [points]", "p (Holm)", *others]
-page.table(
+html.table(
     pd.DataFrame([line(row) for _, row in table.iterrows()], columns=head),
     f"Means over n trainings with {level} intervals; none of one training, or where all "
     "are the same. Differences: Welch's t; of a single training, Student's t with the spread of "
@@ -285,17 +286,17 @@ def trained_often(first, metric):
         else f"no band, one of {band_level} would be of no use"
     )
     caption = (
-        f"{page.words(names)}, n = {len(names)} trainings that differ in their seed alone. Thick: "
+        f"{numbers.words(names)}, n = {len(names)} trainings that differ in their seed alone. Thick: "
         f"mean of the exponential moving averages (weight of the newest evaluation "
         f"{curves.ALPHA:g}); thin: single trainings; {band}."
     )
     title = learning_figures.NAMES[metric]
     figure = learning_figures.trainings(own, metric, {first: first})
-    return figure, f"{title} of {page.words(names)} against training step", caption
+    return figure, f"{title} of {numbers.words(names)} against training step", caption
 
 
 for first in repeated:
-    display(page.gallery([trained_often(first, metric) for metric in fig3]))
+    display(html.gallery([trained_often(first, metric) for metric in fig3]))
 
 
 # %%
@@ -309,7 +310,7 @@ def trained_once(name):
     return figure, f"Evaluations of {name} against training step", caption
 
 
-page.gallery([trained_once(name) for name in ran])
+html.gallery([trained_once(name) for name in ran])
 
 
 # %%
@@ -319,12 +320,12 @@ def course(name):
     near, end = curves.settled(curve, metric, claims.MARGIN), curve.iloc[-1]
     average = curves.smoothed(curve.assign(variant=name, seed=0), metric)["value"].iloc[-1]
     return (
-        f"- **{name}** ends at {page.percent(average)} after "
+        f"- **{name}** ends at {numbers.percent(average)} after "
         f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots and "
         f"{end['seconds'] / 60:.0f} minutes. From update {near['updates']:,} on "
         f"({near['seconds'] / 60:.0f} minutes) it stays within "
         f"{claims.margin_in_words(claims.MARGIN)} of that: the other "
-        f"{page.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
+        f"{numbers.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
     )
 
 
@@ -350,7 +351,7 @@ display(
         )
     )
 )
-page.table(
+html.table(
     pd.DataFrame(
         [
             [
@@ -368,4 +369,4 @@ page.table(
 )
 
 # %%
-page.weights(folder)
+html.weights(folder)

@@ -25,11 +25,11 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import load_results, summary
+from analysis import load_results, numbers, summary
 from analysis.figures import missions as figures
 from analysis.replication import paper
 from dess.scenario import SAMPLED
-from reports.pages import html as page
+from reports.pages import html
 from reports.player import READING, library, player
 
 example, study = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
@@ -64,13 +64,13 @@ display(
     Markdown(
         f"A map of {small.grid} x {small.grid} cells with {len(small.nodes)} nodes. The paper "
         "draws this example without numbers, so there is nothing to compare with; the mission "
-        f"here is flown by **{pilot}**, of {page.words(example.policies)} the best by collection "
-        f"ratio and communication: {page.interval(*ranked.loc[pilot, ['mean', 'low', 'high']])}, "
+        f"here is flown by **{pilot}**, of {numbers.words(example.policies)} the best by collection "
+        f"ratio and communication: {numbers.interval(*ranked.loc[pilot, ['mean', 'low', 'high']])}, "
         f"n = {ranked.loc[pilot, 'n']:,} missions. What is learned is learned on one map, so no "
         "learned policy can fly it."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             figures.mission_figure(log, small),
@@ -101,7 +101,7 @@ best = " the best of the study by" if policy == product["mean"].idxmax() else ""
 display(
     Markdown(
         f"The policy is **{policy}**,{best} collection ratio and communication "
-        f"{page.interval(*product.loc[policy, ['mean', 'low', 'high']])} over "
+        f"{numbers.interval(*product.loc[policy, ['mean', 'low', 'high']])} over "
         f"{product.loc[policy, 'n']:,} missions. Each column is a single mission, replication "
         f"{replication} of seed {seed}: an example, not an average. All three meet the same sea: "
         "initial data, arrivals and shadowing are equal, only the number of UAVs differs."
@@ -118,15 +118,15 @@ def captioned(point):
     caption = (
         f"n = 1 mission of {mission['slots']} slots; {mission['collected']:.0f} of "
         f"{mission['initial'] + mission['arrived']:.0f} data units collected. The mean of this "
-        f"policy, n = {ratio['n']:,}, is {page.interval(*ratio[['mean', 'low', 'high']])}, "
-        f"the paper's {page.percent(printed[point])}."
+        f"policy, n = {ratio['n']:,}, is {numbers.interval(*ratio[['mean', 'low', 'high']])}, "
+        f"the paper's {numbers.percent(printed[point])}."
     )
     figure = figures.mission_figure(logs[point], scenarios[point])
     alt = f"Map of the mission with I = {mission['uavs']}; battery, residual data and charging"
     return figure, alt, caption
 
 
-page.gallery([captioned(point) for point in points])
+html.gallery([captioned(point) for point in points])
 
 # %% [markdown]
 # ## Slot by slot
@@ -143,7 +143,7 @@ for point in points:
         f"{mission['slots']} mission slots, {len(logs[point]):,} events. A single mission has no "
         "interval."
     )
-    title = f"I = {mission['uavs']}: {page.percent(mission['collection_ratio'])} collected"
+    title = f"I = {mission['uavs']}: {numbers.percent(mission['collection_ratio'])} collected"
     display(player(logs[point], scenarios[point], f"player-{mission['uavs']}", title, caption))
 
 # %% [markdown]
@@ -159,7 +159,7 @@ def sights(point):
     return {
         "UAVs": mission["uavs"],
         "Success": "yes" if mission["success"] else "no",
-        "Collected": page.percent(mission["collection_ratio"]),
+        "Collected": numbers.percent(mission["collection_ratio"]),
         "Mission slots": mission["slots"],
         "Charging sessions": (log["event"] == "charge_start").sum(),
         "Nodes never served": f"{len(ends) - len(served)} of {len(ends)}",
@@ -174,18 +174,18 @@ display(
     Markdown(
         f"From {first['UAVs']} to {last['UAVs']} UAVs, what is collected goes from "
         f"{first['Collected']} to {last['Collected']} in these missions, from "
-        f"{page.percent(ratios['mean'].iloc[0])} to {page.percent(ratios['mean'].iloc[-1])} in the "
-        f"mean of {policy}, and from {page.percent(printed[0])} to {page.percent(printed[-1])} in "
+        f"{numbers.percent(ratios['mean'].iloc[0])} to {numbers.percent(ratios['mean'].iloc[-1])} in the "
+        f"mean of {policy}, and from {numbers.percent(printed[0])} to {numbers.percent(printed[-1])} in "
         "the paper."
     )
 )
-page.table(seen, "The three missions; data in data units")
+html.table(seen, "The three missions; data in data units")
 
 # %% [markdown]
 # ## Every UAV
 
 # %%
-page.table(
+html.table(
     pd.DataFrame(
         {
             "UAVs": uavs["point"].map(missions["uavs"]),
@@ -215,7 +215,7 @@ command = (
 display(
     Markdown(
         "Each mission can be flown again:\n\n"
-        + page.commands(command.format(uavs) for uavs in missions["uavs"])
+        + html.commands(command.format(uavs) for uavs in missions["uavs"])
     )
 )
-page.provenance([example, study])
+html.provenance([example, study])

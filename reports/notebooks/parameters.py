@@ -26,7 +26,7 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import load_results, summary
+from analysis import load_results, numbers, summary
 from analysis.figures import missions as figures
 from analysis.figures import parameters as parameter_figures
 from analysis.names import METRICS, PRODUCT, parameter, value_text
@@ -38,10 +38,10 @@ from analysis.replication.rules import NO_RESULTS, VERDICTS, margin_in_words
 from analysis.replication.scorecard import margin, of_policy
 from analysis.stats.intervals import LEVEL
 from analysis.study.design import NOISE
-from reports.pages import html as page
+from reports.pages import html
 
 folder = Path(results)
-level = page.level(LEVEL)
+level = numbers.level(LEVEL)
 fig5, sweet, sobol = (load_results(folder / n) for n in ("fig5", "sweet-spot", "sensitivity"))
 
 means = summary(fig5.missions, by=["policy"])
@@ -74,7 +74,7 @@ pairs = {
 display(
     Markdown(
         f"Shown {'are' if len(drawn) > 1 else 'is'} "
-        + page.words([f"**{policy}**" for policy in drawn])
+        + numbers.words([f"**{policy}**" for policy in drawn])
         + (": the best learned policy of the study, and the best heuristic" if learned else "")
         + f". Every value of a parameter was flown in {table['n'].min():,} missions per policy, "
         "everything else drawn from Table II. All values, and all policies, meet the same "
@@ -98,7 +98,7 @@ def captioned(field):
     return figure, f"The three metrics against the {parameter(field).within}", caption
 
 
-page.gallery([captioned(field) for field in fields])
+html.gallery([captioned(field) for field in fields])
 
 # %% [markdown]
 # ### What one sees
@@ -121,13 +121,13 @@ def seen(policy, field):
     found = effects.shape(pairs[policy, field, PRODUCT])
     first, last = (at(policy, field, n) for n in (0, len(values[field]) - 1))
     change = pairs[policy, field, PRODUCT].query("first == 0 and second == @last.position").iloc[0]
-    ends = page.points(change["difference"], change["low"], change["high"])
+    ends = numbers.points(change["difference"], change["low"], change["high"])
     text = (
-        f"{policy} **{found.words}**: {page.percent(first.mean)} at {first.value}, "
-        f"{page.percent(last.mean)} at {last.value}, {ends} points"
+        f"{policy} **{found.words}**: {numbers.percent(first.mean)} at {first.value}, "
+        f"{numbers.percent(last.mean)} at {last.value}, {ends} points"
     )
     if found.words == effects.PEAK:
-        tops = page.words([values[field][n] for n in found.peaks])
+        tops = numbers.words([values[field][n] for n in found.peaks])
         text += f", highest at {tops}{' or so' if len(found.peaks) > 1 else ''}"
     return text
 
@@ -170,7 +170,7 @@ display(
         f"So for {leading}, of {len(claims)} claims, {'; '.join(counted)}. They overlap, so their "
         "number is no score. By the largest difference between two values, the "
         "parameters rank: "
-        + page.words([f"{parameter(f).within} ({100 * sizes[f]:.1f} points)" for f in order])
+        + numbers.words([f"{parameter(f).within} ({100 * sizes[f]:.1f} points)" for f in order])
         + "."
     )
 )
@@ -197,7 +197,7 @@ display(
         f"(means of {paper.SWEET_SPOT_MISSIONS:,} missions, all parameters at their best)."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
@@ -216,7 +216,9 @@ page.gallery(
 def beside(policy, metric):
     """A checked mean with its interval, and how it lies to the paper's figure."""
     mean, *ends = by.loc[(policy, metric), ["mean", "low", "high"]]
-    return f"{page.interval(mean, *ends)} {marks[paper.verdict(*ends, paper.SWEET_SPOT[metric])]}"
+    return (
+        f"{numbers.interval(mean, *ends)} {marks[paper.verdict(*ends, paper.SWEET_SPOT[metric])]}"
+    )
 
 
 def setting_of(point):
@@ -224,7 +226,7 @@ def setting_of(point):
 
 
 swept = [*designs[0]["values"]]
-printed = ["paper", *[""] * len(swept), *map(page.percent, paper.SWEET_SPOT.values()), "", ""]
+printed = ["paper", *[""] * len(swept), *map(numbers.percent, paper.SWEET_SPOT.values()), "", ""]
 lines = [
     [row.policy, *setting_of(row.point)]
     + ([beside(row.policy, m) for m in METRICS] if len(checks) else [""] * len(METRICS))
@@ -233,7 +235,7 @@ lines = [
 ]
 shorts = [parameter(field).short for field in swept]
 head = ["Policy", *shorts, *METRICS.values(), "Missions", "Settings left"]
-page.table(
+html.table(
     pd.DataFrame([printed, *lines], columns=head),
     f"The setting selected, and its check: means with {level} intervals, ▲ wholly above "
     "the paper's figure, ▼ below it, ≈ around it. Then the missions that the selection took, and "
@@ -244,7 +246,7 @@ page.table(
 top = by["mean"].xs(PRODUCT, level="metric").idxmax() if len(checks) else None
 if top:
     (point,) = selections[selections["policy"] == top]["point"]
-    at_best = page.words(
+    at_best = numbers.words(
         [f"{short} {value}" for short, value in zip(shorts, setting_of(point), strict=True)]
     )
     mean, *ends = by.loc[(top, PRODUCT), ["mean", "low", "high"]]
@@ -252,9 +254,9 @@ if top:
     display(
         Markdown(
             f"The best at its best setting is **{top}**, with {at_best}: "
-            f"{page.interval(mean, *ends)} in collection ratio and communication, {verdict} "
+            f"{numbers.interval(mean, *ends)} in collection ratio and communication, {verdict} "
             f"{'from ' if verdict == paper.LEVEL else ''}"
-            f"the paper's {page.percent(paper.SWEET_SPOT[PRODUCT])}."
+            f"the paper's {numbers.percent(paper.SWEET_SPOT[PRODUCT])}."
         )
     )
 
@@ -277,14 +279,14 @@ of_product = told[told["metric"] == PRODUCT]
 display(
     Markdown(
         "Here all parameters are drawn together: "
-        + page.words([f"{parameter(f).within} {value_text(ends)}" for f, ends in ranges.items()])
+        + numbers.words([f"{parameter(f).within} {value_text(ends)}" for f, ends in ranges.items()])
         + ". A Sobol index is the share of a metric's variance that a parameter accounts for: "
         "*alone*, or *with all interactions* that it takes part in. The replication, which is the "
         "sea, the arrivals and the start, is a parameter too: what it accounts for, no setting "
         "removes."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             parameter_figures.sensitivity(rows, policy),
@@ -309,9 +311,9 @@ def weighed(policy):
         f"{share(rows.loc[most], 'first')} of the variance. The noise leaves "
         f"{share(rows.loc[NOISE], 'total')} that no setting removes."
     )
-    few = page.words([parameter(f).within for f in small])
+    few = numbers.words([parameter(f).within for f in small])
     return text + (
-        f" Less than {page.percent(margin_of_share)} of it has to do with {few}, by the whole "
+        f" Less than {numbers.percent(margin_of_share)} of it has to do with {few}, by the whole "
         "interval, interactions included."
         if small
         else ""
@@ -319,20 +321,20 @@ def weighed(policy):
 
 
 def share(row, index):
-    return page.interval(row[index], row[f"{index}_low"], row[f"{index}_high"])
+    return numbers.interval(row[index], row[f"{index}_low"], row[f"{index}_high"])
 
 
 margin_of_share = 0.05
 flat = indices[indices["first"].isna()]
 silent = [
-    f"{METRICS[metric].lower()} of {page.words(rows['policy'].unique().tolist())}"
+    f"{METRICS[metric].lower()} of {numbers.words(rows['policy'].unique().tolist())}"
     for metric, rows in flat.groupby("metric", sort=False)
 ]
 display(
     Markdown(
         "\n".join(map(weighed, of_product["policy"].unique()))
         + (
-            f"\n\nNo shares can be told of {page.words(silent)}: it is the same in all missions "
+            f"\n\nNo shares can be told of {numbers.words(silent)}: it is the same in all missions "
             "of both base samples, from which the variance is taken."
             if silent
             else ""
@@ -341,7 +343,7 @@ display(
 )
 
 # %%
-page.table(
+html.table(
     pd.DataFrame(
         [
             [
@@ -362,4 +364,4 @@ page.table(
 # ## Where the figures come from
 
 # %%
-page.provenance([fig5, sweet, sobol])
+html.provenance([fig5, sweet, sobol])

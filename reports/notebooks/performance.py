@@ -23,12 +23,12 @@ from pathlib import Path
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import load_results, summary
+from analysis import load_results, numbers, summary
 from analysis.figures import missions as figures
 from analysis.names import METRICS, PRODUCT
 from analysis.replication import paper
 from analysis.stats.intervals import wilson
-from reports.pages import html as page
+from reports.pages import html
 
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
 policies = table4.manifest["study"]["policies"]
@@ -41,11 +41,11 @@ marks = {paper.ABOVE: "▲", paper.LEVEL: "≈", paper.BELOW: "▼"}
 def beside(row, printed):
     """An interval as text, and how it lies to the paper's figure."""
     mark = marks[paper.verdict(row["low"], row["high"], printed)]
-    return shown(row), f"{page.difference(row['mean'], printed)} {mark}"
+    return shown(row), f"{numbers.difference(row['mean'], printed)} {mark}"
 
 
 def shown(row):
-    return page.interval(row["mean"], row["low"], row["high"])
+    return numbers.interval(row["mean"], row["low"], row["high"])
 
 
 # %% [markdown]
@@ -60,7 +60,7 @@ display(
         "missions: the same sea, arrivals and shadowing."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             figures.performance(overall, metric, paper.TABLE_IV[metric]),
@@ -73,13 +73,13 @@ page.gallery(
 )
 
 # %%
-printed = ["paper", *(c for p in paper.TABLE_IV.values() for c in (page.percent(p), ""))]
+printed = ["paper", *(c for p in paper.TABLE_IV.values() for c in (numbers.percent(p), ""))]
 lines = [
     [p, *(c for m in METRICS for c in beside(rows.loc[(p, m)], paper.TABLE_IV[m]))]
     for p in policies
 ]
 head = [("", "Policy"), *((n, c) for n in METRICS.values() for c in ("mean", "to paper"))]
-page.table(
+html.table(
     pd.DataFrame([printed, *lines], columns=pd.MultiIndex.from_tuples(head)),
     "Means with 95 % intervals, and the difference to the paper in percentage points. "
     "▲ the whole interval is above the paper's figure, ▼ below it, ≈ not distinguishable from it.",
@@ -93,8 +93,8 @@ def sorted_out(metric):
     for p in policies:
         low, high = rows.loc[(p, metric), ["low", "high"]]
         groups[paper.verdict(low, high, paper.TABLE_IV[metric])].append(p)
-    found = (f"{verdict}: {page.words(those)}" for verdict, those in groups.items() if those)
-    name, figure = METRICS[metric], page.percent(paper.TABLE_IV[metric])
+    found = (f"{verdict}: {numbers.words(those)}" for verdict, those in groups.items() if those)
+    name, figure = METRICS[metric], numbers.percent(paper.TABLE_IV[metric])
     return f"- **{name}** (paper {figure}), {'; '.join(found)}."
 
 
@@ -109,7 +109,7 @@ display(
         + "\n".join(sorted_out(metric) for metric in METRICS)
         + "\n\nThe paper prints no intervals. Its figures are themselves means of "
         f"{paper.TABLE_IV_MISSIONS:,} missions: a success of that size alone has a 95 % interval "
-        f"of {page.interval(*spread)}. And where the paper is silent, such as on the place of the "
+        f"of {numbers.interval(*spread)}. And where the paper is silent, such as on the place of the "
         "charging zone or the transmit power, the scenario here decides."
     )
 )
@@ -120,7 +120,7 @@ display(
 # The same missions, split by the size of the fleet that they drew.
 
 # %%
-page.gallery(
+html.gallery(
     [
         (
             figures.by_fleet(by_fleet, metric),
@@ -140,7 +140,7 @@ lines = [
     for p in policies
     for uavs in sorted(by_fleet["uavs"].unique())
 ]
-page.table(
+html.table(
     pd.DataFrame(lines, columns=["Policy", "UAVs", "Missions", *METRICS.values()]),
     "Means with 95 % intervals",
 )
@@ -159,7 +159,7 @@ display(
     )
 )
 printed_metrics = {m: METRICS[m] for m in paper.FIG_4[1]}
-page.gallery(
+html.gallery(
     [
         (
             figures.by_fleet(in_fig4, metric, {i: p[metric] for i, p in paper.FIG_4.items()}),
@@ -182,11 +182,11 @@ def with_mark(p, metric, uavs):
 
 
 lines = [
-    ["paper", *(page.percent(paper.FIG_4[uavs][metric]) for metric, uavs in columns)],
+    ["paper", *(numbers.percent(paper.FIG_4[uavs][metric]) for metric, uavs in columns)],
     *([p, *(with_mark(p, *column) for column in columns)] for p in policies),
 ]
 head = [("", "Policy"), *((printed_metrics[metric], f"I = {uavs}") for metric, uavs in columns)]
-page.table(
+html.table(
     pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(head)),
     "Means with 95 % intervals; ▲ wholly above the paper's figure, ▼ below it, ≈ around it",
 )
@@ -195,4 +195,4 @@ page.table(
 # ## Where the figures come from
 
 # %%
-page.provenance([table4, fig4])
+html.provenance([table4, fig4])

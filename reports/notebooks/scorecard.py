@@ -27,7 +27,7 @@ import pandas as pd
 
 from analysis import load_results
 from analysis.replication.scorecard import PAPERS_NETWORK, departures, scorecard
-from reports.pages import html as page
+from reports.pages import html
 from reports.pages import scorecard as layout
 
 folder = Path(trained or str(files("policies") / "trained"))
@@ -42,7 +42,7 @@ layout.scorecard(rows, departures=ours)
 # ## Where the figures come from
 
 # %%
-page.weights(folder)
+html.weights(folder)
 
 # %%
-page.provenance(studies.values())
+html.provenance(studies.values())

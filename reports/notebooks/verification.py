@@ -27,19 +27,18 @@ import numpy as np
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import load_results
+from analysis import load_results, numbers
 from analysis.figures import verification as drawings
 from analysis.names import METRICS, parameter
 from analysis.questions import summary as findings
-from analysis.questions.main_effects import HOLDS, OPEN, REFUTED
+from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.stats.intervals import LEVEL
 from analysis.verification import chance as fits
 from analysis.verification import closed_forms
 from analysis.verification import exact as audits
 from analysis.verification import lone_uav as hover
 from analysis.verification.checks import ALPHA, judge
-from reports.pages import html as page
-from reports.pages import stress
+from reports.pages import html, stress
 
 study = load_results(Path(results) / "verification")
 others, damaged = audits.studies_in(Path(results), but="verification")
@@ -84,7 +83,7 @@ table = judge(
 def told(row):
     """The p-value and its correction, or the error and its bound."""
     if not np.isnan(row.p):
-        return f"p {page.p_value(row.p)}, Holm {page.p_value(row.p_adjusted)}"
+        return f"p {numbers.p_value(row.p)}, Holm {numbers.p_value(row.p_adjusted)}"
     if np.isnan(row.error):
         return ""
     return (
@@ -96,8 +95,8 @@ def verdicts(*topics):
     """The verdicts of some topics, in words."""
     rows = table[table["topic"].isin(topics)]
     sorted_out = [
-        f"{verdict}: {page.words(rows.loc[rows['verdict'] == verdict, 'test'].tolist())}"
-        for verdict in (REFUTED, OPEN)
+        f"{verdict}: {numbers.words(rows.loc[rows['verdict'] == verdict, 'test'].tolist())}"
+        for verdict in (REFUTED, INCONCLUSIVE)
         if (rows["verdict"] == verdict).any()
     ]
     holding = (rows["verdict"] == HOLDS).sum()
@@ -110,23 +109,23 @@ def verdicts(*topics):
 # %%
 chance, exact = table["p"].notna(), table["error"].notna()
 refuted = table.loc[table["verdict"] == REFUTED, "test"].tolist()
-unknown = table.loc[table["verdict"] == OPEN, "test"].tolist()
+unknown = table.loc[table["verdict"] == INCONCLUSIVE, "test"].tolist()
 display(
     Markdown(
         (
-            f"**{len(refuted)} of {len(table)} checks do not hold**: {page.words(refuted)}."
+            f"**{len(refuted)} of {len(table)} checks do not hold**: {numbers.words(refuted)}."
             if refuted
             else f"**{(table['verdict'] == HOLDS).sum()} of {len(table)} checks hold"
             + ("**; the others cannot be told." if unknown else "**.")
         )
         + f" {exact.sum()} are exact: an error above its bound, which is zero or what rounding can "
         f"do, refutes. {chance.sum()} are of chance: they have a p-value, corrected by Holm for "
-        f"their number and judged at {page.level(ALPHA)}. So if all is as it should be, any of "
+        f"their number and judged at {numbers.level(ALPHA)}. So if all is as it should be, any of "
         f"them fails for at most one seed in {1 / ALPHA:.0f}."
-        + (f" Too few observations for: {page.words(unknown)}." if unknown else "")
+        + (f" Too few observations for: {numbers.words(unknown)}." if unknown else "")
     )
 )
-page.table(
+html.table(
     pd.DataFrame(
         {
             "Test": table["test"],
@@ -155,7 +154,7 @@ display(
         f"from {len(seas):,} event logs, one per replication, since policies share its arrivals."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             drawings.fit(
@@ -166,7 +165,7 @@ page.gallery(
             ),
             f"{name}: observed and expected numbers",
             f"Dots should lie on the bars, and inside the band below, which holds all dots of "
-            f"{page.level(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with "
+            f"{numbers.level(LEVEL)} of such figures. n = {fit.n:,} counts; expected: Poisson with "
             f"mean {mean:g}.",
         )
         for name, fit, mean in panels
@@ -190,11 +189,11 @@ display(
         "which one is heard best, and what it gives."
     )
 )
-page.figure(
+html.figure(
     drawings.rates(rates, space),
     "Mean rate of a lone UAV against its distance from the node",
     f"Dots should lie on the curve, and inside the band below, which holds all dots of "
-    f"{page.level(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per "
+    f"{numbers.level(LEVEL)} of such figures. n = {rates['n'].min():,} communication slots per "
     "distance.",
 )
 
@@ -203,11 +202,11 @@ page.figure(
 
 # %%
 topics = [audits.CONSERVATION, audits.ENERGY, audits.RECORDS, audits.SEA, audits.ENGINES]
-unread = f" (not read, incomplete or of other code: {page.words(damaged)})" if damaged else ""
+unread = f" (not read, incomplete or of other code: {numbers.words(damaged)})" if damaged else ""
 display(
     Markdown(
         f"{verdicts(*topics)} Data are neither made nor lost: not in the missions of "
-        f"{page.words([f'`{name}`' for name in studies])}{unread}, and not at any node in "
+        f"{numbers.words([f'`{name}`' for name in studies])}{unread}, and not at any node in "
         f"{len(logs):,} event logs. The logs also hold every battery to its rules, slot by slot, "
         "and add up to the records. "
         + ("Policies meet the same sea. " if len(study.policies) > 1 else "")
@@ -230,7 +229,7 @@ drawn = [
         drawings.fit(fit, parameter(field).label, "value"),
         f"How often each value of the {parameter(field).within} was drawn",
         f"All values should be drawn equally often. n = {fit.n:,} missions. The band holds all "
-        f"dots of {page.level(LEVEL)} of such figures.",
+        f"dots of {numbers.level(LEVEL)} of such figures.",
     )
     for field, fit in fits.parameter_fits(missions, space).items()
 ]
@@ -248,7 +247,7 @@ if space.initial_data[0] < space.initial_data[1]:
             f"variables. n = {len(missions):,} missions.",
         )
     )
-page.gallery(drawn)
+html.gallery(drawn)
 
 # %% [markdown]
 # ## What intervals promise
@@ -262,7 +261,7 @@ held = {metric: f"{rows['holds'].sum():,} of {len(rows):,}" for metric, rows in 
 display(
     Markdown(
         f"{verdicts(fits.COVERAGE)} The {len(of_best):,} missions of {best} in blocks of "
-        f"{block:,}: of intervals at {page.level(LEVEL)}, each computed from a block, about that "
+        f"{block:,}: of intervals at {numbers.level(LEVEL)}, each computed from a block, about that "
         "share should hold the mean of all. For Student's t it is a little more, since a block is "
         "itself a part of all. Wilson's interval, for success, cannot keep to a level: a block has "
         "a whole number of successes, so what its interval holds jumps with their share. How often "
@@ -270,14 +269,14 @@ display(
         "held to."
     )
 )
-page.gallery(
+html.gallery(
     [
         (
             drawings.caterpillar(rows, of_best[metric].head(len(rows) * block).mean(), name),
             f"{name}: intervals of blocks of missions",
             f"The first {min(len(rows), drawings.SHOWN)} of {len(rows):,} blocks; the line is the "
             f"mean of all missions. Of all blocks {held[metric]} hold it. n = {block:,} missions "
-            f"per interval, at {page.level(LEVEL)}.",
+            f"per interval, at {numbers.level(LEVEL)}.",
         )
         for metric, name in METRICS.items()
         if len(rows := blocks[metric])
@@ -310,7 +309,7 @@ def section(*numbers):
 
 
 display(section("1", "2"))
-page.figure(
+html.figure(
     drawings.slot(*stress.overview(space)),
     "Boxes, one below the other: what happens before the first mission slot and in each",
     "The base model (2.1): a mission slot from top to bottom; the arrow back is the next one. "
@@ -320,7 +319,7 @@ page.figure(
 # %%
 display(section("3"))
 inputs = stress.parameters(space)
-page.table(
+html.table(
     pd.DataFrame(
         {
             "Input parameter [unit]": inputs["Field"] + ": " + inputs["Meaning [unit]"],
@@ -338,4 +337,4 @@ section("4", "5", "6")
 # ## Where the figures come from
 
 # %%
-page.provenance(studies.values())
+html.provenance(studies.values())

@@ -29,14 +29,14 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 import pandas as pd
 from IPython.display import Markdown, display
 
-from analysis import fly
+from analysis import fly, numbers
 from analysis.figures import missions as figures
 from analysis.figures import what_if as what_if_figures
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import summary as findings
 from analysis.questions import what_if
 from analysis.stats.intervals import LEVEL
-from reports.pages import html as page
+from reports.pages import html
 
 asked = what_if.question(settings, baseline, scenario, policies, missions, seed)
 what_if.check_policy(asked, shown or asked.policies[0])
@@ -54,7 +54,7 @@ level = f"{100 * LEVEL:g} %"
 
 def code(values):
     """Fields and values in words."""
-    return page.words([f"`{field}` {value}" for field, value in values.items()])
+    return numbers.words([f"`{field}` {value}" for field, value in values.items()])
 
 
 def amount(value, *ends, sign=""):
@@ -68,7 +68,7 @@ def points(value, low, high):
     """A difference and its interval in percentage points; a short one with two decimals."""
     if 0 < high - low < 0.01:
         return amount(100 * value, 100 * low, 100 * high, sign="+")
-    return page.points(value, low, high)
+    return numbers.points(value, low, high)
 
 
 def gain(policy, metric):
@@ -81,19 +81,19 @@ def gain(policy, metric):
 
 # %%
 same, drawn = what_if.shared(study), what_if.drawn(study)
-listed = page.words([f"`{c.field}` = {c.after} instead of {c.before}" for c in changes])
+listed = numbers.words([f"`{c.field}` = {c.after} instead of {c.before}" for c in changes])
 display(
     Markdown(
         f"What if a mission had {listed}?\n\n"
         f"All else is as scenario **{study.manifest['study']['scenario']}** has it"
         + (f", with {code(same)} in both" if same else "")
         + (f". Every mission draws its own {code(drawn)}" if drawn else "")
-        + f". {page.words([f'**{p}**' for p in study.policies])} flew {n:,} missions each in the "
+        + f". {numbers.words([f'**{p}**' for p in study.policies])} flew {n:,} missions each in the "
         f"baseline, and the same {n:,} in the variation: replication by replication, "
         "all that the variation does not set is equal, the sea, the arrivals and the shadowing."
     )
 )
-page.table(
+html.table(
     pd.DataFrame(changes).rename(
         columns={"field": "Field", "before": "Baseline", "after": "Variation"}
     )[["Field", "Baseline", "Variation"]],
@@ -112,7 +112,7 @@ def answered(policy):
     words = {
         what_if.HIGHER: "is **higher** with",
         what_if.LOWER: "is **lower** with",
-        what_if.OPEN: "**cannot be told** to differ with",
+        what_if.INCONCLUSIVE: "**cannot be told** to differ with",
     }
     return f"{words[what_if.verdict(row)]} {policy}, {gain(policy, product)} points"
 
@@ -120,8 +120,8 @@ def answered(policy):
 def detailed(policy):
     row = told.loc[(policy, product)]
     return (
-        f"- **{policy}**: collection ratio and communication from {page.percent(row['before'])} "
-        f"to {page.percent(row['after'])}; successful communication {gain(policy, 'success')}, "
+        f"- **{policy}**: collection ratio and communication from {numbers.percent(row['before'])} "
+        f"to {numbers.percent(row['after'])}; successful communication {gain(policy, 'success')}, "
         f"collection ratio {gain(policy, 'collection_ratio')} points."
     )
 
@@ -141,19 +141,21 @@ def undecided(policy):
     )
 
 
-open_for = [p for p in study.policies if what_if.verdict(told.loc[(p, product)]) == what_if.OPEN]
+open_for = [
+    p for p in study.policies if what_if.verdict(told.loc[(p, product)]) == what_if.INCONCLUSIVE
+]
 
 
 def leading(point):
     """The best policy of a side, with its mean."""
     (row,) = means.query("metric == @product and point == @point and policy == @best[@point]").index
-    mean = page.interval(*means.loc[row, ["mean", "low", "high"]])
+    mean = numbers.interval(*means.loc[row, ["mean", "low", "high"]])
     return f"in the {what_if.SIDES[point]} {best[point]}, {mean}"
 
 
 taught = [p for those in findings.learners(study).values() for p in those]
 caveat = (
-    f"\n\nA learned policy flies as it was trained: {page.words(taught)} may do better in a "
+    f"\n\nA learned policy flies as it was trained: {numbers.words(taught)} may do better in a "
     "setting like this after training in it. Its model card says what it has learned."
 )
 display(
@@ -189,7 +191,7 @@ def beside(metric):
     return what_if_figures.means(means, metric, sides), f"{name}, baseline and variation", caption
 
 
-page.gallery([beside(metric) for metric in METRICS])
+html.gallery([beside(metric) for metric in METRICS])
 
 # %%
 gaps = {policy: what_if.differences(study, policy) for policy in study.policies}
@@ -198,12 +200,12 @@ gaps = {policy: what_if.differences(study, policy) for policy in study.policies}
 def sorted_out(policy):
     """How many missions gain and lose."""
     own = gaps[policy]
-    better, worse = page.percent((own > 0).mean()), page.percent((own < 0).mean())
+    better, worse = numbers.percent((own > 0).mean()), numbers.percent((own < 0).mean())
     return f"{policy} is better off in {better} of the missions and worse off in {worse}"
 
 
 uneven = any(what_if.differences(study, p, "success").any() for p in study.policies)
-page.gallery(
+html.gallery(
     [
         (
             what_if_figures.gains(answers),
@@ -219,7 +221,7 @@ page.gallery(
             "interval: these are the missions themselves. "
             + ("Far out lie those where one of the pair failed and counts 0. " if uneven else "")
             + "Below: between the quantiles of "
-            f"{page.words([f'{50 * (1 + s * what_if_figures.MIDDLE):g} %' for s in (-1, 1)])}.",
+            f"{numbers.words([f'{50 * (1 + s * what_if_figures.MIDDLE):g} %' for s in (-1, 1)])}.",
         ),
     ]
 )
@@ -228,7 +230,7 @@ page.gallery(
 # ### In absolute terms
 
 # %%
-marks = {what_if.HIGHER: "▲", what_if.LOWER: "▼", what_if.OPEN: "≈"}
+marks = {what_if.HIGHER: "▲", what_if.LOWER: "▼", what_if.INCONCLUSIVE: "≈"}
 short = {"success": "Success", "collection_ratio": "Collection ratio", product: "Their product"}
 
 
@@ -236,7 +238,7 @@ def line(row):
     """A measure of both sides, and its difference."""
     ends = (row.difference, row.low, row.high)
     if row.metric in short:
-        name, texts = short[row.metric], [page.percent(row.before), page.percent(row.after)]
+        name, texts = short[row.metric], [numbers.percent(row.before), numbers.percent(row.after)]
         change = f"{points(*ends)} points"
     else:
         name, texts = what_if.MEASURES[row.metric], [amount(row.before), amount(row.after)]
@@ -255,7 +257,7 @@ display(
 for policy in study.policies:
     rows = [line(row) for row in answers[answers["policy"] == policy].itertuples()]
     head = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
-    display(page.table(pd.DataFrame(rows, columns=head), policy))
+    display(html.table(pd.DataFrame(rows, columns=head), policy))
 
 # %% [markdown]
 # ### What common random numbers gained
@@ -270,8 +272,8 @@ def paired(policy, metric):
         policy,
         short[metric],
         amount(row["correlation"]),
-        page.percent(left),
-        page.percent(1 - left**0.5) if left < 1 else "none",
+        numbers.percent(left),
+        numbers.percent(1 - left**0.5) if left < 1 else "none",
         f"{n / left:,.0f}" if left else "any number",
     ]
 
@@ -283,7 +285,7 @@ display(
         "where failures come on different seas, there is little to drop out."
     )
 )
-page.table(
+html.table(
     pd.DataFrame(
         [paired(policy, metric) for policy in study.policies for metric in METRICS],
         columns=["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"],
@@ -312,8 +314,8 @@ def flown(kind, point):
     ]
     caption = (
         f"{kind.capitalize()} mission, {side} ({', '.join(sides[point])}): collection ratio "
-        f"{page.percent(record.collection_ratio)}"
-        + (f", but {page.words(lost)}: it counts 0" if lost else ", all quotas filled")
+        f"{numbers.percent(record.collection_ratio)}"
+        + (f", but {numbers.words(lost)}: it counts 0" if lost else ", all quotas filled")
         + f". {record.slots} mission slots. n = 1 of {n:,} missions: an example, no interval."
     )
     alt = f"Map of a {kind} mission in the {side}; battery, residual data and charging"
@@ -323,19 +325,19 @@ def flown(kind, point):
 def shown_beside(kind, why):
     """A mission of the baseline beside that of the variation on the same sea."""
     points, replication = (what_if.BASELINE, what_if.VARIATION), chosen[kind]
-    change = page.difference(gaps[shown][replication], 0)
+    change = numbers.difference(gaps[shown][replication], 0)
     display(
         Markdown(
             f"Replication {replication}: {why} The variation changes collection ratio and "
             f"communication by {change} points here. To fly it again:\n\n"
-            + page.commands(
+            + html.commands(
                 line
                 for p in points
                 for line in (f"# {what_if.SIDES[p]}", study.replay(shown, p, replication))
             )
         )
     )
-    return page.gallery([flown(kind, point) for point in points])
+    return html.gallery([flown(kind, point) for point in points])
 
 
 display(
@@ -382,7 +384,7 @@ shown_beside(
 # %%
 display(
     Markdown(
-        f"This page is made by\n\n{page.commands([what_if.command(study)])}\n\n"
+        f"This page is made by\n\n{html.commands([what_if.command(study)])}\n\n"
         "The same question asked again reuses its missions; with more `missions` it flies only "
         "the others. `--set` and the parameter `baseline` take every field of the scenario, in "
         "TOML syntax. In Jupyter, the page's notebook asks what its first cell says.\n\n"
@@ -398,4 +400,4 @@ display(
 # ## Where the figures come from
 
 # %%
-page.provenance([study])
+html.provenance([study])

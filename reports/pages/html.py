@@ -22,48 +22,6 @@ STUDY, FILES = "dess-study", "dess-files"  # what a page carries, by the class o
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
-def percent(value: float) -> str:
-    """``0.9731`` as ``97.3 %``."""
-    return f"{_minus(f'{100 * value:.1f}')} %"
-
-
-def interval(mean: float, low: float, high: float) -> str:
-    """A mean and its interval as ``97.3 % [96.1, 98.1]``."""
-    return f"{percent(mean)} [{_minus(f'{100 * low:.1f}')}, {_minus(f'{100 * high:.1f}')}]"
-
-
-def difference(value: float, reference: float) -> str:
-    """By how many percentage points a value is above its reference, as ``+7.4`` or ``−2.1``."""
-    points = round(100 * (value - reference), 1) or 0.0  # no −0.0
-    return _minus(f"{points:+.1f}") if points else "0.0"
-
-
-def points(value: float, low: float, high: float) -> str:
-    """A difference and its interval in percentage points, as ``+7.4 [6.9, 7.9]``."""
-    ends = [difference(end, 0) for end in (low, high)]
-    return f"{difference(value, 0)} [{ends[0]}, {ends[1]}]"
-
-
-def _minus(number: str) -> str:
-    """A number with a proper minus, and none on zero."""
-    return number.replace("-", "−") if float(number) else number.replace("-", "")
-
-
-def level(share: float) -> str:
-    """A confidence level, as ``95 %``."""
-    return f"{100 * share:g} %"
-
-
-def p_value(p: float) -> str:
-    """A p-value, as ``0.094``, or ``< 0.001``."""
-    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
-
-
-def words(names: Sequence[str]) -> str:
-    """``a, b and c``."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
 def commands(lines: Iterable[str]) -> str:
     """Lines for a shell, as Markdown: none is broken, and all can be copied at once."""
     return "\n".join(["```sh", *lines, "```"])

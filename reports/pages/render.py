@@ -23,7 +23,7 @@ from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess.errors import InputError
-from reports.pages import html as page
+from reports.pages import html
 from reports.pages.kernels import Kernels, Progress
 from reports.pages.notebook import GIVEN, NAMES, SCORECARD, Report, check_parameters, read
 from reports.pages.verify import is_sealed, sealed
@@ -171,9 +171,9 @@ def _body(notebook: NotebookNode) -> str:
     return _with_indices(exporter.from_notebook_node(notebook)[0])
 
 
-def _with_indices(html: str) -> str:
+def _with_indices(content: str) -> str:
     """Text with ``C_S`` as a C with an index; code and attributes stay."""
-    return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], html)
+    return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], content)
 
 
 def _pages(out: Path, but: Container[str] = ()) -> dict[str, str]:
@@ -181,22 +181,22 @@ def _pages(out: Path, but: Container[str] = ()) -> dict[str, str]:
     pages = {}
     for path in (out / f"{name}.html" for name in NAMES if f"{name}.html" not in but):
         try:
-            html = path.read_bytes().decode()
-            if not is_sealed(html):
+            content = path.read_bytes().decode()
+            if not is_sealed(content):
                 raise InputError("altered")
-            _evidence([html])
+            _evidence([content])
         except FileNotFoundError:
             continue
         except (OSError, UnicodeDecodeError, InputError):
             log.warning("%s: altered, or of another version; the index leaves it out", path)
         else:
-            pages[path.name] = html
+            pages[path.name] = content
     return pages
 
 
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
     """What pages carry of their studies, each once."""
-    texts = [text for html in pages for text in page.embedded(page.STUDY, html)]
+    texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
     return [Evidence.parse(text, "page") for text in dict.fromkeys(texts)]
 
 
@@ -210,15 +210,15 @@ def _index(pages: Mapping[str, str]) -> str:
     ]
     scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
     shown = [pages[report.page] for report in there]
-    files = dict.fromkeys(text for html in shown for text in page.embedded(page.FILES, html))
-    origins = page.carrying(_evidence(shown), files)
+    files = dict.fromkeys(text for content in shown for text in html.embedded(html.FILES, content))
+    origins = html.carrying(_evidence(shown), files)
     parts = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
     return sealed(_page(INDEX, cards=cards, **parts))
 
 
-def _thumbnail(html: str) -> Markup:
+def _thumbnail(content: str) -> Markup:
     """The last image of a page, the fullest one."""
-    images = _IMAGE.findall(html)
+    images = _IMAGE.findall(content)
     return Markup(images[-1] if images else "")
 
 

@@ -9,13 +9,13 @@ from IPython.display import HTML
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
+from analysis import numbers
 from analysis.replication import paper
 from analysis.replication.evidence_of_policy import Finding, Quantity
 from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Row
 from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED
-from reports.pages import html as page
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 
 COLUMNS = {
     "learned": "The best learned policy",
@@ -26,7 +26,7 @@ COLUMNS = {
 _LOOK = {
     HOLDS: ("holds", "✓"),
     IN_PART: ("in-part", "◐"),
-    OPEN: ("open", "?"),
+    INCONCLUSIVE: ("open", "?"),
     REFUTED: ("refuted", "✗"),
     NO_RESULTS: ("none", "–"),
 }
@@ -75,8 +75,8 @@ def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) ->
     """How to read the scorecard, a paragraph each."""
     spreads = {each.interval: each for row in rows for each in row.printed if each.low is not None}
     examples = [
-        f"{page.interval(*each.interval).partition(' % ')[2]} for a success in "
-        f"{page.percent(each.value)} of {each.n:,} missions"
+        f"{numbers.interval(*each.interval).partition(' % ')[2]} for a success in "
+        f"{numbers.percent(each.value)} of {each.n:,} missions"
         for each in spreads.values()
     ]
     verdicts = (
@@ -88,7 +88,7 @@ def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) ->
     )
     no_score = (
         f"The counts are no score. Rows overlap, as those that find {paper.BEST_UAVS} UAVs the "
-        f"best; intervals are of {page.level(LEVEL)} each, unless a rule says otherwise, not of "
+        f"best; intervals are of {numbers.level(LEVEL)} each, unless a rule says otherwise, not of "
         f"all {len(rows)} rows at once, so some may miss by chance; and the best learned policy of "
         "a study is chosen on the missions that judge it, which flatters it. What follows from the "
         "model by itself, as that success takes a charge, is left out."
@@ -96,7 +96,7 @@ def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) ->
     spread = (
         "The paper's figures are means of missions as well, but it prints no intervals"
         + (
-            f". At {page.level(LEVEL)} (Wilson) they are {page.words(examples)}; the verdicts on "
+            f". At {numbers.level(LEVEL)} (Wilson) they are {numbers.words(examples)}; the verdicts on "
             "these allow for that"
             if examples
             else ""
@@ -106,7 +106,7 @@ def _explanation(rows: Sequence[Row], papers: str, departures: Sequence[str]) ->
     )
     ours = (
         f"{papers or 'The other policy'} has the paper's observation, network and Algorithm 1. Not "
-        f"the paper's, but ours, are {page.words(departures)}. So its column does not tell what "
+        f"the paper's, but ours, are {numbers.words(departures)}. So its column does not tell what "
         "the paper's means come to by themselves."
     )
     return [verdicts, no_score, spread, *([ours] if departures else [])]
@@ -146,9 +146,9 @@ def _figure(quantity: Quantity) -> str:
     spread = low < high
     match quantity.unit:
         case "share":
-            return page.interval(value, low, high) if spread else page.percent(value)
+            return numbers.interval(value, low, high) if spread else numbers.percent(value)
         case "points":
-            text = page.points(value, low, high) if spread else page.difference(value, 0)
+            text = numbers.points(value, low, high) if spread else numbers.difference(value, 0)
             return f"{text} points"
         case "reward":
             ends = [f"{end:+,.0f}".replace("-", "−") for end in (value, low, high)]

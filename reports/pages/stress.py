@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
+from analysis.numbers import words
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from policies.registry import descriptions
-from reports.pages.html import words
 
 Manifest = Mapping[str, Any]
 

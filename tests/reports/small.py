@@ -12,7 +12,7 @@ import pytest
 
 from analysis import load_study, run_study
 from analysis.execution import decision_time as timing
-from reports.pages import html as page
+from reports.pages import html
 from reports.pages.notebook import read
 from reports.player import library
 
@@ -99,7 +99,7 @@ def shown_by(name: str, cells: int | None = None, **parameters: Any) -> str:
     report.set(parameters)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(IPython.display, "display", shown.append)
-        patch.setattr(page, "svg", lambda drawing: b"")
+        patch.setattr(html, "svg", lambda drawing: b"")
         for cell in report.cells[:cells]:
             tree = ast.parse(cell.source)
             last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None

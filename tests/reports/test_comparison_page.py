@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
-from analysis import load_results, load_study, run_study
+from analysis import load_results, load_study, numbers, run_study
 from analysis.execution import decision_time as timing
 from analysis.figures.comparison import duration
 from analysis.names import parameter
 from analysis.questions import head_to_head as regions
 from analysis.questions import summary as findings
 from dess import InputError
-from reports.pages import html as page
 from tests.reports.small import said_by
 
 NAME = "comparison"
@@ -54,12 +53,12 @@ def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
     assert f"ddqn is the best learned policy of the study, {pair.baseline} {best};" in text
     for table in (findings.learned_against_heuristic(study), findings.comparisons(study)):
         for _, row in table.iterrows():
-            assert page.points(row["difference"], row["low"], row["high"]) in text
+            assert numbers.points(row["difference"], row["low"], row["high"]) in text
     missions = regions.duels(study, pair)
     for row in regions.outcomes(missions).itertuples():
-        assert f"{row.outcome} in {page.interval(row.share, row.low, row.high)}" in text
+        assert f"{row.outcome} in {numbers.interval(row.share, row.low, row.high)}" in text
     for row in regions.rules(missions, pair.candidates).itertuples():
-        assert f"{row.rule} {page.points(row.mean, row.low, row.high)}" in text
+        assert f"{row.rule} {numbers.points(row.mean, row.low, row.high)}" in text
     lead = regions.along(missions, pair.candidates)
     verdicts = lead["verdict"].value_counts()
     assert f"Of these {len(lead)} bins, ddqn is ahead in {verdicts.get('ahead', 0)}" in text
@@ -71,13 +70,13 @@ def test_the_heat_map_is_of_missions_that_did_not_choose_it(text: str, results: 
     found, told = regions.halves(regions.duels(study, pair))
     strongest = regions.dependence(found)
     first, second = strongest["field"][:2]
-    shares = map(page.percent, strongest["explained"][:2])
+    shares = map(numbers.percent, strongest["explained"][:2])
     names = [parameter(field).within for field in (first, second)]
     one, two = (f"the {n} ({s}" for n, s in zip(names, shares, strict=True))
     assert f"{one} of its variance) and {two})" in text
     cells = regions.across(told, first, second, pair.candidates)
     low = cells.loc[cells["mean"].idxmin()]
-    assert f"The lowest mean is {page.points(low['mean'], low['low'], low['high'])}" in text
+    assert f"The lowest mean is {numbers.points(low['mean'], low['low'], low['high'])}" in text
 
 
 def test_the_worst_missions_can_be_flown_again(text: str, results: Path) -> None:

@@ -6,12 +6,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from analysis import numbers
 from analysis.names import PRODUCT
 from analysis.questions import learning as curves
 from analysis.replication import paper
-from analysis.stats.verdict import HOLDS, OPEN
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE
 from policies.registry import TRAINED
-from reports.pages import html as page
 from tests.reports.small import said_by
 
 
@@ -20,13 +20,13 @@ def test_the_learning_page_tells_the_ablation() -> None:
     table = curves.ablation(last, f"final_{PRODUCT}", "quick")
     text = said_by("learning")
     for row in table.itertuples():
-        shown = page.percent(row.mean)
+        shown = numbers.percent(row.mean)
         if row.low < row.high:
-            shown = page.interval(row.mean, row.low, row.high)
+            shown = numbers.interval(row.mean, row.low, row.high)
         assert re.search(rf"{re.escape(row.variant)} {row.n} {re.escape(shown)}", text)
 
 
-@pytest.mark.parametrize(("length", "verdict"), [(paper.CROSSING, HOLDS), (12_000, OPEN)])
+@pytest.mark.parametrize(("length", "verdict"), [(paper.CROSSING, HOLDS), (12_000, INCONCLUSIVE)])
 def test_the_learning_page_judges_by_the_curves_it_is_given(
     tmp_path: Path, length: int, verdict: str
 ) -> None:
@@ -53,6 +53,6 @@ def test_the_learning_page_judges_by_the_curves_it_is_given(
     assert f"By these rules the claim {verdict} in 2 of 2 comparisons." in text
     assert text.count(f"{verdict}: is above in all of phase II") == 2
     short = f"its crossing at {paper.CROSSING:,}: by the rules they are too short to tell"
-    assert (short in text) == (verdict == OPEN)
+    assert (short in text) == (verdict == INCONCLUSIVE)
     assert "ddqn and ddqn-2, n = 2 trainings that differ in their seed alone." in text
     assert "worse: no transfer" in text

@@ -5,14 +5,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis import load_results, load_study, run_study
+from analysis import load_results, load_study, numbers, run_study
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import main_effects as effects
 from analysis.questions import summary as findings
 from analysis.replication.claims import FIG_5
 from analysis.replication.rules import NO_RESULTS
 from analysis.replication.scorecard import scorecard
-from reports.pages import html as page
 from tests.reports.small import run_small_studies, said_by
 
 
@@ -34,11 +33,11 @@ def test_the_page_tells_what_the_studies_found(results: Path) -> None:
     sweet = load_results(results / "sweet-spot")
     for _, row in findings.checks(sweet).iterrows():
         if row["metric"] in METRICS:
-            assert page.interval(row["mean"], row["low"], row["high"]) in text
+            assert numbers.interval(row["mean"], row["low"], row["high"]) in text
     for row in findings.selections(sweet).itertuples():
         assert row.guarantee in text
     for _, row in findings.sensitivities(load_results(results / "sensitivity")).dropna().iterrows():
-        assert page.interval(row["total"], row["total_low"], row["total_high"]) in text
+        assert numbers.interval(row["total"], row["total_low"], row["total_high"]) in text
     assert "random falls" not in text and "random rises" not in text
 
 

@@ -5,10 +5,9 @@ from typing import Any
 
 import pytest
 
-from analysis import load_results
+from analysis import load_results, numbers
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import what_if
-from reports.pages import html as page
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
 
@@ -46,18 +45,18 @@ def test_the_page_says_what_the_missions_say(text: str, results: Any) -> None:
     for answer in what_if.answers(results).itertuples():
         if answer.metric in METRICS:
             ends = (answer.difference, answer.low, answer.high)
-            assert page.points(*ends) in text or 0 < answer.high - answer.low < 0.01
-            assert page.percent(answer.before) in text and page.percent(answer.after) in text
+            assert numbers.points(*ends) in text or 0 < answer.high - answer.low < 0.01
+            assert numbers.percent(answer.before) in text and numbers.percent(answer.after) in text
         if answer.metric == PRODUCT:
             says = {
                 what_if.HIGHER: f"is higher with {answer.policy}",
                 what_if.LOWER: f"is lower with {answer.policy}",
-                what_if.OPEN: f"cannot be told to differ with {answer.policy}",
+                what_if.INCONCLUSIVE: f"cannot be told to differ with {answer.policy}",
             }
             given = what_if.verdict(answer)
             assert says.pop(given) in text
             assert not any(other in text for other in says.values())
-            assert (f"{answer.policy} is undecided" in text) == (given == what_if.OPEN)
+            assert (f"{answer.policy} is undecided" in text) == (given == what_if.INCONCLUSIVE)
     assert "model card" not in text  # nobody of these has learned
     assert what_if.command(results) in text
 

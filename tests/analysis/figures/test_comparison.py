@@ -9,7 +9,7 @@ from analysis.execution.decision_time import Cost
 from analysis.figures import comparison as drawings
 from analysis.figures.comparison import COLOURS, duration
 from analysis.questions import head_to_head
-from analysis.questions.head_to_head import AHEAD, BEHIND, OPEN, Pair
+from analysis.questions.head_to_head import AHEAD, BEHIND, INCONCLUSIVE, Pair
 from analysis.results.manifest import Member
 from tests.analysis.questions.test_head_to_head import missions_of
 
@@ -45,8 +45,8 @@ def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
         assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (row.position, pytest.approx(row.mean))
         assert arm.get_segments()[0][:, 1] == pytest.approx([row.low, row.high])
         assert dot.get_color() == COLOURS[row.verdict]
-        assert (dot.get_markerfacecolor() == "white") == (row.verdict == OPEN)
-    assert [COLOURS[v] for v in (AHEAD, OPEN, BEHIND)] == [b.lines[0].get_color()
+        assert (dot.get_markerfacecolor() == "white") == (row.verdict == INCONCLUSIVE)
+    assert [COLOURS[v] for v in (AHEAD, INCONCLUSIVE, BEHIND)] == [b.lines[0].get_color()
                                                           for b in ax.containers]  # fmt: skip
     assert [label.get_text() for label in ax.get_xticklabels()] == ["1", "2", "3"]
     levels = {tuple(line.get_ydata()) for line in ax.lines}
@@ -76,9 +76,9 @@ def test_a_cell_says_its_mean_and_shows_its_sign(missions):
     for row in cells.itertuples():
         text = said[row.position, row.position_2]
         assert float(text.strip("()").replace("−", "-")) == pytest.approx(100 * row.mean, abs=0.05)
-        assert text.startswith("(") == (row.verdict == OPEN)
+        assert text.startswith("(") == (row.verdict == INCONCLUSIVE)
         red, _, blue, _ = faces[row.position, row.position_2]
-        if row.verdict != OPEN:
+        if row.verdict != INCONCLUSIVE:
             assert (blue > red) == (row.verdict == AHEAD)
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
     assert ax.get_ylabel() == "Number of UAVs"

@@ -7,7 +7,7 @@ from scipy import stats
 
 from analysis.questions import learning
 from analysis.replication import paper
-from analysis.stats.verdict import HOLDS, OPEN, REFUTED
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 METRIC = "evaluation_reward"
 STEPS = [1000, 2000, 3000, 4000]
@@ -72,11 +72,11 @@ def test_transfer_holds_where_the_curve_passes_and_ends_surely_higher():
 
 def test_transfer_cannot_be_told_where_the_end_is_not_sure():
     found = compared([4.0, 9.0], [3.0, 8.0], level=1.0)
-    assert (found.verdict, found.since, found.throughout) == (OPEN, STEPS[0], True)
+    assert (found.verdict, found.since, found.throughout) == (INCONCLUSIVE, STEPS[0], True)
     assert found.last.low < 0 < found.last.mean
     found = compared([3.0, 8.0], [4.0, 9.0])  # nor where it ends below
-    assert (found.verdict, found.since) == (OPEN, None)
-    assert compared([9.0], [5.0]).verdict == OPEN  # two single trainings
+    assert (found.verdict, found.since) == (INCONCLUSIVE, None)
+    assert compared([9.0], [5.0]).verdict == INCONCLUSIVE  # two single trainings
 
 
 def test_transfer_does_not_hold_where_the_curve_ends_surely_below():
@@ -89,9 +89,12 @@ def test_trainings_shorter_than_the_paper_s_crossing_cannot_tell(ends):
     both = pd.concat([several("with", ends[0]), several("without", ends[1])])
     averages = learning.smoothed(both, METRIC)
     found = learning.transfer(averages, "with", "without")
-    assert (found.verdict, found.length) == (OPEN, STEPS[-1])
+    assert (found.verdict, found.length) == (INCONCLUSIVE, STEPS[-1])
     assert STEPS[-1] < paper.CROSSING
-    assert learning.transfer(averages, "with", "without", shortest=found.length).verdict != OPEN
+    assert (
+        learning.transfer(averages, "with", "without", shortest=found.length).verdict
+        != INCONCLUSIVE
+    )
 
 
 def test_transfer_is_judged_in_the_last_phase_alone():

@@ -13,7 +13,7 @@ from analysis import load_study
 from analysis.figures import what_if as what_if_figures
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import what_if
-from analysis.questions.what_if import BASELINE, HIGHER, LOWER, OPEN, VARIATION
+from analysis.questions.what_if import BASELINE, HIGHER, INCONCLUSIVE, LOWER, VARIATION
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import paired
 from dess import load_scenario
@@ -183,9 +183,9 @@ def test_means_are_of_the_papers_metrics(results):
     [
         (row(0.2, 0.1, 0.3), HIGHER),
         (row(-0.2, -0.3, -0.1), LOWER),
-        (row(0.1, -0.1, 0.3), OPEN),
-        (row(0.0, 0.0, 0.0, p=1.0), OPEN),
-        (row(0.5, 0.5, 0.5, p=0.5, n=2), OPEN),  # two equal differences prove nothing
+        (row(0.1, -0.1, 0.3), INCONCLUSIVE),
+        (row(0.0, 0.0, 0.0, p=1.0), INCONCLUSIVE),
+        (row(0.5, 0.5, 0.5, p=0.5, n=2), INCONCLUSIVE),  # two equal differences prove nothing
         (row(0.5, 0.5, 0.5, p=0.002, n=10), HIGHER),
     ],
 )

@@ -9,7 +9,7 @@ from scipy import stats
 from analysis.replication import paper, rules
 from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.stats.intervals import Interval
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from analysis.study.selection import Choice
 
 RULES = (
@@ -29,7 +29,7 @@ def around(mean: float, half: float = 0.01) -> Interval:
 
 @given(st.floats(-1, 1), st.integers(0, len(RULES) - 1))
 def test_what_is_not_known_at_all_is_never_told(mean: float, rule: int) -> None:
-    assert RULES[rule](Interval(mean, -9.0, 9.0)) == OPEN
+    assert RULES[rule](Interval(mean, -9.0, 9.0)) == INCONCLUSIVE
 
 
 @pytest.mark.parametrize(
@@ -39,8 +39,8 @@ def test_what_is_not_known_at_all_is_never_told(mean: float, rule: int) -> None:
         (-0.005, 0.01, HOLDS),  # around it
         (-0.01, 0.01, HOLDS),  # the upper end is the figure
         (-0.02, 0.01, IN_PART),  # wholly below, but near
-        (-0.10, 0.20, OPEN),  # too few missions to say, but far
-        (0.01, 0.20, OPEN),  # too few missions to say, if near
+        (-0.10, 0.20, INCONCLUSIVE),  # too few missions to say, but far
+        (0.01, 0.20, INCONCLUSIVE),  # too few missions to say, if near
         (-0.06, 0.005, REFUTED),
         (-0.05, 0.01, REFUTED),  # wholly below, and not shown to be near
     ],
@@ -75,7 +75,7 @@ def test_the_interval_of_a_printed_share_is_wilsons() -> None:
         (0.15, 0.01, IN_PART),
         (0.005, 0.01, REFUTED),  # perhaps it rises, but surely not that much
         (-0.3, 0.01, REFUTED),
-        (0.2, 0.3, OPEN),
+        (0.2, 0.3, INCONCLUSIVE),
     ],
 )
 def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -> None:
@@ -83,7 +83,8 @@ def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -
 
 
 @pytest.mark.parametrize(
-    ("mean", "verdict"), [(0.02, HOLDS), (0.005, OPEN), (-0.001, OPEN), (-0.02, REFUTED)]
+    ("mean", "verdict"),
+    [(0.02, HOLDS), (0.005, INCONCLUSIVE), (-0.001, INCONCLUSIVE), (-0.02, REFUTED)],
 )
 def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
     assert rules.higher(around(mean)) == rules.lower(around(-mean)) == verdict
@@ -93,8 +94,8 @@ def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
     ("mean", "half", "verdict"),
     [
         (-0.02, 0.01, HOLDS),
-        (-0.005, 0.01, OPEN),
-        (0.0, 0.01, OPEN),
+        (-0.005, 0.01, INCONCLUSIVE),
+        (0.0, 0.01, INCONCLUSIVE),
         (-0.05, 0.04, IN_PART),  # it falls, but who knows how much
         (-0.10, 0.01, REFUTED),  # more than slightly
         (0.02, 0.01, REFUTED),
@@ -110,8 +111,8 @@ def test_slightly_lower(mean: float, half: float, verdict: str) -> None:
         (0.0, 0.009, HOLDS),
         (0.05, 0.01, HOLDS),
         (-0.005, 0.001, HOLDS),  # surely lower, but by less than matters
-        (0.0, 0.02, OPEN),  # it might be lower by more than the margin
-        (-0.02, 0.015, OPEN),
+        (0.0, 0.02, INCONCLUSIVE),  # it might be lower by more than the margin
+        (-0.02, 0.015, INCONCLUSIVE),
         (-0.05, 0.01, REFUTED),
     ],
 )
@@ -121,7 +122,7 @@ def test_kept_up_to_a_margin(mean: float, half: float, verdict: str) -> None:
 
 def test_shares_of_missions() -> None:
     assert rules.most(around(0.6, 0.05)) == HOLDS
-    assert rules.most(around(0.6, 0.2)) == rules.most(around(0.4, 0.2)) == OPEN
+    assert rules.most(around(0.6, 0.2)) == rules.most(around(0.4, 0.2)) == INCONCLUSIVE
     assert rules.most(around(0.4, 0.05)) == REFUTED
 
 
@@ -130,7 +131,7 @@ def test_missions_that_collect_everything() -> None:
     assert rules.never_all(none, around(0.9)) == HOLDS
     assert rules.never_all(some, around(0.9)) == IN_PART
     assert rules.never_all(Interval(0, 0, 0.2), around(0.9)) == IN_PART  # few missions
-    assert rules.never_all(some, around(0.99)) == OPEN
+    assert rules.never_all(some, around(0.99)) == INCONCLUSIVE
     assert rules.never_all(every, around(1.0, 0)) == REFUTED
 
 
@@ -139,7 +140,7 @@ def test_ignored_nodes() -> None:
     assert rules.ignored(around(0.4), around(0.2)) == IN_PART  # more than others, not most
     assert rules.ignored(around(0.9), around(-0.1)) == IN_PART  # most, but the others too
     assert rules.ignored(around(0.2), around(-0.1)) == REFUTED
-    assert rules.ignored(around(0.5), around(0.0)) == OPEN
+    assert rules.ignored(around(0.5), around(0.0)) == INCONCLUSIVE
 
 
 def test_divided_nodes() -> None:
@@ -147,12 +148,17 @@ def test_divided_nodes() -> None:
     assert rules.divided(around(0.0), around(0.95)) == IN_PART  # nodes of their own, no sectors
     assert rules.divided(around(0.2), around(0.6)) == IN_PART
     assert rules.divided(around(0.0), around(0.6)) == REFUTED
-    assert rules.divided(around(0.0), around(0.75)) == OPEN
+    assert rules.divided(around(0.0), around(0.75)) == INCONCLUSIVE
 
 
 @pytest.mark.parametrize(
     ("best", "left", "verdict"),
-    [(4, (4, 5), HOLDS), (4, (4, 1), OPEN), (1, (1, 4), OPEN), (1, (1, 2), REFUTED)],
+    [
+        (4, (4, 5), HOLDS),
+        (4, (4, 1), INCONCLUSIVE),
+        (1, (1, 4), INCONCLUSIVE),
+        (1, (1, 2), REFUTED),
+    ],
 )
 def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> None:
     choice = Choice(best, left, (), (), "kn", "", True, True, 0, 0, 0)
@@ -162,17 +168,17 @@ def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> Non
 def test_learning_curves() -> None:
     assert rules.throughout(HOLDS, True) == HOLDS
     assert rules.throughout(HOLDS, False) == IN_PART  # it ends above, but was below
-    assert rules.throughout(OPEN, True) == OPEN
+    assert rules.throughout(INCONCLUSIVE, True) == INCONCLUSIVE
     assert rules.throughout(REFUTED, False) == REFUTED
     assert rules.levels_off(0.4, around(0.1)) == HOLDS
     assert rules.levels_off(0.4, around(0.0)) == IN_PART  # early, not shown to be low
     assert rules.levels_off(0.9, around(0.1)) == IN_PART  # low, not early
-    assert rules.levels_off(0.9, around(0.0)) == OPEN
+    assert rules.levels_off(0.9, around(0.0)) == INCONCLUSIVE
     assert rules.levels_off(0.9, around(-0.1)) == REFUTED
 
 
 def test_single_trainings_leave_it_open() -> None:
-    assert rules.levels_off(0.9, Interval(0.1, np.nan, np.nan)) == OPEN
+    assert rules.levels_off(0.9, Interval(0.1, np.nan, np.nan)) == INCONCLUSIVE
 
 
 def test_the_margin_is_in_the_words() -> None:
@@ -181,4 +187,4 @@ def test_the_margin_is_in_the_words() -> None:
 
 
 def test_the_verdicts_are_five_words() -> None:
-    assert {*VERDICTS} == {HOLDS, IN_PART, OPEN, REFUTED, NO_RESULTS}
+    assert {*VERDICTS} == {HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS}

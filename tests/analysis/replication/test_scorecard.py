@@ -17,7 +17,7 @@ from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Row, departures, of_policy, scorecard
 from analysis.results.tables import Results
 from analysis.stats.intervals import Interval, summary
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
@@ -183,13 +183,15 @@ def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
     wide = changed(studies["table4"], collection_ratio=halves * 0.4 + 0.6)
     few = wide.missions[wide.missions["replication"] < 6]
     found = scorecard({"table4": replace(wide, missions=few)}, NONE)
-    assert row_of(found, "Collection ratio over").learned.verdict == OPEN
+    assert row_of(found, "Collection ratio over").learned.verdict == INCONCLUSIVE
 
 
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
-        assert row.learned.verdict == (OPEN if row.part.startswith("Table IV") else NO_RESULTS)
+        assert row.learned.verdict == (
+            INCONCLUSIVE if row.part.startswith("Table IV") else NO_RESULTS
+        )
 
 
 def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
@@ -203,7 +205,7 @@ def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
     [
         ({1: 0.6, 2: 0.9, 3: 0.95}, HOLDS, HOLDS, HOLDS),
         ({1: 0.6, 2: 0.7, 3: 0.69}, IN_PART, REFUTED, REFUTED),
-        ({1: 0.6, 2: 0.5, 3: 0.6}, REFUTED, HOLDS, OPEN),
+        ({1: 0.6, 2: 0.5, 3: 0.6}, REFUTED, HOLDS, INCONCLUSIVE),
     ],
 )
 def test_what_one_more_uav_changes(
@@ -335,7 +337,7 @@ def test_learning_that_fails_is_told() -> None:
 def test_short_trainings_cannot_tell(tops: tuple[float, float]) -> None:
     curves = trained({v: (0, top) for v, top in zip(module.VARIANTS, tops, strict=True)}, 12_000)
     found = [row.learned for row in scorecard({}, curves) if row.part.startswith("Fig. 3")]
-    assert [each.verdict for each in found] == 3 * [OPEN]
+    assert [each.verdict for each in found] == 3 * [INCONCLUSIVE]
     assert all(each.note.endswith("too short to tell") for each in found)
 
 

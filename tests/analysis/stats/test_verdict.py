@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.stats.intervals import Interval
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED, above, judged
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED, above, judged
 
 
 @pytest.mark.parametrize(
@@ -26,7 +26,7 @@ def test_verdicts_on_parts() -> None:
     assert judged(True) == judged(True, True) == HOLDS
     assert judged(True, False) == judged(True, None) == IN_PART
     assert judged(False) == judged(False, None) == judged(False, False) == REFUTED
-    assert judged(None) == judged(None, None) == OPEN
+    assert judged(None) == judged(None, None) == INCONCLUSIVE
 
 
 def test_the_order_of_parts_does_not_matter() -> None:

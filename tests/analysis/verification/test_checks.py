@@ -1,6 +1,6 @@
 """Verdicts follow from p-values, corrected together, and from errors and their bounds."""
 
-from analysis.questions.main_effects import HOLDS, OPEN, REFUTED
+from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.verification.checks import ALPHA, Check, judge
 
 
@@ -22,9 +22,9 @@ def test_p_values_are_corrected_for_their_number() -> None:
 
 def test_exact_checks_and_open_ones_do_not_count_for_the_correction() -> None:
     table = judge([check(p=0.6 * ALPHA), check(error=0.0), check(), check()])
-    assert table["verdict"].tolist() == [REFUTED, HOLDS, OPEN, OPEN]
+    assert table["verdict"].tolist() == [REFUTED, HOLDS, INCONCLUSIVE, INCONCLUSIVE]
 
 
 def test_a_page_without_chance_is_judged_too() -> None:
-    assert judge([check(error=0.0), check()])["verdict"].tolist() == [HOLDS, OPEN]
-    assert judge([check()])["verdict"].tolist() == [OPEN]
+    assert judge([check(error=0.0), check()])["verdict"].tolist() == [HOLDS, INCONCLUSIVE]
+    assert judge([check()])["verdict"].tolist() == [INCONCLUSIVE]

@@ -7,12 +7,12 @@ from html.parser import HTMLParser
 
 import pytest
 
+from analysis import numbers
 from analysis.replication import paper
 from analysis.replication.evidence_of_policy import Finding, Quantity
 from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Row
-from analysis.stats.verdict import HOLDS, IN_PART, OPEN, REFUTED
-from reports.pages import html as page
+from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.scorecard import scorecard
 
 ABSENT = Finding(NO_RESULTS, note="the study fig4 has not run")
@@ -34,7 +34,7 @@ ROWS = [
         (),
         "Holds if C_S does not matter.",
         "mission.html#fig-4",
-        Finding(OPEN, "ddqn", (Quantity(-0.0001, -0.009, 0.009, 300, "points", "change"),)),
+        Finding(INCONCLUSIVE, "ddqn", (Quantity(-0.0001, -0.009, 0.009, 300, "points", "change"),)),
         ABSENT,
     ),
     Row(
@@ -148,7 +148,7 @@ def test_it_says_how_to_read_it() -> None:
     success = Quantity(*paper.spread(0.901, 1000), n=1000)
     rows = [replace(ROWS[0], printed=(success,)), *ROWS[1:]]
     text = text_of(scorecard(rows, departures=["a guard", "5-step returns"]).data)
-    spread = page.interval(*success.interval).partition(" % ")[2]
+    spread = numbers.interval(*success.interval).partition(" % ")[2]
     assert f"At 95 % (Wilson) they are {spread} for a success in 90.1 % of 1,000 missions" in text
     assert f"not of all {len(rows)} rows at once" in text
     assert "The counts are no score." in text and "chosen on the missions that judge it" in text

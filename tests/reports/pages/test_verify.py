@@ -15,7 +15,7 @@ from analysis.results.tables import load_results
 from dess.errors import InputError
 from policies.registry import TRAINED
 from reports.cli import main
-from reports.pages import html as pieces
+from reports.pages import html
 from reports.pages.html import STUDY, embedded
 from reports.pages.render import _index, _pages, render
 from reports.pages.verify import sealed, verify_page, verify_results
@@ -196,9 +196,9 @@ def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> N
 
 def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     folder = shutil.copytree(TRAINED, tmp_path / "trained")
-    html = f'<meta name="dess-checksum" content="">{pieces.weights(folder).data}'
+    content = f'<meta name="dess-checksum" content="">{html.weights(folder).data}'
     path = tmp_path / "page.html"
-    path.write_text(sealed(html), "utf-8")
+    path.write_text(sealed(content), "utf-8")
     assert lines_of(path) == []
     weights = folder / "ddqn" / "model.safetensors"
     weights.write_bytes(weights.read_bytes() + b" ")
