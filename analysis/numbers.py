@@ -1,6 +1,8 @@
 """How numbers are written, on pages and in the terminal: shares in percent, with a proper minus."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+
+import pandas as pd
 
 
 def percent(value: float) -> str:
@@ -43,3 +45,25 @@ def p_value(p: float) -> str:
 def words(names: Sequence[str]) -> str:
     """``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def wide(
+    table: pd.DataFrame,
+    index: str | list[str],
+    columns: str | list[str] = "metric",
+    write: Callable[[float, float, float], str] = interval,
+) -> pd.DataFrame:
+    """A long table of estimates as a wide one of text, rows and columns in order of appearance.
+
+    Args:
+        table: A row per estimate: ``mean``, ``low``, ``high``, and the columns named below.
+        index: Columns that name a row.
+        columns: Columns that name a column.
+        write: What is written of an estimate and its interval.
+    """
+    text = [write(*ends) for ends in table[["mean", "low", "high"]].to_numpy(float)]
+    rows = [index] if isinstance(index, str) else [*index]
+    heads = [columns] if isinstance(columns, str) else [*columns]
+    cells = table.assign(text=text).set_index([*rows, *heads])["text"].unstack(heads)
+    order = table.drop_duplicates(rows).set_index(rows).index
+    return cells.loc[order, table.drop_duplicates(heads).set_index(heads).index]

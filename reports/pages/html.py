@@ -10,7 +10,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import pandas as pd
-from IPython.display import HTML
+from IPython.display import HTML, Markdown
 from matplotlib.figure import Figure
 
 from analysis.results.evidence import Evidence, learned_files
@@ -20,6 +20,11 @@ SHORT = 12  # characters of a hash that are shown
 STUDY, FILES = "dess-study", "dess-files"  # what a page carries, by the class of its element
 
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
+
+
+def say(text: str, **values: object) -> Markdown:
+    """A sentence with numbers in it, as Markdown: ``say("{n:,} missions", n=300)``."""
+    return Markdown(text.format(**values))
 
 
 def commands(lines: Iterable[str]) -> str:
