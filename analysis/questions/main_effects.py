@@ -4,7 +4,6 @@ For designs that vary one parameter at a time (the paper's Fig. 5). All values o
 the same replications, so they are compared mission by mission.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,7 +15,6 @@ from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import adjust, paired
-from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess.errors import InputError
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
@@ -109,7 +107,7 @@ def changes(
 
 def shape(pairs: pd.DataFrame) -> Shape:
     """The shape that the differences of ``changes`` leave."""
-    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
+    ups, downs = differing(pairs, 1), differing(pairs, -1)
     places = range(int(pairs["second"].max()) + 1)
     peaks = tuple(p for p in places if _passes(p, ups, downs))
     valleys = tuple(p for p in places if _passes(p, downs, ups))
@@ -124,61 +122,8 @@ def shape(pairs: pd.DataFrame) -> Shape:
     return Shape(words, peaks)
 
 
-def best_at(pairs: pd.DataFrame, position: int) -> str:
-    """Whether the metric is highest at a value: it differs from every other, upwards."""
-    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
-    others = set(range(int(pairs["second"].max()) + 1)) - {position}
-    below = {a for a, b in ups if b == position} | {b for a, b in downs if a == position}
-    above = {b for a, b in ups if a == position} | {a for a, b in downs if b == position}
-    if above:
-        return REFUTED
-    return HOLDS if below == others else INCONCLUSIVE
-
-
-def no_lower(pairs: pd.DataFrame, positions: Iterable[int], margin: float) -> str:
-    """Whether the metric is no lower at some values than at all others, up to a margin.
-
-    It holds if all intervals of a difference are above -margin; it does not if one of those that
-    hold at once is below.
-    """
-    chosen = [*positions]
-    inside = pairs["second"].isin(chosen)
-    across = inside != pairs["first"].isin(chosen)
-    rows, upwards = pairs[across], inside[across]
-    lows = rows["low"].where(upwards, -rows["high"])
-    tops = rows["wide_high"].where(upwards, -rows["wide_low"])
-    if (tops < -margin).any():
-        return REFUTED
-    return HOLDS if (lows > -margin).all() else INCONCLUSIVE
-
-
-def alike(pairs: pd.DataFrame, margin: float) -> str:
-    """Whether all values are alike: every interval of a difference within a margin.
-
-    They are not if one of the intervals that hold at once is wholly beyond.
-    """
-    if ((pairs["wide_low"] > margin) | (pairs["wide_high"] < -margin)).any():
-        return REFUTED
-    within = (pairs["low"] >= -margin) & (pairs["high"] <= margin)
-    return HOLDS if within.all() else INCONCLUSIVE
-
-
-def peaks_at(pairs: pd.DataFrame, position: int) -> str:
-    """Whether the metric rises up to a value and falls behind it."""
-    found = shape(pairs)
-    if position not in found.peaks:
-        return REFUTED
-    return HOLDS if found.words == PEAK else INCONCLUSIVE
-
-
-def rises(pairs: pd.DataFrame) -> str:
-    """Whether the metric rises along the values."""
-    found = shape(pairs).words
-    return {RISES: HOLDS, LEVELS: INCONCLUSIVE}.get(found, REFUTED)
-
-
-def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
-    """The pairs of positions that differ, upwards or downwards."""
+def differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
+    """The pairs of positions whose values differ, upwards (sign 1) or downwards (sign -1)."""
     rows = pairs[(pairs["p_adjusted"] <= 1 - LEVEL) & (np.sign(pairs["difference"]) == sign)]
     return set(zip(rows["first"], rows["second"], strict=True))
 

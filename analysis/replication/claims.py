@@ -387,7 +387,7 @@ def _division(flight: Flight, generator: np.random.Generator) -> tuple[float, ..
 def _best_at(study: str, field: str, value: str) -> Judge:
     def judge(case: Case) -> Finding:
         pairs = case.pairs(study, field, PRODUCT)
-        verdict = main_effects.best_at(pairs.table, pairs.place(value))
+        verdict = rules.best_at(pairs.table, pairs.place(value))
         lead = least(pairs.leads(value), f"{_at(field, value)} above the next best")
         return Finding(verdict, case.policy(study), (lead,))
 
@@ -397,7 +397,7 @@ def _best_at(study: str, field: str, value: str) -> Judge:
 def _lowest_at(field: str, value: str) -> Judge:
     def judge(case: Case) -> Finding:
         pairs = case.pairs("fig5", field, RATIO).reversed()
-        verdict = main_effects.best_at(pairs.table, pairs.place(value))
+        verdict = rules.best_at(pairs.table, pairs.place(value))
         lead = least(pairs.leads(value), "the next lowest is higher by")
         return Finding(verdict, case.policy("fig5"), (lead,))
 
@@ -409,19 +409,19 @@ def _no_lower(case: Case, margin: float) -> Finding:
     low = [pairs.place(value) for value in ADVENTUROUS]
     leads = pd.concat([pairs.leads(value) for value in ADVENTUROUS])
     ours = least(leads[~leads["other"].isin(low)], "least difference")
-    verdict = main_effects.no_lower(pairs.table, low, margin)
+    verdict = rules.no_lower(pairs.table, low, margin)
     return Finding(verdict, case.policy("fig5"), (ours,))
 
 
 def _alike(case: Case, margin: float) -> Finding:
     table = case.pairs("fig5", "charge_complete", PRODUCT).table
     ours = points(table.loc[table["difference"].abs().idxmax()], "largest difference")
-    return Finding(main_effects.alike(table, margin), case.policy("fig5"), (ours,))
+    return Finding(rules.alike(table, margin), case.policy("fig5"), (ours,))
 
 
 def _peaks(case: Case) -> Finding:
     pairs = case.pairs("fig5", "initial_data", PRODUCT)
-    verdict = main_effects.peaks_at(pairs.table, pairs.place(TURNING))
+    verdict = rules.peaks_at(pairs.table, pairs.place(TURNING))
     lead = least(pairs.leads(TURNING), f"{_at('initial_data', TURNING)} above the best other")
     return Finding(verdict, case.policy("fig5"), (lead,), note=_course(pairs))
 
@@ -436,7 +436,7 @@ def _rises(field: str, metric: str) -> Judge:
         pairs = case.pairs("fig5", field, metric)
         first, *_, last = pairs.places
         ours = pairs.change(first, last)._replace(name=f"from {first} to {last}")
-        verdict = main_effects.rises(pairs.table)
+        verdict = rules.rises(pairs.table)
         return Finding(verdict, case.policy("fig5"), (ours,), note=_course(pairs))
 
     return judge

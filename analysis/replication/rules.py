@@ -5,9 +5,12 @@ whole intervals say so, and in part where a part of it is shown; else it is inco
 are of 95 %, differences are taken mission by mission, unless a rule says otherwise.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from math import hypot
 
+import pandas as pd
+
+from analysis.questions import main_effects
 from analysis.questions.learning import BAND
 from analysis.replication.paper import CROSSING
 from analysis.stats.intervals import Interval
@@ -181,7 +184,7 @@ def divided(beyond_chance: Interval, division: Interval) -> str:
     return judged(above(beyond_chance), above(division, 0.75))
 
 
-# The words of ``effects``.
+# Of the differences between all values of a parameter, as of ``main_effects.changes``.
 _PAIRS = "(Holm, all pairs of values)"
 BEST = (
     f"Holds if every other value is surely lower {_PAIRS}; does not hold if one is surely higher; "
@@ -202,7 +205,7 @@ PEAKS = (
 
 
 def alike_words(margin: float) -> str:
-    """The words of ``effects.alike``."""
+    """The words of ``alike``."""
     points = margin_in_words(margin)
     return (
         f"Holds if all intervals of differences lie within {points}; does not hold if one, widened "
@@ -211,12 +214,65 @@ def alike_words(margin: float) -> str:
 
 
 def no_lower_words(margin: float) -> str:
-    """The words of ``effects.no_lower``."""
+    """The words of ``no_lower``."""
     points = margin_in_words(margin)
     return (
         f"Holds if all intervals of differences lie above −{points}; does not hold if one, widened "
         f"for their number (Bonferroni), lies wholly below; {_ELSE}"
     )
+
+
+def best_at(pairs: pd.DataFrame, position: int) -> str:
+    """Whether the metric is highest at a value: it differs from every other, upwards."""
+    ups, downs = main_effects.differing(pairs, 1), main_effects.differing(pairs, -1)
+    others = set(range(int(pairs["second"].max()) + 1)) - {position}
+    below = {a for a, b in ups if b == position} | {b for a, b in downs if a == position}
+    above = {b for a, b in ups if a == position} | {a for a, b in downs if b == position}
+    if above:
+        return REFUTED
+    return HOLDS if below == others else INCONCLUSIVE
+
+
+def no_lower(pairs: pd.DataFrame, positions: Iterable[int], margin: float) -> str:
+    """Whether the metric is no lower at some values than at all others, up to a margin.
+
+    It holds if all intervals of a difference are above -margin; it does not if one of those that
+    hold at once is below.
+    """
+    chosen = [*positions]
+    inside = pairs["second"].isin(chosen)
+    across = inside != pairs["first"].isin(chosen)
+    rows, upwards = pairs[across], inside[across]
+    lows = rows["low"].where(upwards, -rows["high"])
+    tops = rows["wide_high"].where(upwards, -rows["wide_low"])
+    if (tops < -margin).any():
+        return REFUTED
+    return HOLDS if (lows > -margin).all() else INCONCLUSIVE
+
+
+def alike(pairs: pd.DataFrame, margin: float) -> str:
+    """Whether all values are alike: every interval of a difference within a margin.
+
+    They are not if one of the intervals that hold at once is wholly beyond.
+    """
+    if ((pairs["wide_low"] > margin) | (pairs["wide_high"] < -margin)).any():
+        return REFUTED
+    within = (pairs["low"] >= -margin) & (pairs["high"] <= margin)
+    return HOLDS if within.all() else INCONCLUSIVE
+
+
+def peaks_at(pairs: pd.DataFrame, position: int) -> str:
+    """Whether the metric rises up to a value and falls behind it."""
+    found = main_effects.shape(pairs)
+    if position not in found.peaks:
+        return REFUTED
+    return HOLDS if found.words == main_effects.PEAK else INCONCLUSIVE
+
+
+def rises(pairs: pd.DataFrame) -> str:
+    """Whether the metric rises along the values."""
+    found = main_effects.shape(pairs).words
+    return {main_effects.RISES: HOLDS, main_effects.LEVELS: INCONCLUSIVE}.get(found, REFUTED)
 
 
 CHOSEN = (

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.stats.paired import adjust
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 # The chance that any check of chance fails although all that is known holds.
 ALPHA = 0.01

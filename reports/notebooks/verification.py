@@ -31,8 +31,8 @@ from analysis import load_results, numbers
 from analysis.figures import verification as drawings
 from analysis.names import METRICS, parameter
 from analysis.questions import summary as findings
-from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.stats.intervals import LEVEL
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.verification import chance as fits
 from analysis.verification import closed_forms
 from analysis.verification import exact as audits

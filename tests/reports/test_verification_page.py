@@ -8,7 +8,7 @@ import pytest
 
 from analysis import load_results, load_study, run_study
 from analysis.execution import jobs
-from analysis.questions.main_effects import HOLDS, REFUTED
+from analysis.stats.verdict import HOLDS, REFUTED
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
 from reports.pages import stress

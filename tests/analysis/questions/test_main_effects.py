@@ -10,7 +10,6 @@ from analysis.questions import main_effects
 from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.stats.intervals import mean_interval
 from analysis.stats.paired import adjust, paired
-from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -124,61 +123,3 @@ def test_many_small_steps_make_a_rise():
     pairs = pairs_of([0.4, 0.4, 0.4], half=1.0)
     assert pairs.loc[pairs["second"] - pairs["first"] == 1, "p_adjusted"].eq(1).all()
     assert main_effects.shape(pairs).words == RISES
-
-
-def test_best_at():
-    assert main_effects.best_at(pairs_of([1, 1]), 2) == HOLDS
-    assert main_effects.best_at(pairs_of([1, -2]), 1) == HOLDS
-    assert main_effects.best_at(pairs_of([1, 1]), 1) == REFUTED
-    assert main_effects.best_at(pairs_of([1, 0]), 2) == INCONCLUSIVE  # as high as the one before
-    assert main_effects.best_at(pairs_of([1, 1], sure=False), 2) == INCONCLUSIVE
-
-
-def test_no_lower():
-    assert main_effects.no_lower(pairs_of([0, 0, 0]), [0, 1], 0.01) == HOLDS
-    assert main_effects.no_lower(pairs_of([0, -1, 0]), [0, 1], 0.01) == HOLDS
-    assert main_effects.no_lower(pairs_of([0, 1, 0]), [0, 1], 0.01) == REFUTED
-    assert main_effects.no_lower(pairs_of([0, -1, 0]), [2, 3], 0.01) == REFUTED
-    assert main_effects.no_lower(pairs_of([0, 0, 0], half=0.02), [0, 1], 0.01) == INCONCLUSIVE
-    assert main_effects.no_lower(pairs_of([1, 0, 0]), [0, 1], 0.01) == REFUTED  # the first is lower
-    assert (
-        main_effects.no_lower(pairs_of([0, 0.005, 0]), [0, 1], 0.01) == HOLDS
-    )  # by less than matters
-
-
-def test_no_lower_is_refuted_beyond_the_margin_alone():
-    """Surely lower, but perhaps by less than matters; or beyond, but not with all at once."""
-    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.015), [0, 1], 0.01) == INCONCLUSIVE
-    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.006), [0, 1], 0.01) == INCONCLUSIVE
-    assert main_effects.no_lower(pairs_of([0, 0.02, 0], half=0.004), [0, 1], 0.01) == REFUTED
-
-
-def test_alike():
-    assert main_effects.alike(pairs_of([0, 0.005]), 0.01) == HOLDS
-    assert (
-        main_effects.alike(pairs_of([0.005, 0.005]), 0.01) == INCONCLUSIVE
-    )  # it might be a little more
-    assert main_effects.alike(pairs_of([0, 0.05]), 0.01) == REFUTED
-    assert main_effects.alike(pairs_of([0, -0.05]), 0.01) == REFUTED
-
-
-def test_alike_is_refuted_beyond_the_margin_alone():
-    """The differences are sure, and by their means beyond the margin: that is not enough."""
-    assert main_effects.alike(pairs_of([0, 0.02], half=0.015), 0.01) == INCONCLUSIVE
-    assert (
-        main_effects.alike(pairs_of([0, 0.02], half=0.006), 0.01) == INCONCLUSIVE
-    )  # not all at once
-    assert main_effects.alike(pairs_of([0, 0.02], half=0.004), 0.01) == REFUTED
-
-
-def test_peaks_at():
-    assert main_effects.peaks_at(pairs_of([1, 1, -1]), 2) == HOLDS
-    assert main_effects.peaks_at(pairs_of([1, 1, -1]), 1) == REFUTED
-    assert main_effects.peaks_at(pairs_of([1, 1, 0]), 2) == INCONCLUSIVE  # nothing is seen to fall
-    assert main_effects.peaks_at(pairs_of([0, 0, 0]), 2) == INCONCLUSIVE
-
-
-def test_rises():
-    assert main_effects.rises(pairs_of([0, 1])) == HOLDS
-    assert main_effects.rises(pairs_of([0, 0])) == INCONCLUSIVE
-    assert main_effects.rises(pairs_of([0, -1])) == main_effects.rises(pairs_of([1, -1])) == REFUTED

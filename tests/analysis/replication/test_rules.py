@@ -11,6 +11,7 @@ from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.stats.intervals import Interval
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from analysis.study.selection import Choice
+from tests.analysis.questions.test_main_effects import pairs_of
 
 RULES = (
     rules.reached,
@@ -188,3 +189,55 @@ def test_the_margin_is_in_the_words() -> None:
 
 def test_the_verdicts_are_five_words() -> None:
     assert {*VERDICTS} == {HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS}
+
+
+def test_best_at() -> None:
+    assert rules.best_at(pairs_of([1, 1]), 2) == HOLDS
+    assert rules.best_at(pairs_of([1, -2]), 1) == HOLDS
+    assert rules.best_at(pairs_of([1, 1]), 1) == REFUTED
+    assert rules.best_at(pairs_of([1, 0]), 2) == INCONCLUSIVE  # as high as the one before
+    assert rules.best_at(pairs_of([1, 1], sure=False), 2) == INCONCLUSIVE
+
+
+def test_no_lower() -> None:
+    assert rules.no_lower(pairs_of([0, 0, 0]), [0, 1], 0.01) == HOLDS
+    assert rules.no_lower(pairs_of([0, -1, 0]), [0, 1], 0.01) == HOLDS
+    assert rules.no_lower(pairs_of([0, 1, 0]), [0, 1], 0.01) == REFUTED
+    assert rules.no_lower(pairs_of([0, -1, 0]), [2, 3], 0.01) == REFUTED
+    assert rules.no_lower(pairs_of([0, 0, 0], half=0.02), [0, 1], 0.01) == INCONCLUSIVE
+    assert rules.no_lower(pairs_of([1, 0, 0]), [0, 1], 0.01) == REFUTED  # the first is lower
+    assert rules.no_lower(pairs_of([0, 0.005, 0]), [0, 1], 0.01) == HOLDS  # by less than matters
+
+
+def test_no_lower_is_refuted_beyond_the_margin_alone() -> None:
+    """Surely lower, but perhaps by less than matters; or beyond, but not with all at once."""
+    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.015), [0, 1], 0.01) == INCONCLUSIVE
+    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.006), [0, 1], 0.01) == INCONCLUSIVE
+    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.004), [0, 1], 0.01) == REFUTED
+
+
+def test_alike() -> None:
+    assert rules.alike(pairs_of([0, 0.005]), 0.01) == HOLDS
+    assert rules.alike(pairs_of([0.005, 0.005]), 0.01) == INCONCLUSIVE  # it might be a little more
+    assert rules.alike(pairs_of([0, 0.05]), 0.01) == REFUTED
+    assert rules.alike(pairs_of([0, -0.05]), 0.01) == REFUTED
+
+
+def test_alike_is_refuted_beyond_the_margin_alone() -> None:
+    """The differences are sure, and by their means beyond the margin: that is not enough."""
+    assert rules.alike(pairs_of([0, 0.02], half=0.015), 0.01) == INCONCLUSIVE
+    assert rules.alike(pairs_of([0, 0.02], half=0.006), 0.01) == INCONCLUSIVE  # not all at once
+    assert rules.alike(pairs_of([0, 0.02], half=0.004), 0.01) == REFUTED
+
+
+def test_peaks_at() -> None:
+    assert rules.peaks_at(pairs_of([1, 1, -1]), 2) == HOLDS
+    assert rules.peaks_at(pairs_of([1, 1, -1]), 1) == REFUTED
+    assert rules.peaks_at(pairs_of([1, 1, 0]), 2) == INCONCLUSIVE  # nothing is seen to fall
+    assert rules.peaks_at(pairs_of([0, 0, 0]), 2) == INCONCLUSIVE
+
+
+def test_rises() -> None:
+    assert rules.rises(pairs_of([0, 1])) == HOLDS
+    assert rules.rises(pairs_of([0, 0])) == INCONCLUSIVE
+    assert rules.rises(pairs_of([0, -1])) == rules.rises(pairs_of([1, -1])) == REFUTED

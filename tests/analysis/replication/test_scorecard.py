@@ -11,7 +11,7 @@ import pytest
 from analysis import fly, load_study, run_study
 from analysis.names import METRICS, PRODUCT
 from analysis.questions import main_effects, node_shares
-from analysis.replication import claims, paper
+from analysis.replication import claims, paper, rules
 from analysis.replication import scorecard as module
 from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Row, departures, of_policy, scorecard
@@ -240,11 +240,11 @@ def test_verdicts_on_parameters_are_those_of_their_page(
         return main_effects.changes(fig5, table, "ddqn", field, metric)
 
     expected = {
-        "best with three UAVs": main_effects.best_at(pairs("uavs", PRODUCT), 2),
-        "no lower at C_S": main_effects.no_lower(pairs("charge_start", "success"), [0, 1], 0.02),
-        "All values of C_C": main_effects.alike(pairs("charge_complete", PRODUCT), 0.02),
-        "More initial data": main_effects.peaks_at(pairs("initial_data", PRODUCT), 4),
-        "More flying time": main_effects.rises(pairs("flying_time", PRODUCT)),
+        "best with three UAVs": rules.best_at(pairs("uavs", PRODUCT), 2),
+        "no lower at C_S": rules.no_lower(pairs("charge_start", "success"), [0, 1], 0.02),
+        "All values of C_C": rules.alike(pairs("charge_complete", PRODUCT), 0.02),
+        "More initial data": rules.peaks_at(pairs("initial_data", PRODUCT), 4),
+        "More flying time": rules.rises(pairs("flying_time", PRODUCT)),
     }
     for words, verdict in expected.items():
         assert row_of(rows, words).learned.verdict == verdict

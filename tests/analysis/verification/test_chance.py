@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.questions.main_effects import HOLDS, REFUTED
 from analysis.stats.intervals import mean_interval, wilson
+from analysis.stats.verdict import HOLDS, REFUTED
 from analysis.verification import chance, lone_uav
 from analysis.verification.checks import Check, judge
 from dess import load_scenario

@@ -1,6 +1,6 @@
 """Verdicts follow from p-values, corrected together, and from errors and their bounds."""
 
-from analysis.questions.main_effects import HOLDS, INCONCLUSIVE, REFUTED
+from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.verification.checks import ALPHA, Check, judge
 
 
