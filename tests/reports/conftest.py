@@ -1,16 +1,36 @@
 """A browser for the tests of pages."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, sync_playwright
 
 from tests.reports import browser
 
 
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[browser.Page]:
-    """An empty page of a headless Chromium."""
+def chromium() -> Iterator[Browser]:
+    """A headless Chromium; tests that need it are skipped on machines without one."""
     if browser.CHROMIUM is None:
-        pytest.skip("there is no chromium on this machine to open a page in")
-    with browser.page() as tab:
-        yield tab
+        pytest.skip("no chromium on this machine to open a page in")
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(
+            executable_path=browser.CHROMIUM, args=browser.ARGUMENTS
+        )
+        yield launched
+        launched.close()
+
+
+@pytest.fixture
+def visit(chromium: Browser) -> Iterator[Callable[[Path, int], browser.Visit]]:
+    """Opens a file in a window of a width [px]; its tab is closed after the test."""
+    visits: list[browser.Visit] = []
+
+    def open_page(path: Path, width: int) -> browser.Visit:
+        visits.append(browser.Visit(chromium, path, width))
+        return visits[-1]
+
+    yield open_page
+    for opened in visits:
+        opened.page.close()

@@ -2,12 +2,14 @@
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 import pytest
+from playwright.sync_api import Locator, Page, expect
 from plotly import graph_objects
 
 import dess
@@ -17,7 +19,7 @@ from analysis.results.event_log import battery_levels, duration, residual_data, 
 from dess.errors import InputError
 from dess.state import sample_scenario
 from reports.player import chart, library, player
-from tests.reports import browser
+from tests.reports.browser import Visit
 
 # One UAV; three in a queue for one pad, of which one runs dry long before the others are done;
 # quotas that are filled at once; nothing to serve, in a mission that is truncated.
@@ -270,64 +272,63 @@ def document(queue: Mission, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def button(name: str, label: str) -> str:
-    """The JavaScript that finds a button of a player."""
-    buttons = f"[...document.querySelectorAll('#{name} .updatemenu-button')]"
-    return f"{buttons}.find((button) => button.textContent === '{label}')"
+def button(page: Page, name: str, label: str) -> Locator:
+    """A button of a player."""
+    return page.locator(f"#{name} .updatemenu-button").filter(has_text=label)
 
 
 def slot(name: str) -> str:
-    """The JavaScript that reads which slot a player says it shows."""
+    """The JavaScript that reads which slot a player shows."""
     return f"Number(document.querySelector('#{name} .slider-label').textContent.split(' ')[1])"
 
 
 @pytest.mark.parametrize("width", [pytest.param(1200, marks=pytest.mark.slow), 390])
 def test_a_mission_is_played_and_paused(
-    chromium: browser.Page, document: Path, queue: Mission, width: int
+    visit: Callable[[Path, int], Visit], document: Path, queue: Mission, width: int
 ) -> None:
-    page, end = chromium, duration(queue.log)
-    page.requests.clear()
-    page.complaints.clear()
-    page.open(document, width)
-    page.wait(button("second", "Play"))
-    page.wait("document.getElementById('second').style.height.endsWith('px')")
+    opened, end = visit(document, width), duration(queue.log)
+    page, status = opened.page, opened.page.locator("#first .x5y5 .textpoint")
+    button(page, "second", "Play").wait_for()
+    page.wait_for_function("document.getElementById('second').style.height.endsWith('px')")
     assert page.evaluate(slot("first")) == 0
 
-    page.press(button("first", "Play"))
-    page.wait(f"{slot('first')} >= 3")
-    page.press(button("first", "Pause"))
+    button(page, "first", "Play").click()
+    page.wait_for_function(f"{slot('first')} >= 3")
+    button(page, "first", "Pause").click()
     paused = page.evaluate(slot("first"))
-    page.evaluate("new Promise((done) => setTimeout(done, 1000))")  # three slots, were it playing
+    page.wait_for_timeout(1000)  # three slots, were it playing
     assert 3 <= page.evaluate(slot("first")) == paused < end
-    status = "document.querySelector('#first .x5y5 .textpoint').textContent"
-    assert page.evaluate(status) == Replay(queue)[paused]["status"]["text"][0]
+    assert status.text_content() == Replay(queue)[paused]["status"]["text"][0]
     assert page.evaluate(slot("second")) == 0
 
-    page.press(button("first", "Play"))
-    page.wait(f"{slot('first')} > {paused}")
-    page.press("document.querySelector('#first .slider-rail-touch-rect')", across=0.999)
-    page.wait(f"{slot('first')} === {end}")
-    page.wait(f"{status} === {json.dumps(Replay(queue)[end]['status']['text'][0])}")
-    page.press(button("first", "Fast"))
-    page.wait(f"0 < {slot('first')} && {slot('first')} < {end}")
+    button(page, "first", "Play").click()
+    page.wait_for_function(f"{slot('first')} > {paused}")
+    rail = page.locator("#first .slider-rail-touch-rect")
+    box = rail.bounding_box()
+    assert box is not None
+    rail.click(position={"x": 0.999 * box["width"], "y": box["height"] / 2}, force=True)
+    page.wait_for_function(f"{slot('first')} === {end}")
+    expect(status).to_have_text(Replay(queue)[end]["status"]["text"][0])
+    button(page, "first", "Fast").click()
+    page.wait_for_function(f"0 < {slot('first')} && {slot('first')} < {end}")
 
-    assert page.complaints == []
-    assert set(page.requests) == {document.as_uri()}
+    assert opened.complaints == []
+    assert opened.requests == [document.as_uri()]
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_the_curves_stand_beside_the_map_where_there_is_room(
-    chromium: browser.Page, document: Path
+    visit: Callable[[Path, int], Visit], document: Path
 ) -> None:
     def left(axes: str) -> str:
         plot = f"document.querySelector('#first .subplot.{axes} .gridlayer, #first .{axes}')"
         return f"{plot}.getBoundingClientRect().left"
 
     beside = f"{left('x2y2')} > 400"
-    chromium.open(document, 390)
-    chromium.wait(button("second", "Play"))
-    assert not chromium.evaluate(beside)
-    chromium.resize(1200)
-    chromium.wait(beside)
-    chromium.resize(390)
-    chromium.wait(f"!({beside})")
+    opened = visit(document, 390)
+    button(opened.page, "second", "Play").wait_for()
+    assert not opened.page.evaluate(beside)
+    opened.resize(1200)
+    opened.page.wait_for_function(beside)
+    opened.resize(390)
+    opened.page.wait_for_function(f"!({beside})")

@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 from base64 import b64decode
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import ReportError, render
 from reports.player import library
-from tests.reports import browser
+from tests.reports.browser import Visit
 from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
 READS = jupytext.reads
@@ -231,43 +232,37 @@ def test_every_page_carries_what_it_was_made_with(pages: dict[str, str], results
 
 
 @pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.slow), 390])
-def test_pages_fit_the_window_and_ask_for_nothing(
-    chromium: browser.Page, pages: dict[str, str], out: Path, width: int
+def test_pages_fit_the_window_and_request_nothing(
+    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path, width: int
 ) -> None:
     for name in html_of(pages):
-        chromium.requests.clear()
-        chromium.complaints.clear()
-        chromium.open(out / name, width)
-        assert chromium.evaluate("document.documentElement.scrollWidth") <= width
-        assert chromium.requests == [(out / name).as_uri()]
-        assert chromium.complaints == []
+        opened = visit(out / name, width)
+        assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+        assert opened.requests == [(out / name).as_uri()]
+        assert opened.complaints == []
 
 
-def test_pages_fit_the_paper(chromium: browser.Page, pages: dict[str, str], out: Path) -> None:
-    try:
-        chromium.call("Emulation.setEmulatedMedia", media="print")
-        for name in html_of(pages):
-            chromium.open(out / name, A4)
-            assert chromium.evaluate(BEYOND.format(A4)) == [], name
-    finally:
-        chromium.call("Emulation.setEmulatedMedia", media="")
+def test_pages_fit_the_paper(
+    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path
+) -> None:
+    for name in html_of(pages):
+        page = visit(out / name, A4).page
+        page.emulate_media(media="print")
+        assert page.evaluate(BEYOND.format(A4)) == [], name
 
 
 def test_a_mission_is_played_in_its_page(
-    chromium: browser.Page, pages: dict[str, str], out: Path
+    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path
 ) -> None:
-    chromium.requests.clear()
-    chromium.complaints.clear()
-    chromium.open(out / "mission.html", 1280)
-    buttons = "[...document.querySelectorAll('#player-3 .updatemenu-button')]"
-    play = f"{buttons}.find((button) => button.textContent === 'Play')"
+    opened = visit(out / "mission.html", 1280)
     label = "document.querySelector('#player-3 .slider-label').textContent"
-    chromium.wait(play)
-    assert chromium.evaluate(label) == "slot 0"
-    chromium.press(play)
-    chromium.wait(f"Number({label}.split(' ')[1]) >= 3")
-    assert chromium.requests == [(out / "mission.html").as_uri()]
-    assert chromium.complaints == []
+    play = opened.page.locator("#player-3 .updatemenu-button").filter(has_text="Play")
+    play.wait_for()
+    assert opened.page.evaluate(label) == "slot 0"
+    play.click()
+    opened.page.wait_for_function(f"Number({label}.split(' ')[1]) >= 3")
+    assert opened.requests == [(out / "mission.html").as_uri()]
+    assert opened.complaints == []
 
 
 def test_an_unknown_report_is_refused(results: Path, tmp_path: Path) -> None:
