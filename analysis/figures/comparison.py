@@ -10,10 +10,18 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, PercentFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 
 from analysis.execution.decision_time import Cost
-from analysis.figures.missions import DPI, INK, MUTED, policy_colours, style
+from analysis.figures.style import (
+    INK,
+    MUTED,
+    legend_below,
+    panels,
+    points_axis,
+    policy_colours,
+    style,
+)
 from analysis.names import parameter
 from analysis.questions.head_to_head import AHEAD, BEHIND, INCONCLUSIVE, Pair
 from analysis.stats.intervals import LEVEL
@@ -33,8 +41,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     """
     rows = table[table["field"] == field].sort_values("position")
     with style():
-        figure = Figure(figsize=(5.2, 3.5), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.5)
         ax.axhline(0, color=INK, linewidth=1.2, zorder=1)
         ax.axhline(overall, color=MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall")
         for row in rows.itertuples():
@@ -54,8 +61,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         ax.set(title=parameter(field).label, ylabel="mean difference [points]")
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
-        ax.yaxis.set_major_formatter(FuncFormatter(_points))
+        points_axis(ax.yaxis, 6)
         ax.grid(axis="x", visible=False)
         sns.despine(ax=ax)
     return figure
@@ -76,8 +82,7 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     widest = max(float(np.nanmax(np.abs(grid))), 0.01)
     with style():
         height = 1.5 + 0.55 * len(names)
-        figure = Figure(figsize=(5.2, height), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(height)
         ax.grid(False)
         colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
         ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
@@ -125,8 +130,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     x = np.concatenate([[min(values[0], low) - 1], values, [max(values[-1], high) + 1]])
     y = np.concatenate([[0], shares, [1]])
     with style():
-        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.9)
         ax.axvspan(x[0], 0, color=COLOURS[BEHIND], alpha=0.12, linewidth=0, zorder=0)
         ax.axvspan(0, x[-1], color=COLOURS[AHEAD], alpha=0.10, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
@@ -141,8 +145,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         ax.set_title("Difference in every mission", pad=22)
         ax.set(xlim=(low - room, high + room), ylim=(0, 1), ylabel="share of the missions")
         ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
-        ax.xaxis.set_major_formatter(FuncFormatter(_points))
+        points_axis(ax.xaxis, 7)
         ax.yaxis.set_major_formatter(PercentFormatter(1))
         sns.despine(ax=ax)
     return figure
@@ -158,10 +161,9 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         costs: Of a ``analysis.execution.decision_time.Timing``.
         policies: All policies of the study: they give every policy its colour on all pages.
     """
-    colours = policy_colours(pd.Series([*policies, *(cost.policy for cost in costs)]))
+    colours = policy_colours([*policies, *(cost.policy for cost in costs)])
     with style():
-        figure = Figure(figsize=(5.2, 1.5 + 0.45 * len(costs)), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(1.5 + 0.45 * len(costs))
         for y, cost in enumerate(costs):
             colour, _ = colours[cost.policy]
             first = not y
@@ -180,7 +182,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
         ax.grid(axis="y", visible=False)
         sns.despine(ax=ax, left=True)
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+        legend_below(figure, ax, 1)
     return figure
 
 
@@ -190,12 +192,6 @@ def duration(seconds: float) -> str:
         if seconds >= size:
             return f"{float(f'{seconds / size:.3g}'):g} {unit}"
     return f"{float(f'{seconds / 1e-9:.3g}'):g} ns"
-
-
-def _points(share: float, _: int = 0) -> str:
-    """``0.025`` as ``+2.5``."""
-    points = round(100 * share, 1) or 0.0
-    return f"{points:+.3g}".replace("-", "−") if points else "0"
 
 
 def _ends(table: pd.DataFrame) -> tuple[float, float]:

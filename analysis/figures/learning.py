@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
-from analysis.figures.missions import DPI, INK, LINES, MUTED, style
+from analysis.figures.style import INK, LINES, MUTED, panels, round_ticks, style
 from analysis.names import METRICS
 from analysis.questions.learning import bands, smoothed
 
@@ -41,8 +41,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     averages = smoothed(curves[curves["variant"].isin(labels)], metric)
     colours = dict(zip(labels, sns.color_palette("colorblind").as_hex(), strict=False))
     with style():
-        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.9)
         for number, (variant, label) in enumerate(labels.items()):
             own = averages[averages["variant"] == variant]
             _trainings(own, colours[variant], ax)
@@ -72,8 +71,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     level = table.loc[table["variant"] == baseline, "mean"].item()
     left, right = _ends(table, last[metric], OFF * level)
     with style():
-        figure = Figure(figsize=(5.2, 0.9 + 0.42 * len(table)), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(0.9 + 0.42 * len(table))
         ax.axvline(level, color=INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, row in table.reset_index(drop=True).iterrows():
             own = values.get_group(row["variant"])
@@ -88,7 +86,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
         ax.set_yticks(range(len(table)), names)
         ax.set(title=METRICS[metric.removeprefix("final_")], ylim=(len(table) - 0.4, -0.6))
         ax.set_xlim(left, right)
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+        round_ticks(ax.xaxis, 5)
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         ax.grid(axis="y", visible=False)
         sns.despine(ax=ax, left=True)
@@ -104,8 +102,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     """
     kept = curve[curve["is_best"]].iloc[-1]
     with style():
-        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.9)
         colours = sns.color_palette("colorblind").as_hex()
         for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
             for n, (_, own) in enumerate(curve.groupby("phase", sort=False)):

@@ -1,77 +1,36 @@
-"""Figures of missions and of studies, one function each.
+"""Figures of one mission: its map, batteries, residual data and charging zone.
 
-Functions of a mission take its event log (a data frame, or the columns, of
-``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; those that end in
-``_figure`` and those of a study return a figure of their own. Nothing touches pyplot's state.
+Each function takes the event log of the mission (a data frame, or the columns, of
+``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure`` puts
+them together. Nothing touches pyplot's state.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
-from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator
 
-from analysis.names import METRICS
+from analysis.figures.style import (
+    DPI,
+    INK,
+    LINES,
+    MUTED,
+    SEA,
+    ZONE,
+    node_colours,
+    note_at_right,
+    style,
+    uav_colours,
+)
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
-from policies.registry import SHIPPED
 
-INK, MUTED, SEA, ZONE = "#22303c", "#7a8791", "#f3f8fb", "#ffe08a"
-UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
-# Policies that look the same in all figures, whichever others are there.
-EVERYWHERE = (*SHIPPED, "ddqn", "ddqn-paper")
-LINES = ("-", "--", ":", "-.")
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
-DPI = 150
-_PRINTED: dict = {"color": INK, "linestyle": "--", "linewidth": 1.3}
-
-
-def node_colours(count: int) -> list[str]:
-    """A colour per node: nine colour-blind safe hues in three shades; neighbours differ in hue."""
-    hues = [c for c in sns.color_palette("colorblind") if np.ptp(c) > 0.05]  # all but the grey
-    hues = [min(c, sns.set_hls_values(c, l=0.5), key=sum) for c in hues]  # readable on white
-    mixes = (("white", 0.0), ("black", 0.45), ("white", 0.33))
-    shades = [(1 - share) * np.array(hues) + share * np.array(to_rgb(c)) for c, share in mixes]
-    palette = np.concatenate(shades)
-    return [to_hex(palette[k % len(palette)]) for k in range(count)]
-
-
-def uav_colours(count: int) -> list[str]:
-    """A dark colour per UAV, the same in a fleet of any size; they come again after eight."""
-    return [UAVS[uav % len(UAVS)] for uav in range(count)]
-
-
-@contextmanager
-def style() -> Iterator[None]:
-    """The look of all figures, for the figures and axes that are made inside."""
-    look = {
-        "font.size": 10,
-        "axes.titlesize": 11,
-        "axes.titleweight": "bold",
-        "axes.titlelocation": "left",
-        "axes.edgecolor": MUTED,
-        "axes.labelcolor": INK,
-        "text.color": INK,
-        "xtick.color": INK,
-        "ytick.color": INK,
-        "legend.frameon": False,
-        "legend.fontsize": 9,
-        "grid.color": "#dde4e9",
-    }
-    with mpl.rc_context():
-        mpl.rcdefaults()  # whatever the user's matplotlibrc says
-        sns.set_style("whitegrid")
-        mpl.rcParams.update(look)
-        yield
 
 
 def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
@@ -201,104 +160,6 @@ def mission_figure(events: Events, scenario: Scenario) -> Figure:
     return figure
 
 
-def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
-    """A metric of every policy: means with intervals, and the paper's figure as a line.
-
-    Args:
-        summary: Rows of ``analysis.summary`` by ``policy``.
-        metric: One of ``METRICS``.
-        printed: The paper's figure.
-    """
-    rows = summary[summary["metric"] == metric].reset_index(drop=True)
-    with style():
-        figure = Figure(figsize=(5.2, 1.3 + 0.42 * len(rows)), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
-        colours = policy_colours(rows["policy"])
-        for y, row in rows.iterrows():
-            ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
-            ax.annotate(
-                f"{row['mean']:.1%}",
-                (1, y),
-                xycoords=("axes fraction", "data"),
-                xytext=(4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=9,
-            )
-        if printed is not None:
-            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
-            figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center")
-        ax.set_yticks(range(len(rows)), rows["policy"])
-        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
-        ax.set_xticks(np.linspace(0, 1, 6))
-        ax.xaxis.set_major_formatter(PercentFormatter(1))
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
-    return figure
-
-
-def by_fleet(
-    summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
-) -> Figure:
-    """A metric of every policy against the number of UAVs, with intervals.
-
-    Args:
-        summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
-        metric: One of ``METRICS``.
-        printed: The paper's figures by number of UAVs.
-    """
-    rows = summary[summary["metric"] == metric]
-    with style():
-        figure = Figure(figsize=(5.2, 3.9), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
-        colours = policy_colours(rows["policy"])
-        offsets = np.linspace(-0.12, 0.12, len(colours)) if len(colours) > 1 else [0.0]
-        for offset, (policy, own) in zip(offsets, rows.groupby("policy", sort=False), strict=True):
-            own = own.sort_values("uavs")
-            ax.errorbar(
-                own["uavs"] + offset,
-                own["mean"],
-                yerr=arms(own),
-                **dot(policy, colours),
-                linewidth=1,
-                alpha=0.9,
-                label=policy,
-            )
-        if printed:
-            ax.plot(*zip(*sorted(printed.items()), strict=True), marker="D", markersize=6,
-                    label="paper", **_PRINTED)  # fmt: skip
-        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
-        ax.set_xticks(sorted(rows["uavs"].unique()))
-        ax.set_yticks(np.linspace(0, 1, 6))
-        ax.yaxis.set_major_formatter(PercentFormatter(1))
-        ax.grid(axis="x", visible=False)
-        ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=5, columnspacing=1.1,
-                  handletextpad=0.5)  # fmt: skip
-        sns.despine(ax=ax)
-    return figure
-
-
-def policy_colours(policies: pd.Series) -> dict[str, tuple[str, str]]:
-    """Colour and marker of every policy; those of ``EVERYWHERE`` always have their own."""
-    names = list(dict.fromkeys(policies))
-    numbers = {name: EVERYWHERE.index(name) for name in names if name in EVERYWHERE}
-    free = [n for n in range(len(names)) if n not in numbers.values()]
-    numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
-    palette = sns.color_palette("colorblind").as_hex()
-    return {name: (palette[numbers[name] % 10], "os^vPX*"[numbers[name] % 7]) for name in names}
-
-
-def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
-    """How the means of a policy are drawn."""
-    colour, marker = colours[policy]
-    return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
-
-
-def arms(rows: pd.DataFrame | pd.Series) -> np.ndarray:
-    """Lengths of the arms of error bars, (2, N)."""
-    return np.array([rows["mean"] - rows["low"], rows["high"] - rows["mean"]]).reshape(2, -1)
-
-
 def _outcome(events: Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
@@ -420,8 +281,7 @@ def _uav_line(uav: int, scenario: Scenario) -> dict:
 
 def _margin_note(text: str, level: float, ax: Axes) -> None:
     """A note in the right margin, at a level of the y axis."""
-    note = ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
-                       textcoords="offset points", va="center", fontsize=8.5)  # fmt: skip
+    note = note_at_right(text, level, ax, 8.5)
     note.set_in_layout(False)  # maps of one gallery are equally large, whatever the notes say
 
 

@@ -10,9 +10,20 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, PercentFormatter
 
-from analysis.figures.missions import DPI, INK, MUTED, arms, dot, policy_colours, style
+from analysis.figures.style import (
+    INK,
+    MUTED,
+    arms,
+    dot,
+    legend_below,
+    panels,
+    policy_colours,
+    round_ticks,
+    signed_points,
+    style,
+)
 from analysis.names import METRICS, parameter
 from analysis.study.design import NOISE
 
@@ -36,10 +47,9 @@ def effect(
     """
     rows = table[table["field"] == field]
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
-    colours = policy_colours(pd.Series(policies))
+    colours = policy_colours(policies)
     with style():
-        figure = Figure(figsize=(5.2, 7.6), dpi=DPI, layout="constrained")
-        axes = figure.subplots(4, sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
+        figure, axes = panels(7.6, 4, sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
         for ax, metric in zip(axes, METRICS, strict=False):
             _means(rows[rows["metric"] == metric], [*changes], colours, ax)
             ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
@@ -48,15 +58,15 @@ def effect(
             _changes(changes[policy], shift, dot(policy, colours), axes[3])
         axes[3].set_title(f"Change of the last, from {values[0]} on")
         axes[3].set_ylabel("points")
-        axes[3].yaxis.set_major_formatter(FuncFormatter(_points))
+        axes[3].yaxis.set_major_formatter(FuncFormatter(signed_points))
         axes[3].set_xlim(-0.4, len(values) - 0.6)
         axes[3].set_xticks(range(len(values)), values)
         axes[3].set_xlabel(parameter(field).label)
         for ax in axes:
-            ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+            round_ticks(ax.yaxis, 5)
             ax.grid(axis="x", visible=False)
             sns.despine(ax=ax)
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        legend_below(figure, axes[0])
     return figure
 
 
@@ -70,8 +80,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     rows = rows.reset_index(drop=True)
     colour = sns.color_palette("colorblind").as_hex()[0]
     with style():
-        figure = Figure(figsize=(5.2, 1.5 + 0.52 * len(rows)), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(1.5 + 0.52 * len(rows))
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
             name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
             spots = np.arange(len(rows)) + shift
@@ -87,7 +96,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         ax.grid(axis="y", visible=False)
         sns.despine(ax=ax, left=True)
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(figure, ax, 2)
     return figure
 
 
@@ -118,11 +127,6 @@ def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
 def _shifts(drawn: list[str], values: int) -> dict[str, float]:
     ends = APART * values * (len(drawn) > 1)
     return dict(zip(drawn, np.linspace(-ends, ends, len(drawn)), strict=True))
-
-
-def _points(share: float, _: int) -> str:
-    """``0.025`` as ``+2.5``."""
-    return f"{100 * share:+.3g}".replace("-", "−") if round(share, 9) else "0"
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:

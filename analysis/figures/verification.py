@@ -14,7 +14,7 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from scipy import stats
 
-from analysis.figures.missions import DPI, INK, MUTED, SEA, ZONE, style
+from analysis.figures.style import INK, MUTED, SEA, ZONE, legend_below, panels, round_ticks, style
 from analysis.stats.intervals import LEVEL
 from analysis.verification import closed_forms
 from analysis.verification.chance import Fit
@@ -52,7 +52,7 @@ def fit(observed: Fit, title: str, label: str, logarithmic: bool = False) -> Fig
         labels = [name.replace(" or ", "\nor ") for name in table["label"]]
         below.set_xticks(spots[::step], labels[::step])
         below.set_xlabel(label)
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(figure, ax, 2)
     return figure
 
 
@@ -77,15 +77,14 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
         _deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
         below.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
         below.set_xlabel("distance [m]")
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(figure, ax, 2)
     return figure
 
 
 def totals(values: np.ndarray, law: Any, title: str, label: str) -> Figure:
     """How values are distributed, and the density that they are said to have."""
     with style():
-        figure = Figure(figsize=(5.2, 3.4), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.4)
         bins = int(np.clip(np.sqrt(len(values)), 8, 50))
         ax.hist(values, bins, density=True, color=KNOWN, label="observed")
         reach = law.mean() + 3 * law.std() * np.array([-1, 1])
@@ -94,7 +93,7 @@ def totals(values: np.ndarray, law: Any, title: str, label: str) -> Figure:
         ax.set(title=title, xlabel=label, ylabel="density")
         ax.yaxis.set_major_locator(MaxNLocator(nbins=5))
         sns.despine(ax=ax)
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(figure, ax, 2)
     return figure
 
 
@@ -108,8 +107,7 @@ def caterpillar(blocks: pd.DataFrame, reference: float, title: str) -> Figure:
     """
     own = blocks.head(SHOWN)
     with style():
-        figure = Figure(figsize=(5.2, 3.6), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(3.6)
         looks = ((True, SEEN, "o", "holds the mean of all"), (False, MISS, "X", "misses it"))
         for holds, colour, marker, name in looks:
             rows = own[own["holds"] == holds]
@@ -120,11 +118,11 @@ def caterpillar(blocks: pd.DataFrame, reference: float, title: str) -> Figure:
         ax.axhline(reference, color=INK, linewidth=1.1, zorder=1)
         ax.set(title=title, xlabel="block of missions", xlim=(0, len(own) + 1))
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+        round_ticks(ax.yaxis, 6)
         ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
         ax.grid(axis="x", visible=False)
         sns.despine(ax=ax)
-        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        legend_below(figure, ax, 2)
     return figure
 
 
@@ -139,8 +137,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     height, gap = 1.0, 0.35
     tops = [-(height + gap) * number for number in range(len(steps) + 1)]
     with style():
-        figure = Figure(figsize=(5.2, 0.8 * len(tops)), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(0.8 * len(tops))
         for number, (name, text) in enumerate(steps):
             _box(ax, tops[number], height, name, text, ZONE if number == 0 else SEA)
         _box(ax, tops[-1], height, end, "", ZONE)
@@ -159,8 +156,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
 
 def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
     """A panel and a lower one for the deviations, over the same axis."""
-    figure = Figure(figsize=(5.2, 4.6), dpi=DPI, layout="constrained")
-    ax, below = figure.subplots(2, sharex=True, height_ratios=(2, 1))
+    figure, (ax, below) = panels(4.6, 2, sharex=True, height_ratios=(2, 1))
     ax.grid(axis="x", visible=False)
     for each in (ax, below):
         sns.despine(ax=each)

@@ -10,9 +10,20 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 
-from analysis.figures.missions import DPI, INK, MUTED, arms, dot, policy_colours, style
+from analysis.figures.style import (
+    INK,
+    MUTED,
+    arms,
+    dot,
+    legend_below,
+    panels,
+    points_axis,
+    policy_colours,
+    round_ticks,
+    style,
+)
 from analysis.names import METRICS
 from analysis.questions.what_if import SIDES
 
@@ -32,8 +43,7 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     policies = list(dict.fromkeys(rows["policy"]))
     colours = policy_colours(rows["policy"])
     with style():
-        figure = Figure(figsize=(5.2, 4.1), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(4.1)
         for policy, shift in zip(policies, _apart(len(policies), 0.05), strict=True):
             own = rows[rows["policy"] == policy].sort_values("point")
             ax.errorbar(own["point"] + shift, own["mean"], yerr=arms(own), linewidth=1,
@@ -41,11 +51,11 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
         ax.set(title=METRICS[metric], xlim=(-0.45, 1.45), ylim=_ends(rows))
         ticks = ["\n".join((s, *words)) for s, words in zip(SIDES, settings, strict=True)]
         ax.set_xticks((0, 1), ticks)
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
+        round_ticks(ax.yaxis, 6)
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         ax.grid(axis="x", visible=False)
         sns.despine(ax=ax)
-        _legend(figure, ax)
+        legend_below(figure, ax)
     return figure
 
 
@@ -60,8 +70,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     colours = policy_colours(rows["policy"])
     with style():
         height = 1.6 + len(METRICS) * (0.35 + 0.22 * len(policies))
-        figure = Figure(figsize=(5.2, height), dpi=DPI, layout="constrained")
-        ax = figure.subplots()
+        figure, ax = panels(height)
         for policy, shift in zip(policies, _apart(len(policies), 0.11), strict=True):
             own = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
             ax.errorbar(own["mean"], np.arange(len(METRICS)) + shift, xerr=arms(own),
@@ -73,7 +82,7 @@ def gains(answers: pd.DataFrame) -> Figure:
         _points_axis(ax)
         ax.grid(axis="y", visible=False)
         sns.despine(ax=ax, left=True)
-        _legend(figure, ax)
+        legend_below(figure, ax)
     return figure
 
 
@@ -83,14 +92,13 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     Args:
         differences: Per policy, as of ``analysis.questions.what_if.differences``.
     """
-    colours = policy_colours(pd.Series([*differences]))
+    colours = policy_colours(differences)
     tails = (1 - MIDDLE) / 2
     ends = np.array([own.quantile([tails, 1 - tails]) for own in differences.values()])
     low, high = min(ends[:, 0].min(), 0.0), max(ends[:, 1].max(), 0.0)
     room = max(0.04 * (high - low), 0.002)
     with style():
-        figure = Figure(figsize=(5.2, 5.6), dpi=DPI, layout="constrained")
-        axes = figure.subplots(2, sharey=True)
+        figure, axes = panels(5.6, 2, sharey=True)
         titles = ("Share of missions with that difference or less", "The same, near the middle")
         for ax, title in zip(axes, titles, strict=True):
             for number, (policy, own) in enumerate(differences.items()):
@@ -106,7 +114,7 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
             _points_axis(ax)
             sns.despine(ax=ax)
         axes[1].set(xlim=(low - room, high + room), xlabel="percentage points")
-        _legend(figure, axes[0])
+        legend_below(figure, axes[0])
     return figure
 
 
@@ -123,20 +131,10 @@ def _ends(rows: pd.DataFrame) -> tuple[float, float]:
 
 
 def _points_axis(ax: Axes) -> None:
-    ax.xaxis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
-    ax.xaxis.set_major_formatter(FuncFormatter(_points))
-
-
-def _points(share: float, _: int) -> str:
-    """``0.025`` as ``+2.5``."""
-    return f"{100 * share:+.3g}".replace("-", "−") if round(share, 9) else "0"
+    points_axis(ax.xaxis, 7)
 
 
 def _broken(name: str) -> str:
     """A long name in two lines."""
     first, separator, rest = name.partition(" and ")
     return f"{first}\nand {rest}" if separator else name.replace(" ", "\n", 1)
-
-
-def _legend(figure: Figure, ax: Axes) -> None:
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=3)

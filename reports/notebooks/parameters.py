@@ -27,8 +27,8 @@ import pandas as pd
 from IPython.display import Markdown, display
 
 from analysis import load_results, numbers, summary
-from analysis.figures import missions as figures
 from analysis.figures import parameters as parameter_figures
+from analysis.figures.policies import performance
 from analysis.names import METRICS, PRODUCT, parameter, value_text
 from analysis.questions import main_effects as effects
 from analysis.questions import summary as findings
@@ -200,7 +200,7 @@ display(
 html.gallery(
     [
         (
-            figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
+            performance(checks, metric, paper.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, beside the paper's figure",
             f"The check: n = {checks['n'].min():,} missions per policy, bars are {level} "
             "intervals. Dashed: the paper.",

@@ -24,7 +24,7 @@ import pandas as pd
 from IPython.display import Markdown, display
 
 from analysis import load_results, numbers, summary
-from analysis.figures import missions as figures
+from analysis.figures import policies as figures
 from analysis.names import METRICS, PRODUCT
 from analysis.replication import paper
 from analysis.stats.intervals import wilson

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.figures.missions import INK, MUTED
+from analysis.figures.style import INK, MUTED
 from reports.player.mission import Mission
 from reports.player.trace import Json, Moving, on_axes, rounded
 

@@ -1,6 +1,6 @@
 """The controls of a player."""
 
-from analysis.figures.missions import INK, MUTED
+from analysis.figures.style import INK, MUTED
 from reports.player.mission import Mission
 from reports.player.trace import Json
 

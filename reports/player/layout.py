@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from analysis.figures.missions import INK, MUTED, SEA, ZONE
+from analysis.figures.style import INK, MUTED, SEA, ZONE
 from dess.scenario import Scenario
 from reports.player.chart import EDGE, STATUS, counted
 from reports.player.controls import GRID, buttons, slider

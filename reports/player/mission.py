@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from analysis.figures.missions import node_colours, uav_colours
+from analysis.figures.style import node_colours, uav_colours
 from analysis.results.event_log import battery_levels, residual_data, uav_slots
 from dess.errors import InputError
 from dess.scenario import Scenario

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pandas as pd
 
-from analysis.figures.missions import INK
+from analysis.figures.style import INK
 from reports.player.mission import Mission
 from reports.player.trace import Json, Moving, on_axes, rounded
 

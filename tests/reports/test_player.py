@@ -14,7 +14,7 @@ from plotly import graph_objects
 
 import dess
 import policies
-from analysis.figures.missions import node_colours
+from analysis.figures.style import node_colours
 from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
 from dess.errors import InputError
 from dess.state import sample_scenario

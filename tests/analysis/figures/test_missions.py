@@ -16,7 +16,7 @@ from matplotlib.quiver import Quiver
 import dess
 import policies
 from analysis.figures import missions
-from analysis.names import METRICS
+from analysis.figures.style import MUTED, node_colours
 from analysis.results.event_log import uav_slots
 from dess.state import sample_scenario
 
@@ -49,7 +49,7 @@ def colours(artist: Any) -> list[str]:
 def test_every_move_is_an_arrow_in_the_colour_of_its_node(mission: Any, parts: Any) -> None:
     _, log, scenario = mission
     slots = uav_slots(log)
-    palette = [*missions.node_colours(len(scenario.nodes)), missions.MUTED]
+    palette = [*node_colours(len(scenario.nodes)), MUTED]
     arrows = drawn(parts[0], "moves")
     assert len(arrows) == scenario.uavs
     for uav, arrow in enumerate(arrows):
@@ -64,7 +64,7 @@ def test_every_move_is_an_arrow_in_the_colour_of_its_node(mission: Any, parts: A
 def test_crosses_hover_in_the_colour_of_their_node(mission: Any, parts: Any) -> None:
     _, log, scenario = mission
     slots = uav_slots(log)
-    palette = [*missions.node_colours(len(scenario.nodes)), missions.MUTED]
+    palette = [*node_colours(len(scenario.nodes)), MUTED]
     hovers = slots[~slots["moved"] & ~slots["charging"]]
     seen = [c for cross in drawn(parts[0], "hovers") for c in colours(cross)]
     assert seen == [palette[node] for node in hovers["node"]]
@@ -82,7 +82,7 @@ def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> Non
     _, log, scenario = mission
     (nodes,) = drawn(parts[0], "nodes")
     assert np.array_equal(nodes.get_offsets(), scenario.nodes)
-    assert colours(nodes) == missions.node_colours(len(scenario.nodes))
+    assert colours(nodes) == node_colours(len(scenario.nodes))
     x, y, width, height = scenario.zone
     zone = parts[0].patches[0].get_bbox()
     assert (zone.x0, zone.y0, zone.width, zone.height) == (x - 0.5, y - 0.5, width, height)
@@ -120,9 +120,7 @@ def test_residual_data_ends_as_recorded(mission: Any, parts: Any) -> None:
     (total,) = parts[2].lines
     assert total.get_ydata()[0] == pytest.approx(record.initial)
     assert total.get_ydata()[-1] == pytest.approx(record.residual)
-    assert [colours(band)[0] for band in parts[2].collections] == missions.node_colours(
-        len(scenario.nodes)
-    )
+    assert [colours(band)[0] for band in parts[2].collections] == node_colours(len(scenario.nodes))
 
 
 def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) -> None:
@@ -141,56 +139,3 @@ def test_figures_leave_no_state_behind(mission: Any) -> None:
     assert isinstance(missions.mission_figure(log, scenario), Figure)
     assert dict(mpl.rcParams) == before
     assert plt.get_fignums() == []
-
-
-@pytest.mark.parametrize("count", [1, 9, 25, 40])
-def test_neighbouring_nodes_differ_in_colour(count: int) -> None:
-    palette = missions.node_colours(count)
-    assert len(palette) == count
-    assert len(set(palette)) == min(count, 27)
-    assert all(a != b for a, b in zip(palette, palette[1:], strict=False))
-    columns = 5
-    assert all(a != b for a, b in zip(palette, palette[columns:], strict=False))
-
-
-def summary(by: dict[str, list[Any]]) -> pd.DataFrame:
-    """Rows as of ``analysis.summary``, with numbers of their own in every one."""
-    rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
-    mean = np.linspace(0.2, 0.8, len(rows))
-    return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
-
-
-@pytest.mark.parametrize("metric", METRICS)
-def test_performance_shows_means_intervals_and_the_printed_figure(metric: str) -> None:
-    table = summary({"policy": ["one", "two", "three"]})
-    (ax,) = missions.performance(table, metric, 0.55).axes
-    rows = table[table["metric"] == metric]
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two", "three"]
-    for bar, (_, row) in zip(ax.containers, rows.iterrows(), strict=True):
-        assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
-        (arm,) = bar.lines[2]
-        assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
-    assert list(printed.get_xdata()) == [0.55, 0.55]
-    assert ax.get_title(loc="left") == METRICS[metric]
-
-
-def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
-    table = summary({"policy": ["one"] * 3 + ["two"] * 3, "uavs": [1, 2, 3] * 2})
-    (ax,) = missions.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
-    rows = table[table["metric"] == "success"]
-    assert len(ax.containers) == 2
-    for bar, (_, own) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
-        assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
-        assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
-    (printed,) = (line for line in ax.lines if line.get_label() == "paper")
-    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
-
-
-def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> None:
-    everywhere = missions.policy_colours(pd.Series(missions.EVERYWHERE))
-    for names in (["ddqn", "mine", "greedy", "ddqn"], ["a", "b", "ddqn-paper"], ["b", "a"]):
-        looks = missions.policy_colours(pd.Series(names))
-        assert [*looks] == [*dict.fromkeys(names)]
-        assert len({*looks.values()}) == len(looks)
-        assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)

@@ -1,0 +1,86 @@
+"""Figures of the metrics of policies in a study: one policy per row, and against the fleet.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
+
+from analysis.figures.style import (
+    INK,
+    arms,
+    dot,
+    legend_below,
+    note_at_right,
+    panels,
+    policy_colours,
+    shifts,
+    style,
+)
+from analysis.names import METRICS
+
+_PRINTED: dict = {"color": INK, "linestyle": "--", "linewidth": 1.3}
+
+
+def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
+    """A metric of every policy: means with intervals, and the paper's figure as a line.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy``.
+        metric: One of ``METRICS``.
+        printed: The paper's figure.
+    """
+    rows = summary[summary["metric"] == metric].reset_index(drop=True)
+    colours = policy_colours(rows["policy"])
+    with style():
+        figure, ax = panels(1.3 + 0.42 * len(rows))
+        for y, row in rows.iterrows():
+            ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
+            note_at_right(f"{row['mean']:.1%}", y, ax)
+        if printed is not None:
+            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
+            legend_below(figure, ax)
+        ax.set_yticks(range(len(rows)), rows["policy"])
+        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
+        ax.set_xticks(np.linspace(0, 1, 6))
+        ax.xaxis.set_major_formatter(PercentFormatter(1))
+        ax.grid(axis="y", visible=False)
+        sns.despine(ax=ax, left=True)
+    return figure
+
+
+def by_fleet(
+    summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
+) -> Figure:
+    """A metric of every policy against the number of UAVs, with intervals.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
+        metric: One of ``METRICS``.
+        printed: The paper's figures by number of UAVs.
+    """
+    rows = summary[summary["metric"] == metric].sort_values("uavs")
+    colours = policy_colours(summary["policy"])
+    with style():
+        figure, ax = panels(3.9)
+        for policy, shift in zip(colours, shifts(len(colours), 0.12), strict=True):
+            means = rows[rows["policy"] == policy]
+            ax.errorbar(means["uavs"] + shift, means["mean"], yerr=arms(means), linewidth=1,
+                        alpha=0.9, label=policy, **dot(policy, colours))  # fmt: skip
+        if printed:
+            ax.plot(*zip(*sorted(printed.items()), strict=True), marker="D", markersize=6,
+                    label="paper", **_PRINTED)  # fmt: skip
+        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+        ax.set_xticks(sorted(rows["uavs"].unique()))
+        ax.set_yticks(np.linspace(0, 1, 6))
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        ax.grid(axis="x", visible=False)
+        ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=5, columnspacing=1.1,
+                  handletextpad=0.5)  # fmt: skip
+        sns.despine(ax=ax)
+    return figure

@@ -1,0 +1,143 @@
+"""The look that all figures share: colours, fonts, axes and marks.
+
+A figure is made inside ``style`` and touches no state of pyplot::
+
+    with style():
+        figure, ax = panels(height=3.5)
+        ax.errorbar(row["mean"], 0, xerr=arms(row), **dot("greedy", colours))
+        legend_below(figure, ax)
+"""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.colors import to_hex, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+from analysis.numbers import minus
+
+INK, MUTED, SEA, ZONE = "#22303c", "#7a8791", "#f3f8fb", "#ffe08a"
+UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
+# Policies that look the same in all figures, whichever others are drawn.
+KNOWN_POLICIES = ("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper")
+LINES = ("-", "--", ":", "-.")
+WIDTH, DPI = 5.2, 150  # inches, dots per inch
+
+_LOOK = {
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "grid.color": "#dde4e9",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The look of all figures, for the figures and axes that are made inside."""
+    with mpl.rc_context():
+        mpl.rcdefaults()  # whatever the user's matplotlibrc says
+        sns.set_style("whitegrid")
+        mpl.rcParams.update(_LOOK)
+        yield
+
+
+def panels(height: float, rows: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A new figure with its axes, one below the other.
+
+    Args:
+        height: Of the figure [inches].
+        rows: The number of axes.
+        options: Further arguments of ``Figure.subplots``.
+    """
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    return figure, figure.subplots(rows, **options)
+
+
+def node_colours(count: int) -> list[str]:
+    """A colour per node: nine colour-blind safe hues in three shades; neighbours differ in hue."""
+    hues = [c for c in sns.color_palette("colorblind") if np.ptp(c) > 0.05]  # all but the grey
+    hues = [min(c, sns.set_hls_values(c, l=0.5), key=sum) for c in hues]  # readable on white
+    mixes = (("white", 0.0), ("black", 0.45), ("white", 0.33))
+    shades = [(1 - share) * np.array(hues) + share * np.array(to_rgb(c)) for c, share in mixes]
+    palette = np.concatenate(shades)
+    return [to_hex(palette[k % len(palette)]) for k in range(count)]
+
+
+def uav_colours(count: int) -> list[str]:
+    """A dark colour per UAV, the same in a fleet of any size; they come again after eight."""
+    return [UAVS[uav % len(UAVS)] for uav in range(count)]
+
+
+def palette() -> list[str]:
+    """Ten colour-blind safe colours."""
+    return sns.color_palette("colorblind").as_hex()
+
+
+def policy_colours(policies: Iterable[str]) -> dict[str, tuple[str, str]]:
+    """Colour and marker of every policy; those of ``KNOWN_POLICIES`` always have the same."""
+    names = list(dict.fromkeys(policies))
+    numbers = {name: KNOWN_POLICIES.index(name) for name in names if name in KNOWN_POLICIES}
+    free = [n for n in range(len(names)) if n not in numbers.values()]
+    numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
+    return {name: (palette()[numbers[name] % 10], "os^vPX*"[numbers[name] % 7]) for name in names}
+
+
+def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
+    """How the means of a policy are drawn, as arguments of ``Axes.errorbar``."""
+    colour, marker = colours[policy]
+    return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
+
+
+def arms(
+    rows: pd.DataFrame | pd.Series, mean: str = "mean", low: str = "low", high: str = "high"
+) -> np.ndarray:
+    """Lengths of the arms of error bars, (2, N), from the columns of estimate and interval."""
+    return np.array([rows[mean] - rows[low], rows[high] - rows[mean]]).reshape(2, -1)
+
+
+def shifts(count: int, half_width: float) -> np.ndarray:
+    """(count,) offsets from ``-half_width`` to ``half_width``; marks at one value stay apart."""
+    return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
+
+
+def signed_points(share: float, _: float = 0) -> str:
+    """A difference of shares in percentage points, as ``+2.5`` for ``0.025``: a tick label."""
+    return minus(f"{100 * share:+.3g}") if round(share, 9) else "0"
+
+
+def points_axis(axis: Axis, nbins: int) -> None:
+    """Ticks in percentage points at round values."""
+    round_ticks(axis, nbins)
+    axis.set_major_formatter(FuncFormatter(signed_points))
+
+
+def round_ticks(axis: Axis, nbins: int) -> None:
+    """At most ``nbins`` intervals between ticks, at round values."""
+    axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
+
+
+def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
+    """A note in the right margin, at a level of the y axis."""
+    return ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
+                       textcoords="offset points", va="center", fontsize=size)  # fmt: skip
+
+
+def legend_below(figure: Figure, ax: Axes, columns: int = 3) -> None:
+    """A legend of what is drawn on the axes, below the figure."""
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
