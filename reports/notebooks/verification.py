@@ -291,47 +291,21 @@ html.gallery(
 # number is read from the scenario and the manifests of the studies.
 
 # %%
-items = stress.report(study.manifest, [each.manifest for each in others.values()])
-
-
-def gap(item):
-    return "\n\n" if item.text.startswith("- ") else " "
-
-
-def section(*numbers):
-    """Sections of the checklist as text."""
-    parts = []
-    for number in numbers:
-        parts.append(f"### {number} {stress.SECTIONS[number]}")
-        own = [item for item in items if item.number.startswith(f"{number}.")]
-        parts += [f"**{item.number} {item.name}.**{gap(item)}{item.text}" for item in own]
-    return Markdown("\n\n".join(parts))
-
-
-display(section("1", "2"))
+model = stress.describe(study.manifest, [each.manifest for each in others.values()])
+display(Markdown("\n\n".join(model.sections[number] for number in "12")))
 html.figure(
-    drawings.slot(*stress.overview(space)),
+    drawings.slot(*model.overview),
     "Boxes, one below the other: what happens before the first mission slot and in each",
     "The base model (2.1): a mission slot from top to bottom; the arrow back is the next one. "
     f"n = {space.max_slots:,} slots at most.",
 )
 
 # %%
-display(section("3"))
-inputs = stress.parameters(space)
-html.table(
-    pd.DataFrame(
-        {
-            "Input parameter [unit]": inputs["Field"] + ": " + inputs["Meaning [unit]"],
-            "Value": inputs["Value"],
-        }
-    ),
-    "All input parameters (3.3)",
-    wrap=True,
-)
+display(Markdown(model.sections["3"]))
+html.table(model.parameters, "All input parameters (3.3)", wrap=True)
 
 # %%
-section("4", "5", "6")
+Markdown("\n\n".join(model.sections[number] for number in "456"))
 
 # %% [markdown]
 # ## Where the figures come from

@@ -1,16 +1,15 @@
 """The STRESS-DES checklist is complete, and no number in it is typed."""
 
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from analysis import load_results, load_study, run_study
+from analysis import load_study
 from analysis.figures import verification as drawings
 from analysis.results.manifest import Manifest
 from analysis.stats.intervals import LEVEL
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import Scenario
 from reports.pages import stress
 
 # Monks et al. (2019), Table 1.
@@ -50,7 +49,7 @@ OTHER: dict[str, Any] = {
 # What has numbers of its own: citations, mathematics, and names.
 CITED = re.compile(
     r"eq\. [\d-]+(, \d+)*|EAAI-22-4101|Philox 4x32-10|`[^`]*`|<sub>\d+</sub>|1 \+ SNR|time 0"
-    r"|from 0 on|^\d  ",
+    r"|from 0 on|^\d  |^### \d|^\*\*[\d.]+",
     re.M,
 )
 
@@ -59,38 +58,44 @@ def manifest(**changes: Any) -> dict[str, Any]:
     return Manifest.of(load_study("verification", **changes)).data
 
 
-def told(data: dict[str, Any], *others: dict[str, Any]) -> str:
+def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
     """All words of the checklist, its diagram and its table."""
-    space = ScenarioSpace.of(**data["scenario"])
-    steps, *rest = stress.overview(space)
-    words = [item.text for item in stress.report(data, others)]
-    words += [*rest, *(word for step in steps for word in step)]
-    return "\n".join([*words, *stress.parameters(space)["Value"]])
+    description = stress.describe(data, others)
+    steps, *rest = description.overview
+    texts = [*description.sections.values(), *rest, *(word for step in steps for word in step)]
+    return "\n".join([*texts, *description.parameters["Value"]])
 
 
-def test_every_item_of_the_checklist_is_there_and_filled() -> None:
-    items = stress.report(manifest())
-    numbers = [item.number for item in items]
+def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
+    """The texts of the items, each in one line, by their numbers."""
+    sections = "\n".join(stress.describe(data, others).sections.values())
+    parts = re.split(r"^(?:\*\*([\d.]+) [^*]+\.\*\*|### .*)", sections, flags=re.M)[1:]
+    pairs = zip(parts[::2], parts[1::2], strict=True)
+    return {number: " ".join(text.split()) for number, text in pairs if number}
+
+
+def test_every_item_of_the_checklist_is_on_the_page() -> None:
+    texts = items(manifest())
     expected = [
         f"{section}.{n}" for section, count in CHECKLIST.items() for n in range(1, count + 1)
     ]
-    assert sorted(numbers) == sorted(expected)
-    assert all(item.name and item.text.strip() for item in items)
-    assert {number.split(".")[0] for number in numbers} == set(stress.SECTIONS)
+    assert sorted(texts) == sorted(expected)
+    assert all(texts.values())
+    assert [*stress.describe(manifest()).sections] == ["1", "2", "3", "4", "5", "6"]
 
 
-def test_every_input_parameter_is_there() -> None:
-    data = manifest()
-    table = stress.parameters(ScenarioSpace.of(**data["scenario"]))
-    assert set(table["Field"]) == set(Scenario.model_fields) == set(OTHER)
+def test_every_input_parameter_is_in_the_table() -> None:
+    table = stress.describe(manifest()).parameters
+    fields = table["Input parameter [unit]"].str.partition(":")[0]
+    assert set(fields) == set(Scenario.model_fields) == set(OTHER)
     assert table.notna().all(axis=None)
 
 
 @pytest.mark.parametrize("field", OTHER)
-def test_a_change_of_the_scenario_changes_what_is_told(field: str) -> None:
+def test_a_change_of_the_scenario_changes_the_words(field: str) -> None:
     wider = {"grid": OTHER["grid"]} if field in ("nodes", "zone") else {}
     fewer = {"uavs": 3} if field == "zone" else {}
-    assert told(manifest(set=wider | fewer | {field: OTHER[field]})) != told(
+    assert words(manifest(set=wider | fewer | {field: OTHER[field]})) != words(
         manifest(set=wider | fewer)
     )
 
@@ -101,45 +106,41 @@ def test_no_number_of_the_model_is_typed() -> None:
     numbers = []
     for changes, seed, missions in (({}, 501, 301), (OTHER, 502, 302)):
         data = manifest(set=changes, seed=seed, missions=missions) | about
-        text = re.sub("1 design point", "", CITED.sub("", told(data)))
+        text = re.sub("1 design point", "", CITED.sub("", words(data)))
         numbers.append(set(re.findall(r"\d+(?:[.,]\d+)*", text)))
     assert set.intersection(*numbers) == {f"{100 * LEVEL:g}"}
-    assert all(len(own) > 30 for own in numbers)
+    assert all(len(of_scenario) > 30 for of_scenario in numbers)
 
 
-def test_studies_tell_what_they_are_about() -> None:
+def test_studies_say_what_they_are_about() -> None:
     others = [Manifest.of(load_study(name)).data for name in ("fig5", "sweet-spot")]
-    items = {item.number: item.text for item in stress.report(manifest(), others)}
+    texts = items(manifest(), *others)
     for data in others:
         study = data["study"]
-        assert f"`{study['name']}`: {study['description']}" in items["1.3"]
-        assert f"{len(data['points'])} design points ({study['design']['kind']})" in items["1.3"]
-    assert "by `kn-bounded`" in items["1.3"]
-    assert "`initial_data`" in items["2.3"] and "`uavs`" in items["2.3"]
-    assert "`ddqn`" in items["2.4"] and "another package" not in items["2.4"]
-    assert "as a rule asked for, in `sweet-spot`" in items["4.3"]
+        assert f"`{study['name']}`: {study['description']}" in texts["1.3"]
+        assert f"{len(data['points'])} design points ({study['design']['kind']})" in texts["1.3"]
+    assert "by `kn-bounded`" in texts["1.3"]
+    assert "`initial_data`" in texts["2.3"] and "`uavs`" in texts["2.3"]
+    assert "`ddqn`" in texts["2.4"] and "another package" not in texts["2.4"]
+    assert "as a rule asked for, in `sweet-spot`" in texts["4.3"]
 
 
-def test_missions_are_those_that_were_flown(tmp_path: Path) -> None:
-    study = load_study("verification", policies=["random"], missions=3, logged=0)
-    data = run_study(study, tmp_path / "out").manifest
-    text = {item.number: item.text for item in stress.report(data)}
-    assert "3 in `verification`" in text["4.3"]
-    assert load_results(tmp_path / "out").manifest == data
+def test_missions_are_those_of_the_manifests() -> None:
+    one = manifest() | {"missions": [[1234], [1234]]}
+    two = manifest() | {"missions": [[20, 7], [31, 1500]]}
+    two["study"] = two["study"] | {"name": "other"}
+    assert items(one, two)["4.3"].endswith("1,234 in `verification`; 7 to 1,500 in `other`.")
 
 
 def test_scarce_pads_make_a_queue() -> None:
-    queue = {item.number: item.text for item in stress.report(manifest(set={"pads": 1}))}["2.5.4"]
+    queue = items(manifest(set={"pads": 1}))["2.5.4"]
     assert "With 1 pad for 1 to 3 UAVs, UAVs in excess wait" in queue
-    assert (
-        "nobody ever waits" in dict((i.number, i.text) for i in stress.report(manifest()))["2.5.4"]
-    )
+    assert "nobody ever waits" in items(manifest())["2.5.4"]
 
 
 def test_no_text_of_the_diagram_leaves_its_box() -> None:
     for changes in ({}, OTHER):
-        space = ScenarioSpace.of(**manifest(set=changes)["scenario"])
-        figure = drawings.slot(*stress.overview(space))
+        figure = drawings.slot(*stress.describe(manifest(set=changes)).overview)
         figure.canvas.draw()
         (ax,) = figure.axes
         for text in ax.texts:
