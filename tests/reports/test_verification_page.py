@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
-from analysis import load_results, load_study, run_study
+from analysis import load_study, run_study
 from analysis.execution import jobs
 from analysis.stats.verdict import HOLDS, REFUTED
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports.pages import stress
 from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"
@@ -56,10 +55,9 @@ def test_sound_results_hold(html: str) -> None:
     assert not re.search(r"Figure\(|\bnan\b|NaN|None\b", text)
 
 
-def test_the_checklist_is_on_the_page(html: str, results: Path) -> None:
-    for number, text in stress.describe(load_results(results / NAME).manifest).sections.items():
-        assert f"### {number} " in html
-        assert text[-60:] in html
+def test_the_checklist_is_on_the_page(html: str) -> None:
+    assert re.findall(r"^### (\d)", html, re.M) == [*"123456"]
+    assert "300 in\n`verification`" in html and "2 in\n`fig4`" in html
 
 
 def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Path:
