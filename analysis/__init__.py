@@ -16,10 +16,10 @@ _HOME = {
     "load_results": "results.tables",
     "fly": "results.resimulate",
     "summary": "stats.intervals",
-    "distribution": "stats.intervals",
-    "bootstrap_interval": "stats.intervals",
+    "distribution": "stats.distribution",
+    "bootstrap_interval": "stats.bootstrap",
     "compare": "stats.paired",
-    "compare_learners": "stats.paired",
+    "compare_learners": "stats.learners",
 }
 
 __all__ = [*_HOME]

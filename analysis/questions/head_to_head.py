@@ -13,10 +13,11 @@ from scipy import stats
 from sklearn.tree import DecisionTreeRegressor
 
 from analysis.names import METRICS, PRODUCT, parameter, value_text
-from analysis.questions.summary import learners
+from analysis.questions.summary import learners, ranked_policies
 from analysis.results.tables import Results
+from analysis.stats.correction import adjust, for_choice
 from analysis.stats.intervals import LEVEL, Interval, wilson
-from analysis.stats.paired import adjust, compare, paired
+from analysis.stats.paired import compare, paired
 from analysis.stats.verdict import INCONCLUSIVE
 from dess.errors import InputError
 from dess.scenario import Scenario
@@ -63,7 +64,7 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     Raises:
         InputError: If the study has no two policies, or not the ones that are named.
     """
-    ranked = _ranked(results)
+    ranked = ranked_policies(results.missions)
     for name, given in (("learned", learned), ("heuristic", heuristic)):
         if given is not None and given not in ranked:
             allowed = ", ".join(ranked)
@@ -126,10 +127,7 @@ def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
         )
         for policy, end in names.items()
     ]
-    generator = np.random.default_rng(0)
-    # Of the intervals it is Student's that is used; the bootstrap's need not be sharp.
-    table = compare(pd.concat(parts), pair.baseline, generator, [*METRICS], resamples=100)
-    return table.assign(p_adjusted=(table["p_adjusted"] * pair.candidates).clip(upper=1))
+    return for_choice(compare(pd.concat(parts), pair.baseline, [*METRICS]), pair.candidates)
 
 
 def varied(missions: pd.DataFrame) -> list[str]:
@@ -307,11 +305,6 @@ def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
     return codes, [_named(numbers[codes == code]) for code in range(codes.max() + 1)]
 
 
-def _ranked(results: Results) -> list[str]:
-    means = results.missions.groupby("policy", sort=False)[PRODUCT].mean()
-    return [str(p) for p in means.sort_values(ascending=False, kind="stable").index]
-
-
 def _mean(results: Results, policies: Sequence[str]) -> float:
     """The mean over policies of their collection ratio and communication."""
     means = results.missions.groupby("policy")[PRODUCT].mean()
@@ -328,12 +321,10 @@ def _compared(
     candidates: int,
 ) -> pd.DataFrame:
     """A row per part of the missions of ``duels``, which has some: its labels, its comparison."""
-    generator = np.random.default_rng(0)
     rows = []
     for labels, part in parts:
         of = part[PRODUCT].to_numpy(float), part[PRODUCT + _OF_BASELINE].to_numpy(float)
-        # Of the intervals it is Student's that is used; the bootstrap's need not be sharp.
-        pair = paired(*of, generator, resamples=100)
+        pair = paired(*of)
         behind = wilson(int((part["difference"] < 0).sum()), len(part))
         ends = Interval(pair.difference, pair.low, pair.high)
         rows.append((*labels, *ends, pair.p, len(part), *behind))

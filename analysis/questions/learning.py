@@ -16,8 +16,8 @@ import pandas as pd
 from scipy import stats
 
 from analysis.replication.paper import CROSSING
+from analysis.stats.correction import adjust
 from analysis.stats.intervals import LEVEL, Interval, mean_interval
-from analysis.stats.paired import adjust
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
 # Weight of the newest evaluation in the exponential moving average.

@@ -13,8 +13,9 @@ import pandas as pd
 from analysis.names import SHARES, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
+from analysis.stats.correction import adjust
 from analysis.stats.intervals import LEVEL
-from analysis.stats.paired import adjust, paired
+from analysis.stats.paired import paired
 from dess.errors import InputError
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
@@ -87,17 +88,12 @@ def changes(
     ]
     values = ours.pivot(index="replication", columns="point", values=metric).dropna()
     values = values.rename(columns=places).astype(float)
-    generator = np.random.default_rng(results.store.manifest.seed)
     couples = [*combinations(sorted(values), 2)]
     at_once = 1 - (1 - LEVEL) / max(len(couples), 1)
     rows = []
     for first, second in couples:
         of = values[second].to_numpy(), values[first].to_numpy()
-        # Of the intervals it is Student's that is used; the bootstrap's need not be sharp.
-        pair, wide = (
-            paired(*of, generator, level, resamples=100, share=metric in SHARES)
-            for level in (LEVEL, at_once)
-        )
+        pair, wide = (paired(*of, level, share=metric in SHARES) for level in (LEVEL, at_once))
         ends = pair.low, pair.high, wide.low, wide.high
         rows.append((first, second, pair.difference, *ends, pair.p, pair.n))
     columns = ["first", "second", "difference", "low", "high", "wide_low", "wide_high", "p", "n"]

@@ -1,7 +1,7 @@
 """What a study says, in tidy tables: means, what was selected, and the worst missions."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
@@ -9,8 +9,11 @@ import pandas as pd
 from analysis.names import METRICS, PRODUCT
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.tables import Results, parts_of
-from analysis.stats.intervals import distribution, summary
-from analysis.stats.paired import compare, compare_learners
+from analysis.stats.correction import for_choice
+from analysis.stats.distribution import distribution
+from analysis.stats.intervals import summary
+from analysis.stats.learners import compare_learners
+from analysis.stats.paired import compare
 from analysis.study.design import Saltelli
 from analysis.study.stopping import Precision
 
@@ -24,9 +27,25 @@ def means(results: Results) -> pd.DataFrame:
     return summary(results.missions, by=["policy", "point"])
 
 
-def best_policy(results: Results) -> str:
-    """The policy with the highest collection ratio and communication over all design points."""
-    return _best(results.missions)
+def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
+    """Policies by their mean collection ratio and communication, the best one first.
+
+    Every design point has the same weight. Of policies alike the first to appear is the better.
+
+    Args:
+        missions: A row per mission.
+        among: The policies to rank; all, if not given.
+    """
+    if among is not None:
+        missions = missions[missions["policy"].isin([*among])]
+    at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
+    means = at_points.groupby("policy", sort=False).mean()
+    return [str(policy) for policy in means.sort_values(ascending=False, kind="stable").index]
+
+
+def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
+    """The policy with the highest mean collection ratio and communication."""
+    return ranked_policies(missions, among)[0]
 
 
 def settings(results: Results) -> list[str]:
@@ -61,9 +80,8 @@ def comparisons(results: Results) -> pd.DataFrame:
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
-    generator = np.random.default_rng(results.store.manifest.seed)
-    table = compare(results.missions, best_policy(results), generator, [*METRICS])
-    return _chosen_among(table, len(results.policies))
+    table = compare(results.missions, best_policy(results.missions), [*METRICS])
+    return for_choice(table, len(results.policies))
 
 
 def learners(results: Results) -> dict[str, list[str]]:
@@ -94,13 +112,8 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     others = results.missions[~results.missions["policy"].isin(learned)]
     if not trained or others.empty or not _same_missions(results):
         return pd.DataFrame()
-    table = compare_learners(results.missions, trained, _best(others), [*METRICS])
-    return _chosen_among(table, others["policy"].nunique())
-
-
-def _chosen_among(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
-    """Comparisons with a baseline that these data chose: by Bonferroni, any of the candidates."""
-    return table.assign(p_adjusted=(table["p_adjusted"] * candidates).clip(upper=1))
+    table = compare_learners(results.missions, trained, best_policy(others), [*METRICS])
+    return for_choice(table, others["policy"].nunique())
 
 
 def _same_missions(results: Results) -> bool:
@@ -181,11 +194,6 @@ def selections(results: Results) -> pd.DataFrame:
 def checks(results: Results) -> pd.DataFrame:
     """Means with intervals of what was selected, over missions that did not select it."""
     return summary(results.checks, by=["policy", "point"])
-
-
-def _best(missions: pd.DataFrame) -> str:
-    at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
-    return str(at_points.groupby("policy", sort=False).mean().idxmax())
 
 
 def _mission_of(missions: pd.DataFrame) -> Sequence[tuple[int, int]]:

@@ -19,6 +19,7 @@ from scipy import stats
 
 from analysis.execution.runner import run_study
 from analysis.names import METRICS, PRODUCT
+from analysis.questions import summary as findings
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
@@ -219,17 +220,13 @@ def answers(results: Results) -> pd.DataFrame:
     Returns:
         A row per policy and metric (those of ``METRICS``, then of ``MEASURES``): ``policy``, the
         means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval
-        stands by itself, at 95 %; that of Student or, for shares, as of ``comparison.paired``.
+        stands by itself, at 95 %; that of Student or, for shares, as of ``stats.paired.paired``.
     """
     missions = missions_of(results)
     metrics = [*METRICS, *MEASURES]
-    generator = np.random.default_rng(results.store.manifest.seed)
     tables = []
     for policy, own in missions.groupby("policy", sort=False):
-        # Of the intervals it is Student's that is used; the bootstrap's need not be sharp.
-        table = compare(
-            own, BASELINE, generator, metrics, correction=None, of="point", resamples=100
-        )
+        table = compare(own, BASELINE, metrics, correction=None, of="point")
         sides = own.groupby("point")[metrics].mean()
         table.insert(0, "policy", policy)
         table["before"] = table["metric"].map(sides.loc[BASELINE])
@@ -275,8 +272,8 @@ def differences(results: Results, policy: str, metric: str = PRODUCT) -> pd.Seri
 
 def best_policy(results: Results, point: int) -> str:
     """The policy with the highest mean of collection ratio and communication on a side."""
-    own = results.missions[results.missions["point"] == point]
-    return str(own.groupby("policy", sort=False)[PRODUCT].mean().idxmax())
+    missions = results.missions
+    return findings.best_policy(missions[missions["point"] == point])
 
 
 def typical(results: Results, policy: str) -> int:

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.names import PRODUCT
 from analysis.questions import learning as curves
 from analysis.questions import main_effects as effects
 from analysis.questions import summary as findings
@@ -157,7 +156,7 @@ class Case:
         if not among:
             which = f"policy {' or '.join(self.learners)}" if self.learners else "learned policy"
             raise MissingError(f"the study {study} has no {which}")
-        return _best(self.studies.study(study), among)
+        return findings.best_policy(self.studies.study(study).missions, among)
 
     def missions(self, study: str, uavs: int | None = None) -> pd.DataFrame:
         """The missions of the policy; those of a number of UAVs, if asked."""
@@ -227,10 +226,3 @@ def upside_down(pairs: pd.DataFrame) -> pd.DataFrame:
         wide_low=-pairs["wide_high"],
         wide_high=-pairs["wide_low"],
     )
-
-
-def _best(results: Results, among: list[str]) -> str:
-    """The policy of the highest collection ratio and communication over all design points."""
-    missions = results.missions[results.missions["policy"].isin(among)]
-    at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
-    return str(at_points.groupby("policy", sort=False).mean().idxmax())

@@ -4,6 +4,7 @@ The paper: the learned policy of its Section V on a 32 x 32 map.
 """
 
 from analysis.stats.intervals import Interval, wilson
+from analysis.stats.verdict import ABOVE, BELOW, position
 
 # Table IV: means over that many random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
@@ -43,14 +44,14 @@ TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
 # that without stays level (Fig. 3b, Section V-B).
 CROSSING, LEVEL_FROM = 800_000, 500_000
 
-ABOVE, LEVEL, BELOW = "above", "not distinguishable", "below"
+# A whole interval is above a printed figure, below it, or around it.
+LEVEL = "not distinguishable"
 
 
 def verdict(low: float, high: float, printed: float) -> str:
     """How an interval lies to a printed figure: wholly above, wholly below, or around it."""
-    if low > printed:
-        return ABOVE
-    return BELOW if high < printed else LEVEL
+    where = position(Interval(printed, low, high), printed)
+    return where if where in (ABOVE, BELOW) else LEVEL
 
 
 def spread(share: float, missions: int) -> Interval:

@@ -1,1 +1,1 @@
-"""Statistics: intervals, paired comparisons, learners, verdicts."""
+"""Statistics of missions: intervals, paired comparisons, learners, and what an interval says."""

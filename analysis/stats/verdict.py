@@ -1,18 +1,61 @@
-"""Verdicts on claims: their words, and how intervals come to them.
+"""What an interval or a test says: the one home of these rules and their words.
 
-A part of a claim is shown (true) or refuted (false) by a whole interval; else it is open (None).
+An estimate is ``ABOVE`` or ``BELOW`` a reference if its whole interval is, else ``INCONCLUSIVE``:
+
+    >>> position(Interval(0.2, 0.1, 0.3))
+    'above'
+
+A part of a claim is shown (true) or refuted (false) by a whole interval, or open (None).
 """
 
-from analysis.stats.intervals import Interval
+from typing import Protocol
 
-HOLDS, IN_PART, INCONCLUSIVE, REFUTED = "holds", "holds in part", "inconclusive", "does not hold"
+from analysis.stats.intervals import LEVEL
+
+ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
+HOLDS, IN_PART, REFUTED = "holds", "holds in part", "does not hold"
 
 Part = bool | None
 
 
-def above(interval: Interval, bound: float = 0.0) -> Part:
+class Ends(Protocol):
+    """The ends of an interval: an ``Interval``, or a row of a table of estimates."""
+
+    @property
+    def low(self) -> float:
+        """Its lower end."""
+
+    @property
+    def high(self) -> float:
+        """Its upper end."""
+
+
+def position(interval: Ends, reference: float = 0.0) -> str:
+    """Where a whole interval lies: above the reference, below it, or around it.
+
+    Returns:
+        ``ABOVE``, ``BELOW`` or ``INCONCLUSIVE``, which it is as well where an end is nan.
+    """
+    if interval.low > reference:
+        return ABOVE
+    return BELOW if interval.high < reference else INCONCLUSIVE
+
+
+def position_by_test(difference: float, p: float, level: float = LEVEL) -> str:
+    """On which side of 0 a difference lies by its (adjusted) p-value.
+
+    Returns:
+        ``ABOVE``, ``BELOW`` or ``INCONCLUSIVE``.
+    """
+    significant = p <= 1 - level
+    if significant and difference > 0:
+        return ABOVE
+    return BELOW if significant and difference < 0 else INCONCLUSIVE
+
+
+def above(interval: Ends, bound: float = 0.0) -> Part:
     """Whether something is above a bound."""
-    return True if interval.low > bound else False if interval.high < bound else None
+    return {ABOVE: True, BELOW: False}.get(position(interval, bound))
 
 
 def judged(*parts: Part) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.stats.paired import adjust
+from analysis.stats.correction import adjust
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 # The chance that any check of chance fails although all that is known holds.

@@ -98,7 +98,7 @@ def show(
     if policy and policy not in results.policies:
         allowed = ", ".join(results.policies)
         raise InputError(f"--policy: {policy} is not in the study; allowed: {allowed}")
-    whose = policy or summary.best_policy(results)
+    whose = policy or summary.best_policy(results.missions)
     tables = {
         "means": summary.means(results),
         "distributions": summary.distributions(results),

@@ -34,7 +34,7 @@ from analysis.names import METRICS, PRODUCT, parameter
 from analysis.questions import head_to_head as regions
 from analysis.questions import summary as findings
 from analysis.stats.intervals import LEVEL
-from analysis.stats.paired import CHECKPOINT
+from analysis.stats.learners import CHECKPOINT
 from reports.pages import html
 
 study = load_results(Path(results) / "comparison")

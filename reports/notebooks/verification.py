@@ -46,7 +46,7 @@ studies = {"verification": study, **others}
 space, seed = study.scenario(), study.manifest["seed"]
 logs = audits.logs_of(study)
 seas = audits.longest(logs)
-best = findings.best_policy(study)
+best = findings.best_policy(study.missions)
 
 # Replications share what they draw, so the missions of one policy have all of it.
 missions = study.missions.query("policy == @study.policies[0] and point == 0")

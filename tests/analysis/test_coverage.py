@@ -13,15 +13,12 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.stats.intervals import (
-    Interval,
-    bootstrap_interval,
-    distribution,
-    mean_interval,
-    quantile_interval,
-    wilson,
-)
-from analysis.stats.paired import adjust, crossed, paired
+from analysis.stats.bootstrap import bootstrap_interval, expanded_level
+from analysis.stats.correction import adjust
+from analysis.stats.distribution import distribution, quantile_interval
+from analysis.stats.intervals import Interval, mean_interval, wilson
+from analysis.stats.learners import crossed
+from analysis.stats.paired import paired
 
 TRIALS = 2000
 QUICK = [300, pytest.param(TRIALS, marks=pytest.mark.slow)]
@@ -193,7 +190,7 @@ def pairs(generator: np.random.Generator, n: int, difference: float) -> tuple[np
 @pytest.mark.parametrize("n", [20, 200])
 def test_the_paired_interval_covers_and_its_test_keeps_its_level(n, trials):
     generator = rng(7)
-    results = [paired(*pairs(generator, n, 0.0), generator, resamples=2) for _ in range(trials)]
+    results = [paired(*pairs(generator, n, 0.0)) for _ in range(trials)]
     assert holds(covered(((r.low, r.high) for r in results), 0.0), trials)
     assert np.mean([r.p <= 0.05 for r in results]) == pytest.approx(0.05, abs=error(trials, 0.05))
 
@@ -202,7 +199,7 @@ def test_the_paired_test_finds_what_independent_samples_hide():
     # 0.02 is 4 standard errors of the mean of pairs, 1.7 of that of independent samples
     generator = rng(9)
     draws = [pairs(generator, 200, 0.02) for _ in range(300)]
-    found = [paired(a, b, generator, resamples=2).p <= 0.05 for a, b in draws]
+    found = [paired(a, b).p <= 0.05 for a, b in draws]
     apart = [stats.ttest_ind(a, b).pvalue <= 0.05 for a, b in draws]
     assert np.mean(found) > 0.95
     assert np.mean(apart) < 0.6
@@ -211,8 +208,13 @@ def test_the_paired_test_finds_what_independent_samples_hide():
 @pytest.mark.parametrize("trials", QUICK)
 def test_the_bootstrap_over_pairs_covers(trials):
     generator = rng(10)
-    results = [paired(*pairs(generator, 300, 0.0), generator, resamples=499) for _ in range(trials)]
-    assert holds(covered(((r.bootstrap_low, r.bootstrap_high) for r in results), 0.0), trials)
+    level = expanded_level(0.95, 300)
+
+    def interval() -> Interval:
+        a, b = pairs(generator, 300, 0.0)
+        return bootstrap_interval(a - b, np.mean, generator, level, resamples=499)
+
+    assert holds(covered((interval()[1:] for _ in range(trials)), 0.0), trials)
 
 
 def shares(gain: float, loss: float) -> tuple[float, float]:
@@ -220,7 +222,7 @@ def shares(gain: float, loss: float) -> tuple[float, float]:
     kinds = rng(8).multinomial(100, [gain, loss, 1 - gain - loss], TRIALS)
     kinds, counts = np.unique(kinds, axis=0, return_counts=True)
     pairs = [np.repeat([[1, 0, 1], [0, 1, 1]], kind, axis=1) for kind in kinds]
-    results = [paired(a, b, rng(9), resamples=2, share=True) for a, b in pairs]
+    results = [paired(a, b, share=True) for a, b in pairs]
     inside = [r.low <= gain - loss <= r.high for r in results]
     return counts @ inside / TRIALS, counts @ [r.p <= 0.05 for r in results] / TRIALS
 

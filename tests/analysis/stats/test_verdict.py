@@ -3,23 +3,54 @@
 import itertools
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from analysis.stats.intervals import Interval
-from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED, above, judged
+from analysis.stats.verdict import (
+    ABOVE,
+    BELOW,
+    HOLDS,
+    IN_PART,
+    INCONCLUSIVE,
+    REFUTED,
+    above,
+    judged,
+    position,
+    position_by_test,
+)
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "part"),
-    [(0.1, 0.3, True), (-0.3, -0.1, False), (-0.1, 0.3, None), (0.0, 0.0, None)],
+    ("low", "high", "side", "part"),
+    [
+        (0.1, 0.3, ABOVE, True),
+        (-0.3, -0.1, BELOW, False),
+        (-0.1, 0.3, INCONCLUSIVE, None),
+        (0.0, 0.3, INCONCLUSIVE, None),
+        (0.0, 0.0, INCONCLUSIVE, None),
+        (np.nan, np.nan, INCONCLUSIVE, None),
+    ],
 )
-def test_a_whole_interval_lies_on_one_side(low: float, high: float, part: bool | None) -> None:
+def test_a_whole_interval_lies_on_one_side(low, high, side, part):
+    assert position(Interval((low + high) / 2, low, high)) == side
+    assert position(Interval((low + high) / 2 + 1, low + 1, high + 1), 1) == side
+    assert position(pd.Series({"low": low, "high": high})) == side
     assert above(Interval((low + high) / 2, low, high)) is part
-    assert above(Interval((low + high) / 2 + 1, low + 1, high + 1), 1) is part
 
 
-def test_an_interval_that_there_is_not_leaves_it_open() -> None:
-    assert above(Interval(5.0, np.nan, np.nan)) is None
+@pytest.mark.parametrize(
+    ("difference", "p", "side"),
+    [
+        (0.1, 0.05, ABOVE),
+        (-0.1, 0.01, BELOW),
+        (0.1, 0.06, INCONCLUSIVE),
+        (0.0, 0.01, INCONCLUSIVE),
+        (np.nan, np.nan, INCONCLUSIVE),
+    ],
+)
+def test_a_significant_difference_lies_on_one_side(difference, p, side):
+    assert position_by_test(difference, p) == side
 
 
 def test_verdicts_on_parts() -> None:

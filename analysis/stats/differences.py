@@ -1,0 +1,55 @@
+"""Tests of paired differences: Student's t, for shares with McNemar's, and the sign test."""
+
+import numpy as np
+from scipy import stats
+
+from analysis.stats.intervals import Interval, mean_interval
+
+_ROUNDING = 64 * np.finfo(float).eps  # relative; differences of differences below are none
+
+
+def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """A - B; all the same where they differ by rounding only."""
+    differences = a - b
+    rounding = _ROUNDING * max(np.abs(a).max(), np.abs(b).max())
+    if np.ptp(differences) > rounding:
+        return differences
+    first = differences.flat[0]
+    return np.full_like(differences, first if abs(first) > rounding else 0.0)
+
+
+def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
+    """The mean difference with Student's interval, and the p-value of none.
+
+    If all differences are equal the interval is degenerate, and p is that of the sign test.
+    """
+    mean = mean_interval(differences, level)
+    if np.ptp(differences) == 0:
+        return mean, sign_test(differences)
+    t = abs(mean.mean) / stats.sem(differences)
+    return mean, float(2 * stats.t.sf(t, differences.size - 1))
+
+
+def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
+    """The mean difference of shares with its interval, and the p-value of none.
+
+    One gain and one loss are added before t (as Bonett and Price 2012 do), so that few discordant
+    pairs, or none, are not taken for certainty; outcomes have the exact test of McNemar.
+    """
+    smooth, p = t_test(smoothed(differences), level)
+    if np.isin(differences, (-1, 0, 1)).all():
+        gains, losses = int(np.sum(differences > 0)), int(np.sum(differences < 0))
+        p = float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
+    mean = float(differences.mean())
+    return Interval(mean, max(smooth.low, -1.0), min(smooth.high, 1.0)), p
+
+
+def sign_test(equal: np.ndarray) -> float:
+    """The two-sided p-value of n equal differences: 2^(1 - n), or 1 if they are 0."""
+    return min(1.0, 2 * 0.5 ** len(equal)) if equal[0] else 1.0
+
+
+def smoothed(differences: np.ndarray) -> np.ndarray:
+    """Differences with one gain and one loss more, along the last axis."""
+    more = np.broadcast_to([1.0, -1.0], (*differences.shape[:-1], 2))
+    return np.concatenate([differences, more], axis=-1)

@@ -1,0 +1,181 @@
+"""Learners against a baseline: crossed random factors, training and mission.
+
+How good a training turns out is chance as well, so a claim on a learner needs several trainings:
+
+    compare_learners(results.missions, {"ddqn": ["ddqn", "ddqn-2", "ddqn-3"]}, "greedy")
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import optimize, stats
+
+from analysis.names import MEANS, SHARES
+from analysis.stats.correction import Correction, with_adjusted
+from analysis.stats.differences import differences_of, share_test, sign_test, smoothed, t_test
+from analysis.stats.intervals import LEVEL, check_share
+from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
+from dess.errors import InputError
+
+# What the row of a comparison is about: trainings at large, or the only one.
+LEARNER, CHECKPOINT = "the learner", "this checkpoint"
+
+_ENDS = ("low", "high", "new_low", "new_high")
+
+
+class Crossed(NamedTuple):
+    """A learner of S trainings on R missions: the mean difference with intervals, and its spread.
+
+    ``low`` and ``high`` bound the expected difference of the learner's trainings, ``new_low`` and
+    ``new_high`` that of one new training. The standard deviations are those of the trainings, of
+    the missions, and of the rest.
+    """
+
+    difference: float
+    low: float
+    high: float
+    new_low: float
+    new_high: float
+    p: float
+    training_sd: float
+    mission_sd: float
+    rest_sd: float
+
+
+def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
+    """What the trainings of a learner say of it: two crossed random factors, training and mission.
+
+    The layout d = mu + training + mission + rest has one observation per cell; the mean squares
+    give the variance components, cut at 0. The half-width adds two parts in quadrature (as of
+    Graybill and Wang 1980): Student's t on the means of the S trainings, which holds the rest as
+    well, and that of the missions, which all trainings share. It is at least that of these very
+    trainings. By simulation it covers at its level or above, whichever part dominates, from two
+    trainings on.
+
+    Args:
+        differences: (S, R) of training s on mission r, to the same baseline.
+        level: Confidence level.
+
+    Returns:
+        The intervals, the p-value of no expected difference, and the components as standard
+        deviations. If all differences are equal the intervals are degenerate and p is that of the
+        sign test over the trainings, 2^(1 - S). With a single training the interval is of this
+        training alone (Student's t over the missions), the new one is unbounded, and the deviations
+        of training and rest are nan: unknown. With a single mission the interval is degenerate,
+        the new one unbounded, p is 1 and all deviations are nan.
+
+    Raises:
+        ValueError: If there are no values.
+    """
+    d = np.asarray(differences, float)
+    if d.ndim != 2 or not d.size:
+        raise ValueError("crossed: no values; allowed: trainings x missions")
+    trainings, missions = d.shape
+    of_missions, p = t_test(d.mean(axis=0), level)  # of these very trainings
+    mean = of_missions.mean
+    if trainings == 1 or missions == 1:
+        spread = float(d.std(ddof=1)) if missions > 1 else np.nan
+        return Crossed(*of_missions, -np.inf, np.inf, p, np.nan, spread, np.nan)
+    if np.ptp(d) == 0:
+        return Crossed(*of_missions, mean, mean, sign_test(d[:, 0]), 0.0, 0.0, 0.0)
+    row, column = d.mean(axis=1, keepdims=True), d.mean(axis=0, keepdims=True)
+    rest = float(np.sum((d - row - column + mean) ** 2)) / (trainings - 1) / (missions - 1)
+    between = float(row.var(ddof=1))  # Var(training) + Var(rest) / R
+    shared = max(float(column.var(ddof=1)) - rest / trainings, 0.0)  # Var(mission)
+    sems = np.sqrt([between / trainings, shared / missions])
+    new_sems = np.sqrt([between / trainings + between, shared / missions])
+
+    def half(sems: np.ndarray, alpha: float) -> float:
+        return float(np.hypot(*sems * stats.t.isf(alpha / 2, [trainings - 1, missions - 1])))
+
+    ends = max(half(sems, 1 - level), of_missions.high - mean)
+    new = max(half(new_sems, 1 - level), ends)
+    if sems.any():
+        p = max(p, _alpha_of(lambda alpha: half(sems, alpha), abs(mean)))
+    deviations = np.sqrt([max(between - rest / missions, 0.0), shared, rest])
+    return Crossed(mean, mean - ends, mean + ends, mean - new, mean + new, p, *deviations.tolist())
+
+
+def compare_learners(
+    missions: pd.DataFrame,
+    learners: Mapping[str, Sequence[str]],
+    baseline: str,
+    metrics: Sequence[str] = (*SHARES, *MEANS),
+    by: Sequence[str] = (),
+    level: float = LEVEL,
+    correction: Correction | None = "holm",
+) -> pd.DataFrame:
+    """Compare learners, each known by checkpoints of several trainings, with a baseline policy.
+
+    How good a training turns out is chance as well, so a claim on the learner needs checkpoints of
+    several training seeds; one checkpoint supports claims on this checkpoint only.
+
+    Args:
+        missions: As of ``compare``; the checkpoints and the baseline meet the same missions.
+        learners: Name of each learner -> the policies that are its checkpoints, all of them:
+            the best of several trainings is not the learner.
+        baseline: The policy to compare with, taken as it is.
+        metrics: Columns of numbers.
+        by: Columns whose values form groups of missions, compared one by one.
+        level: Confidence level of each interval.
+        correction: Of the p-values, over all rows, as of ``correction.adjust``.
+
+    Returns:
+        A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,
+        ``metric``, ``about``, the fields of ``Crossed``, after ``p`` ``p_adjusted``, ``trainings``
+        and ``n``, the number of missions (of replications, where ``compare`` would take means).
+        ``about`` says what ``low``, ``high`` and ``p`` are about: ``the learner``, trainings to
+        come included, or ``this checkpoint``, the only one there is. Shares have the intervals and
+        the p-value with one gain and one loss added, as of ``paired``.
+
+    Raises:
+        InputError: As of ``compare``; if a learner has no checkpoint, or one twice.
+    """
+    check_share("level", level)
+    tables = metrics_by_treatment(missions, "policy", metrics, by)
+    reference = select(tables, "policy", baseline)
+    rows = []
+    for learner, checkpoints in learners.items():
+        if not checkpoints or len(set(checkpoints)) < len(checkpoints) or baseline in checkpoints:
+            raise InputError(
+                f"learner {learner}: checkpoints {', '.join(checkpoints) or 'none'}; "
+                f"allowed: one or more, all distinct, without the baseline {baseline}"
+            )
+        trained = [select(tables, "policy", checkpoint) for checkpoint in checkpoints]
+        for checkpoint in checkpoints:
+            check_same_missions(tables, checkpoint, baseline)
+        for group, (b, *parts) in matched([reference, *trained], by):
+            for metric in metrics:
+                differences = differences_of(np.stack([a[metric] for a in parts]), b[metric])
+                result = crossed(differences, level)
+                if metric in SHARES:
+                    result = _as_share(result, differences, level)
+                about = LEARNER if len(parts) > 1 else CHECKPOINT
+                labels = (learner, baseline, *group, metric, about)
+                rows.append((*labels, *result, *differences.shape))
+    columns = ["learner", "baseline", *by, "metric", "about", *Crossed._fields, "trainings", "n"]
+    return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
+
+
+def _as_share(result: Crossed, differences: np.ndarray, level: float) -> Crossed:
+    """The result with the intervals and the p-value of shares."""
+    if len(differences) == 1:
+        mean, p = share_test(differences[0], level)
+        return result._replace(low=mean.low, high=mean.high, p=p)
+    smooth = crossed(smoothed(differences), level)
+    ends = {name: float(np.clip(getattr(smooth, name), -1, 1)) for name in _ENDS}
+    return result._replace(**ends, p=smooth.p)
+
+
+def _alpha_of(half: Callable[[float], float], distance: float) -> float:
+    """Where a half-width, which falls with alpha, meets a distance: the p-value of an interval."""
+
+    def excess(exponent: float) -> float:
+        return half(10**exponent) - distance
+
+    lowest = -100.0  # where quantiles of Student are exact still
+    if excess(lowest) <= 0:
+        return 0.0
+    return float(10 ** optimize.brentq(excess, lowest, 0.0)) if distance else 1.0
