@@ -14,9 +14,9 @@ from plotly.offline import get_plotlyjs
 
 from analysis.results.event_log import Events
 from dess.scenario import Scenario
-from reports.player import chart, layout, panels
-from reports.player.mission import Mission
-from reports.player.trace import Json, merged
+from reports.player import layout, mission_map, panels
+from reports.player.playback import Playback
+from reports.player.trace import Json
 
 READING = (
     "A disc is the data that is left at a node, the ring around it the most that the node ever "
@@ -53,7 +53,7 @@ def player(
         InputError: If the log is not that of a whole mission of this scenario.
     """
     html = to_html(
-        _figure(Mission(pd.DataFrame(events), scenario)),
+        _figure(Playback(pd.DataFrame(events), scenario)),
         config={"displayModeBar": False},
         auto_play=False,
         include_plotlyjs=False,
@@ -68,30 +68,16 @@ def player(
     return HTML(f'<figure class="player">{above}{html}{below}</figure>')
 
 
-def _figure(mission: Mission) -> Json:
+def _figure(playback: Playback) -> Json:
     """The figure as plotly's JSON; later traces lie above earlier ones."""
-    still = [
-        chart.rings(mission),
-        *panels.battery(mission),
-        *panels.residual(mission),
-        *panels.charging(mission),
-    ]
-    moving = [
-        *chart.trails(mission),
-        *chart.links(mission),
-        chart.nodes(mission),
-        *chart.squares(mission),
-        chart.uavs(mission),
-        chart.status(mission),
-        *panels.cursors(mission),
-        panels.levels(mission),
-    ]
+    still = [mission_map.rings(playback), *panels.at_rest(playback)]
+    moving = [*mission_map.moving(playback), *panels.moving(playback)]
     numbers = list(range(len(still), len(still) + len(moving)))
     return {
-        "data": still + [merged(trace.style, trace.frames[0]) for trace in moving],
+        "data": still + [trace.at_start() for trace in moving],
         "frames": [
             {"name": str(t), "data": [trace.frames[t] for trace in moving], "traces": numbers}
-            for t in range(mission.end + 1)
+            for t in range(playback.end + 1)
         ],
-        "layout": layout.layout(mission),
+        "layout": layout.layout(playback),
     }

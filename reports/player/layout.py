@@ -1,186 +1,82 @@
-"""What stands around the traces of a player: axes, notes, and where all of it is."""
+"""The layout of a player: axes, notes, controls, and where each of them is on the page."""
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 from analysis.figures.style import INK, MUTED, SEA, ZONE
 from dess.scenario import Scenario
-from reports.player.chart import EDGE, STATUS, counted
-from reports.player.controls import GRID, buttons, slider
-from reports.player.mission import Mission
-from reports.player.panels import PANELS, ranges
+from reports.player.mission_map import EDGE, STATUS, counted
+from reports.player.panels import BATTERY, CHARGING, PANELS, ranges
+from reports.player.playback import Playback
 from reports.player.trace import Json
 
 WIDE = 720  # width [px] from which on the curves stand beside the map, not below it
 MARGINS = {"l": 44, "r": 38, "t": 6, "b": 40}
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif'
+GRID = "#dde4e9"
+SECONDS_PER_SLOT = {"Play": 0.3, "Fast": 0.1}
 
-
-def layout(mission: Mission) -> Json:
-    """All but the traces and the frames."""
-    return {
+# What all axes, notes, controls and traces have, unless they say otherwise.
+_AXIS = {
+    "fixedrange": True,
+    "constrain": "domain",
+    "showgrid": False,
+    "gridcolor": GRID,
+    "zeroline": False,
+    "showline": True,
+    "linecolor": MUTED,
+    "ticks": "outside",
+    "ticklen": 3,
+    "tickcolor": MUTED,
+    "tickfont": {"size": 11},
+    "title": {"standoff": 4, "font": {"size": 12}},
+}
+_NOTE = {"xanchor": "left", "yanchor": "middle", "showarrow": False, "font": {"size": 11.5}}
+_CONTROL = {"xanchor": "left", "yanchor": "top", "bgcolor": "white", "bordercolor": MUTED}
+_TEMPLATE = {
+    "data": {"scatter": [{"hoverinfo": "skip"}]},
+    "layout": {
         "font": {"family": FONT, "size": 12, "color": INK},
         "margin": {**MARGINS, "autoexpand": False},
         "plot_bgcolor": "white",
         "paper_bgcolor": "white",
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        "annotationdefaults": _NOTE,
+    },
+}
+
+# Left and right end [share of the width], top and bottom end [px] of the axes of each panel and of
+# the controls, in a plot of that height [px] without its margins.
+_Boxes: TypeAlias = dict[str, tuple[float, float, int, int]]
+_NARROW: tuple[int, _Boxes] = 824, {
+    "5": (0, 1, 0, 18), "": (0, 1, 24, 312), "controls": (0, 1, 354, 440),
+    "2": (0, 1, 470, 574), "3": (0, 1, 608, 712), "4": (0, 1, 746, 824),
+}  # fmt: skip
+_WIDE: tuple[int, _Boxes] = 584, {
+    "5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "controls": (0.58, 1, 492, 584),
+    "2": (0.58, 1, 24, 154), "3": (0.58, 1, 190, 320), "4": (0.58, 1, 356, 434),
+}  # fmt: skip
+
+
+def layout(playback: Playback) -> Json:
+    """All but the traces and the frames."""
+    return {
+        "template": _TEMPLATE,
         "showlegend": False,
         "hovermode": "closest",
         "dragmode": False,
-        **_axes(mission),
-        "shapes": _shapes(mission.scenario),
-        "annotations": _annotations(mission),
-        "updatemenus": [buttons()],
-        "sliders": [slider(mission)],
+        **_axes(playback),
+        "shapes": _shapes(playback.scenario),
+        "annotations": _annotations(playback),
+        "updatemenus": [_buttons()],
+        "sliders": [_slider(playback.end)],
     }
-
-
-def _axes(mission: Mission) -> Json:
-    grid = [-0.5, mission.scenario.grid - 0.5]
-    axes = {
-        "xaxis": {
-            **_axis(grid),
-            "title": _title("x, east [cells]"),
-            "constraintoward": "left",
-        },
-        "yaxis": {
-            **_axis(grid[::-1]),
-            "title": _title("y, south [cells]"),
-            "scaleanchor": "x",
-            "constraintoward": "top",
-        },
-    }
-    for panel, span in ranges(mission).items():
-        axes[f"xaxis{panel}"] = {
-            **_axis([0, mission.end]),
-            "anchor": f"y{panel}",
-            "showticklabels": panel == PANELS[-1],
-        }
-        axes[f"yaxis{panel}"] = {
-            **_axis(span),
-            "anchor": f"x{panel}",
-            "showgrid": panel != PANELS[-1],
-            "nticks": 5,
-        }
-    axes[f"xaxis{PANELS[-1]}"]["title"] = _title("time [mission slots]")
-    rows = range(1, mission.scenario.uavs + 1)
-    axes[f"yaxis{PANELS[-1]}"]["tickvals"] = list(rows[:: -(-len(rows) // 6)])
-    hidden = {"range": [0, 1], "fixedrange": True, "visible": False}
-    axes[f"xaxis{STATUS}"] = {**hidden, "anchor": f"y{STATUS}"}
-    axes[f"yaxis{STATUS}"] = {**hidden, "range": [-1, 1], "anchor": f"x{STATUS}"}
-    return axes
-
-
-def _axis(span: list[float]) -> Json:
-    return {
-        "range": span,
-        "fixedrange": True,
-        "constrain": "domain",
-        "showgrid": False,
-        "gridcolor": GRID,
-        "zeroline": False,
-        "showline": True,
-        "linecolor": MUTED,
-        "ticks": "outside",
-        "ticklen": 3,
-        "tickcolor": MUTED,
-        "tickfont": {"size": 11},
-    }
-
-
-def _title(text: str) -> Json:
-    return {"text": text, "standoff": 4, "font": {"size": 12}}
-
-
-def _shapes(scenario: Scenario) -> list[Json]:
-    """The sea and its charging zone; the thresholds of charging."""
-    x, y, width, height = scenario.zone
-    boxes = (
-        (0, 0, scenario.grid, scenario.grid, SEA, MUTED),
-        (x, y, width, height, ZONE, EDGE),
-    )
-    shapes = [
-        {"type": "rect", "layer": "below", "fillcolor": fill, "line": {"color": edge, "width": 1},
-         "x0": x - 0.5, "x1": x + width - 0.5, "y0": y - 0.5, "y1": y + height - 0.5}
-        for x, y, width, height, fill, edge in boxes
-    ]  # fmt: skip
-    for level in (scenario.charge_start, scenario.charge_complete):
-        ends = {"x0": 0, "x1": 1, "xref": "x2 domain", "y0": level, "y1": level, "yref": "y2"}
-        shapes.append({"type": "line", "line": {"color": MUTED, "width": 1}, **ends})
-    return shapes
-
-
-def _annotations(mission: Mission) -> list[Json]:
-    """The titles of the panels, the thresholds of charging, and how each UAV ended."""
-    scenario, queue = (
-        mission.scenario,
-        "; hollow: waiting" if mission.fleet["waiting"].any() else "",
-    )
-    titles = (
-        "Battery [%]",
-        "Residual data [data units], a band per node",
-        f"Charging, {counted(mission.pads, 'pad')}{queue}",
-    )
-    notes = (
-        (f"C<sub>S</sub> {scenario.charge_start}", scenario.charge_start),
-        (f"C<sub>C</sub> {scenario.charge_complete}", scenario.charge_complete),
-    )
-    ends = mission.slots.groupby("uav")["slot"].max() + 1
-    return [
-        *[
-            _note(
-                f"<b>{text}</b>",
-                0,
-                f"x{n} domain",
-                1,
-                f"y{n} domain",
-                yanchor="bottom",
-                font={"size": 12.5},
-            )
-            for n, text in zip(PANELS, titles, strict=True)
-        ],
-        *[_note(text, 1, "x2 domain", level, "y2") for text, level in notes],
-        *[
-            _note("✓" if filled else "✕", int(end), "x4", uav + 1, "y4")
-            for (uav, end), filled in zip(ends.items(), mission.filled, strict=True)
-        ],
-    ]
-
-
-def _note(text: str, x: float, xref: str, y: float, yref: str, **other: Any) -> Json:
-    """A text right of a point."""
-    place = {"x": x, "xref": xref, "y": y, "yref": yref, "xanchor": "left", "yanchor": "middle"}
-    return {**place, "text": text, "showarrow": False, "font": {"size": 11.5}, **other}
-
-
-def _arrangement(height: int, boxes: Mapping[str, tuple[float, float, int, int]]) -> Json:
-    """The height of the whole plot [px] and what to hand to ``Plotly.relayout``.
-
-    Args:
-        height: Of the plot without its margins [px].
-        boxes: Of each axis, and of the controls: left and right end [share of the width], top and
-            bottom end [px from the top].
-    """
-    change: Json = {"autosize": True}
-    for name, (left, right, top, bottom) in boxes.items():
-        if name == "controls":
-            for control in ("updatemenus[0]", "sliders[0]"):
-                change |= {f"{control}.x": left, f"{control}.y": 1 - top / height}
-            change["sliders[0].len"] = right - left
-        else:
-            change[f"xaxis{name}.domain"] = [left, right]
-            change[f"yaxis{name}.domain"] = [1 - bottom / height, 1 - top / height]
-    return {"height": height + MARGINS["t"] + MARGINS["b"], "change": change}
 
 
 def arranging() -> str:
     """The script that puts the curves beside the map where there is room, else below."""
-    narrow = {"5": (0, 1, 0, 18), "": (0, 1, 24, 312), "controls": (0, 1, 354, 440),
-              "2": (0, 1, 470, 574), "3": (0, 1, 608, 712), "4": (0, 1, 746, 824)}  # fmt: skip
-    wide = {"5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "controls": (0.58, 1, 492, 584),
-            "2": (0.58, 1, 24, 154), "3": (0.58, 1, 190, 320),
-            "4": (0.58, 1, 356, 434)}  # fmt: skip
-    layouts = {"narrow": _arrangement(824, narrow), "wide": _arrangement(584, wide)}
+    layouts = {"narrow": _arrangement(*_NARROW), "wide": _arrangement(*_WIDE)}
     return f"""
         const plot = document.getElementById("{{plot_id}}"), layouts = {json.dumps(layouts)};
         let shown;
@@ -194,3 +90,128 @@ def arranging() -> str:
         arrange();
         window.addEventListener("resize", arrange);
     """
+
+
+def _arrangement(height: int, boxes: _Boxes) -> Json:
+    """The height of the whole plot [px] and what to hand to ``Plotly.relayout``."""
+    change: Json = {"autosize": True}
+    for name, (left, right, top, bottom) in boxes.items():
+        if name == "controls":
+            for control in ("updatemenus[0]", "sliders[0]"):
+                change |= {f"{control}.x": left, f"{control}.y": 1 - top / height}
+            change["sliders[0].len"] = right - left
+        else:
+            change[f"xaxis{name}.domain"] = [left, right]
+            change[f"yaxis{name}.domain"] = [1 - bottom / height, 1 - top / height]
+    return {"height": height + MARGINS["t"] + MARGINS["b"], "change": change}
+
+
+def _axes(playback: Playback) -> Json:
+    grid = [-0.5, playback.scenario.grid - 0.5]
+    hidden = {"range": [-1, 1], "visible": False}
+    axes: Json = {
+        "xaxis": {"range": grid, "title": {"text": "x, east [cells]"}, "constraintoward": "left"},
+        "yaxis": {"range": grid[::-1], "title": {"text": "y, south [cells]"},
+                  "scaleanchor": "x", "constraintoward": "top"},
+        f"xaxis{STATUS}": {**hidden, "range": [0, 1], "anchor": f"y{STATUS}"},
+        f"yaxis{STATUS}": {**hidden, "anchor": f"x{STATUS}"},
+    }  # fmt: skip
+    for panel, ends in ranges(playback).items():
+        x = {"range": [0, playback.end], "anchor": f"y{panel}", "showticklabels": panel == CHARGING}
+        y = {"range": ends, "anchor": f"x{panel}", "showgrid": panel != CHARGING, "nticks": 5}
+        axes |= {f"xaxis{panel}": x, f"yaxis{panel}": y}
+    uavs = playback.scenario.uavs
+    axes[f"xaxis{CHARGING}"]["title"] = {"text": "time [mission slots]"}
+    axes[f"yaxis{CHARGING}"]["tickvals"] = list(range(1, uavs + 1, -(-uavs // 6)))
+    return axes
+
+
+def _shapes(scenario: Scenario) -> list[Json]:
+    """The map and its charging zone; the thresholds of charging."""
+    shapes: list[Json] = [
+        {"type": "rect", "layer": "below", "fillcolor": fill, "line": {"color": edge, "width": 1},
+         "x0": x - 0.5, "x1": x + width - 0.5, "y0": y - 0.5, "y1": y + height - 0.5}
+        for (x, y, width, height), fill, edge in (
+            ((0, 0, scenario.grid, scenario.grid), SEA, MUTED),
+            (scenario.zone, ZONE, EDGE),
+        )
+    ]  # fmt: skip
+    for level in (scenario.charge_start, scenario.charge_complete):
+        ends = {"x0": 0, "x1": 1, "xref": "x2 domain", "y0": level, "y1": level, "yref": "y2"}
+        shapes.append({"type": "line", "line": {"color": MUTED, "width": 1}, **ends})
+    return shapes
+
+
+def _annotations(playback: Playback) -> list[Json]:
+    """The titles of the panels, the thresholds of charging, and how each UAV ended."""
+    scenario = playback.scenario
+    queue = "; hollow: waiting" if playback.fleet["waiting"].any() else ""
+    titles = (
+        "Battery [%]",
+        "Residual data [data units], a band per node",
+        f"Charging, {counted(playback.pads, 'pad')}{queue}",
+    )
+    heading = {"yanchor": "bottom", "font": {"size": 12.5}}
+    notes = [
+        _note(f"<b>{title}</b>", (0, f"x{n} domain"), (1, f"y{n} domain"), **heading)
+        for n, title in zip(PANELS, titles, strict=True)
+    ]
+    levels = {"S": scenario.charge_start, "C": scenario.charge_complete}
+    for index, level in levels.items():
+        text = f"C<sub>{index}</sub> {level}"
+        notes.append(_note(text, (1, f"x{BATTERY} domain"), (level, f"y{BATTERY}")))
+    ends = playback.slots.groupby("uav")["slot"].max() + 1
+    for (uav, end), filled in zip(ends.items(), playback.filled, strict=True):
+        mark = "✓" if filled else "✕"
+        notes.append(_note(mark, (int(end), f"x{CHARGING}"), (uav + 1, f"y{CHARGING}")))
+    return notes
+
+
+def _note(text: str, x: tuple[float, str], y: tuple[float, str], **style: Any) -> Json:
+    """A text right of a point, given by a number and its axis."""
+    return {"text": text, "x": x[0], "xref": x[1], "y": y[0], "yref": y[1], **style}
+
+
+def _animate(seconds: float) -> Json:
+    """Options of ``Plotly.animate``: how long a slot lasts."""
+    duration = round(1000 * seconds)
+    return {
+        "mode": "immediate",
+        "fromcurrent": True,
+        "frame": {"duration": duration, "redraw": False},
+        "transition": {"duration": duration, "easing": "linear"},
+    }
+
+
+def _buttons() -> Json:
+    """Play, slow and fast, and pause."""
+    calls: Json = {label: [None, _animate(seconds)] for label, seconds in SECONDS_PER_SLOT.items()}
+    calls["Pause"] = [[None], _animate(0)]
+    return {
+        **_CONTROL,
+        "type": "buttons",
+        "direction": "right",
+        "showactive": False,
+        "pad": {"t": 0, "l": 0, "r": 0, "b": 0},
+        "font": {"size": 14},
+        "buttons": [{"label": k, "method": "animate", "args": args} for k, args in calls.items()],
+    }
+
+
+def _slider(end: int) -> Json:
+    """A step per mission slot."""
+    shown = {"size": 15, "color": INK}
+    return {
+        **_CONTROL,
+        "steps": [
+            {"label": str(t), "method": "animate", "args": [[str(t)], _animate(0)]}
+            for t in range(end + 1)
+        ],
+        "currentvalue": {"xanchor": "right", "prefix": "slot ", "offset": 16, "font": shown},
+        "pad": {"t": 4, "l": 0, "r": 0, "b": 0},
+        "font": {"size": 11},
+        "activebgcolor": GRID,
+        "ticklen": 0,
+        "minorticklen": 0,
+        "transition": {"duration": 0},
+    }

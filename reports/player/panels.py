@@ -5,44 +5,60 @@ from collections.abc import Iterator
 import pandas as pd
 
 from analysis.figures.style import INK
-from reports.player.mission import Mission
-from reports.player.trace import Json, Moving, on_axes, rounded
+from reports.player.playback import Playback
+from reports.player.trace import Json, Moving, lines, markers, rounded
 
-PANELS = (2, 3, 4)
+BATTERY, RESIDUAL, CHARGING = PANELS = (2, 3, 4)
 
 
-def ranges(mission: Mission) -> dict[int, list[float]]:
-    """What each panel spans, from its bottom to its top."""
-    most = max(float(mission.residual.sum(axis=1).max()), 1.0)
-    uavs = mission.scenario.uavs
+def ranges(playback: Playback) -> dict[int, list[float]]:
+    """The ends of each panel's y axis, from its bottom to its top."""
+    most = max(float(playback.residual.sum(axis=1).max()), 1.0)
+    uavs = playback.scenario.uavs
     room = 0.6 + max(0, 3 - uavs) / 2  # a single row is not blown up
-    spans: tuple[list[float], ...] = (
-        [0, 103],
-        [0, round(1.05 * most, 2)],
-        [uavs + room, 1 - room],
-    )
-    return dict(zip(PANELS, spans, strict=True))
+    return {
+        BATTERY: [0, 103],
+        RESIDUAL: [0, round(1.05 * most, 2)],
+        CHARGING: [uavs + room, 1 - room],
+    }
 
 
-def battery(mission: Mission) -> Iterator[Json]:
+def at_rest(playback: Playback) -> list[Json]:
+    """The curves."""
+    return [*_battery(playback), *_residual(playback), *_charging(playback)]
+
+
+def moving(playback: Playback) -> list[Moving]:
+    """An upright line through each panel, and dots on the battery curves, at the slot shown."""
+    times = range(playback.end + 1)
+    cursors = [
+        Moving(
+            {**lines(f"cursor {panel}", INK, 1.2, panel), "y": ends}, [{"x": [t, t]} for t in times]
+        )
+        for panel, ends in ranges(playback).items()
+    ]
+    line = {"width": 1.5, "color": "white"}
+    look: Json = {"size": 9, "opacity": 1, "color": playback.uav_colours, "line": line}
+    rows = enumerate(playback.fleet["battery"].tolist())
+    frames = [{"x": [t] * len(levels), "y": levels} for t, levels in rows]
+    return [*cursors, Moving(markers("batteries", BATTERY, **look), frames)]
+
+
+def _battery(playback: Playback) -> Iterator[Json]:
     """A curve per UAV."""
-    for uav, own in mission.levels.groupby("uav"):
-        yield {
-            **on_axes(2, f"battery {uav + 1}"),
-            "x": own["time"].tolist(),
-            "y": own["battery"].tolist(),
-            "mode": "lines",
-            "line": {"color": mission.uav_colours[uav], "width": 1.5},
-        }
+    for uav, levels in playback.levels.groupby("uav"):
+        style = lines(f"battery {uav + 1}", playback.uav_colours[uav], panel=BATTERY)
+        yield {**style, "x": levels["time"].tolist(), "y": levels["battery"].tolist()}
 
 
-def residual(mission: Mission) -> Iterator[Json]:
+def _residual(playback: Playback) -> Iterator[Json]:
     """A band per node, in its colour."""
-    for node, colour in zip(mission.residual, mission.node_colours, strict=True):
+    times = playback.residual.index.tolist()
+    for node, colour in zip(playback.residual, playback.node_colours, strict=True):
         yield {
-            **on_axes(3, f"residual {node}"),
-            "x": mission.residual.index.tolist(),
-            "y": rounded(mission.residual[node]),
+            **lines(f"residual {node}", panel=RESIDUAL),
+            "x": times,
+            "y": rounded(playback.residual[node]),
             "mode": "none",
             "stackgroup": "nodes",
             "fillcolor": colour,
@@ -50,28 +66,16 @@ def residual(mission: Mission) -> Iterator[Json]:
         }
 
 
-def charging(mission: Mission) -> Iterator[Json]:
+def _charging(playback: Playback) -> Iterator[Json]:
     """A row per UAV: a line while it is active, bars while it charges or waits."""
-    for uav, own in mission.slots.groupby("uav"):
-        colour = mission.uav_colours[uav]
-        yield {
-            **on_axes(4, f"active {uav + 1}"),
-            "x": [0, len(own)],
-            "y": [uav + 1, uav + 1],
-            "mode": "lines",
-            "line": {"color": colour, "width": 1.5},
-        }
+    for uav, slots in playback.slots.groupby("uav"):
+        colour, row = playback.uav_colours[uav], uav + 1
+        active = lines(f"active {row}", colour, panel=CHARGING)
+        yield {**active, "x": [0, len(slots)], "y": [row, row]}
         for state, fill in (("charging", colour), ("waiting", "white")):
-            x, y = _bars(own.loc[own[state], "slot"], uav + 1)
-            yield {
-                **on_axes(4, f"{state} {uav + 1}"),
-                "x": x,
-                "y": y,
-                "mode": "lines",
-                "line": {"color": colour, "width": 1},
-                "fill": "toself",
-                "fillcolor": fill,
-            }
+            style = lines(f"{state} {row}", colour, 1, CHARGING)
+            x, y = _bars(slots.loc[slots[state], "slot"], row)
+            yield {**style, "x": x, "y": y, "fill": "toself", "fillcolor": fill}
 
 
 def _bars(slots: pd.Series, row: int) -> tuple[list[int | None], list[float | None]]:
@@ -83,32 +87,3 @@ def _bars(slots: pd.Series, row: int) -> tuple[list[int | None], list[float | No
         x += [left, right, right, left, left, None]
         y += [bottom, bottom, top, top, bottom, None]
     return x, y
-
-
-def cursors(mission: Mission) -> Iterator[Moving]:
-    """An upright line through each panel at the time that is shown."""
-    for panel, ends in ranges(mission).items():
-        style = {
-            **on_axes(panel, f"cursor {panel}"),
-            "y": ends,
-            "mode": "lines",
-            "line": {"color": INK, "width": 1.2, "simplify": False},
-        }
-        yield Moving(style, [{"x": [t, t]} for t in range(mission.end + 1)])
-
-
-def levels(mission: Mission) -> Moving:
-    """Dots on the battery curves at the time that is shown."""
-    style = {
-        **on_axes(2, "batteries"),
-        "mode": "markers",
-        "cliponaxis": False,
-        "marker": {
-            "size": 9,
-            "opacity": 1,
-            "color": mission.uav_colours,
-            "line": {"width": 1.5, "color": "white"},
-        },
-    }
-    rows = enumerate(mission.fleet["battery"].tolist())
-    return Moving(style, [{"x": [t] * len(levels), "y": levels} for t, levels in rows])

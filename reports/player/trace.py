@@ -11,23 +11,36 @@ Json: TypeAlias = dict[str, Any]
 
 @dataclass
 class Moving:
-    """A trace that changes: what stays, and what the frame of each slot sets."""
+    """A trace that changes: its style, and what the frame of every slot sets."""
 
     style: Json
     frames: list[Json]
 
+    def at_start(self) -> Json:
+        """The trace as the first frame shows it."""
+        return _merged(self.style, self.frames[0])
 
-def on_axes(number: int, name: str) -> Json:
-    """What a trace has that stands in the panel of that number."""
-    return {"name": name, "xaxis": f"x{number}", "yaxis": f"y{number}", "hoverinfo": "skip"}
+
+def lines(name: str, colour: str | None = None, width: float = 1.5, panel: int = 1) -> Json:
+    """The style of a trace of lines in a panel; plotly drops no point of a line that moves."""
+    line = {"color": colour, "width": width, "simplify": False}
+    return {**_on_axes(panel), "name": name, "mode": "lines", "line": line}
 
 
-def merged(style: Json, change: Json) -> Json:
-    """A trace with a change, in depth."""
-    nested = {k: merged(style.get(k, {}), v) for k, v in change.items() if isinstance(v, dict)}
-    return {**style, **change, **nested}
+def markers(name: str, panel: int = 1, mode: str = "markers", **marker: Any) -> Json:
+    """The style of a trace of markers in a panel, drawn in full at its edges."""
+    return {**_on_axes(panel), "name": name, "mode": mode, "cliponaxis": False, "marker": marker}
 
 
 def rounded(values: pd.Series | np.ndarray) -> list[float]:
-    """Amounts of data as a page writes them."""
-    return np.round(np.maximum(values, 0.0), 2).tolist()  # what is left may be -1e-16
+    """Amounts of data with two digits."""
+    return np.round(np.maximum(values, 0.0), 2).tolist()  # residual data may be -1e-16
+
+
+def _on_axes(panel: int) -> Json:
+    return {} if panel == 1 else {"xaxis": f"x{panel}", "yaxis": f"y{panel}"}
+
+
+def _merged(style: Json, change: Json) -> Json:
+    nested = {k: _merged(style.get(k, {}), v) for k, v in change.items() if isinstance(v, dict)}
+    return {**style, **change, **nested}

@@ -18,7 +18,8 @@ from analysis.figures.style import node_colours
 from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
 from dess.errors import InputError
 from dess.state import sample_scenario
-from reports.player import chart, library, player
+from reports.player import library, player
+from reports.player.mission_map import TRAIL
 from tests.reports.browser import Visit
 
 # One UAV; three in a queue for one pad, of which one runs dry long before the others are done;
@@ -158,7 +159,7 @@ def test_trails_are_the_last_moves(mission: Mission, replay: Replay) -> None:
     for uav in range(mission.scenario.uavs):
         way = [replay[time]["UAVs"] for time in range(len(replay))]
         for time in range(len(replay)):
-            past = [way[max(time - n, 0)] for n in range(chart.TRAIL + 1)]
+            past = [way[max(time - n, 0)] for n in range(TRAIL + 1)]
             trail = replay[time][f"trail {uav + 1}"]
             assert trail["x"] == [dots["x"][uav] for dots in past]
             assert trail["y"] == [dots["y"][uav] for dots in past]
@@ -212,7 +213,7 @@ def test_the_cases_are_what_they_are_meant_to_be(queue: Mission) -> None:
     assert slots["waiting"].any() and slots["charging"].any() and ends.nunique() > 1
     notes = {note["text"] for note in Replay(queue).figure["layout"]["annotations"]}
     assert {"✓", "✕"} <= notes
-    assert duration(flown(**CASES["short"]).log) < chart.TRAIL
+    assert duration(flown(**CASES["short"]).log) < TRAIL
 
 
 def test_plotly_knows_every_attribute(mission: Mission, replay: Replay) -> None:

@@ -1,4 +1,4 @@
-"""What a player knows of its mission, slot by slot, from the event log."""
+"""The state of a mission after every mission slot, from its event log: what a player shows."""
 
 from collections.abc import Iterator
 
@@ -11,50 +11,44 @@ from dess.errors import InputError
 from dess.scenario import Scenario
 
 
-class Mission:
-    """What is known of a mission of T slots, I UAVs and K nodes.
+class Playback:
+    """A mission of T slots, I UAVs and K nodes, slot by slot.
 
     Attributes:
         slots: ``uav_slots`` of the log.
         levels: ``battery_levels`` of the log.
         residual: (T + 1, K) ``residual_data`` of the log.
         filled: (I,) whether the UAV filled its quota.
-        fleet: (T + 1, I) arrays of what the UAVs are after every slot: ``x``, ``y``, ``battery``,
-            ``node``, ``charging``, ``waiting``, and ``over`` if the UAV's mission has ended.
+        fleet: (T + 1, I) arrays, the state of the UAVs after every slot: ``x``, ``y``, ``battery``,
+            ``node`` (served, -1 without), ``charging``, ``waiting``, and ``over`` if the UAV's
+            mission has ended.
     """
 
     def __init__(self, log: pd.DataFrame, scenario: Scenario):
         _check(log, scenario)
         self.scenario = scenario
         self.slots, self.levels, self.residual = (
-            uav_slots(log),
-            battery_levels(log),
-            residual_data(log),
+            table(log) for table in (uav_slots, battery_levels, residual_data)
         )
         self.end = len(self.residual) - 1
         self.filled = np.isin(range(scenario.uavs), log.loc[log["event"] == "quota_filled", "uav"])
-        self.fleet = self._after_slots()
+        self.fleet = self._fleet()
         self.pads = scenario.zone_cells if scenario.pads is None else scenario.pads
         self.uav_colours = uav_colours(scenario.uavs)
         self.node_colours = node_colours(len(scenario.nodes))
 
-    def _after_slots(self) -> dict[str, np.ndarray]:
-        table = self.slots.assign(time=self.slots["slot"] + 1).pivot(index="time", columns="uav")
-        table = table.reindex(range(self.end + 1))
-        first = self.slots.drop_duplicates("uav")
-        levels = self.levels.pivot(index="time", columns="uav", values="battery")
-        last = self.slots.groupby("uav")["slot"].max().to_numpy() + 1
-        fleet = {
-            "battery": levels.reindex(table.index).ffill().to_numpy(int),
-            "node": table["node"].fillna(-1).to_numpy(int),
-            "over": np.arange(self.end + 1)[:, None] >= last,
-        }
-        for axis in ("x", "y"):
-            table.loc[0, axis] = first[f"from_{axis}"].to_numpy()
-            fleet[axis] = table[axis].ffill().to_numpy(int)
-        for state in ("charging", "waiting"):
-            fleet[state] = table[state].eq(True).to_numpy()
-        return fleet
+    def _fleet(self) -> dict[str, np.ndarray]:
+        first = self.slots.groupby("uav", as_index=False).first()
+        full = self.levels.groupby("uav")["battery"].first().to_numpy()
+        absent = {"node": -1, "charging": False, "waiting": False}
+        start = first.assign(slot=-1, x=first["from_x"], y=first["from_y"], battery=full, **absent)
+        table = pd.concat([start, self.slots]).pivot(index="slot", columns="uav")
+        table = table.reindex(range(-1, self.end))
+        active = table["x"].notna()
+        fleet = {name: table[name].ffill().to_numpy(int) for name in ("x", "y", "battery")}
+        for name, value in absent.items():
+            fleet[name] = table[name].where(active, value).to_numpy(type(value))
+        return fleet | {"over": ~active.shift(-1, fill_value=False).to_numpy(bool)}
 
     def rows(self, *names: str) -> Iterator[tuple[list, ...]]:
         """The named arrays of the fleet as lists, slot by slot."""
@@ -65,9 +59,9 @@ def _check(log: pd.DataFrame, scenario: Scenario) -> None:
     for edge in ("mission_start", "mission_end"):
         rows = log[log["event"] == edge]
         for what, count in (("uav", scenario.uavs), ("node", len(scenario.nodes))):
-            found = sorted(rows.loc[rows[what] >= 0, what])
-            if found != list(range(count)):
+            numbers = sorted(rows.loc[rows[what] >= 0, what])
+            if numbers != list(range(count)):
                 raise InputError(
-                    f"events: {edge} has {len(found)} rows of a {what}; "
+                    f"events: {edge} has {len(numbers)} rows of a {what}; "
                     f"allowed: one for each of the scenario's {count}"
                 )
