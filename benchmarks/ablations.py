@@ -33,7 +33,7 @@ VARIANTS = {
     "no inlining: the rules are called": (
         ("dess/compiled.py", "kernel(function, forceinline=True)", "kernel(function)"),
     ),
-    "no batch: one mission at a time": (("dess/batch.py", "LANES = 256", "LANES = 1"),),
+    "no batch: one mission at a time": (("dess/batch.py", "BATCH_SIZE = 256", "BATCH_SIZE = 1"),),
 }
 
 TIMED = """

@@ -25,7 +25,7 @@ def _one_thread() -> Iterator[None]:
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("name", config_names())
 def test_ticks(benchmark, name: str, device: str) -> None:
-    """A slot of all lanes and one update; 20 of them per round."""
+    """A slot of all environments and one update; 20 of them per round."""
     training = Training(load_config(name), torch.device(device))
     training.run(20)
     benchmark.pedantic(training.run, args=(20,), rounds=10)

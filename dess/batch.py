@@ -1,6 +1,6 @@
 """The batch engine: many missions advance slot by slot in compiled code over ``rules.py``.
 
-A lane holds one mission at a time; a finished mission makes room for the next one, so the batch
+A batch has a fixed number of places. A finished mission makes room for the next one, so the batch
 stays full. The policies are asked once per slot for all rows that must act. What a mission does
 never depends on the others: B missions in a batch equal B single ones, in any order and grouping.
 """
@@ -27,7 +27,7 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
-LANES = 256  # missions in flight: enough to hide Python's share, few enough for the cache
+BATCH_SIZE = 256  # missions in flight: enough to hide Python's share, few enough for the cache
 
 
 def simulate_batch(
@@ -37,7 +37,7 @@ def simulate_batch(
     replications: Sequence[int] | int = 1,
     *,
     workers: int = 1,
-    lanes: int = LANES,
+    batch_size: int = BATCH_SIZE,
     progress: Callable[[int], None] | None = None,
 ) -> Records:
     """Simulate many missions in lockstep.
@@ -48,11 +48,12 @@ def simulate_batch(
         seed: Seed of all missions.
         replications: Their replication numbers, or how many, counted from 0.
         workers: Threads; the compiled code runs beside Python.
-        lanes: Missions in flight per thread.
+        batch_size: Missions in flight per thread.
         progress: Called with the number of missions finished since its last call.
 
     Returns:
-        The records, in the order of ``replications``; the same for any ``workers`` and ``lanes``.
+        The records, in the order of ``replications``; ``workers`` and ``batch_size`` do not
+        change them.
 
     Raises:
         InputError: If the seed or a replication is out of range.
@@ -61,8 +62,10 @@ def simulate_batch(
     numbers = _numbers(replications)
     for number in (numbers.min(), numbers.max()) if len(numbers) else ():
         check_seed(seed, int(number))
-    if workers < 1 or lanes < 1:
-        raise ValueError(f"workers and lanes must be at least 1, not {workers} and {lanes}")
+    if workers < 1 or batch_size < 1:
+        raise ValueError(
+            f"workers and batch_size must be at least 1, not {workers} and {batch_size}"
+        )
     team = team_of(policy)
     if isinstance(scenario, Scenario | ScenarioSpace):
         scenario = [scenario] * len(numbers)
@@ -76,7 +79,7 @@ def simulate_batch(
     stop = Event()
 
     def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:
-        batch = _Batch(group, team, seed, lanes)
+        batch = _Batch(group, team, seed, batch_size)
         batch.run(jobs, which, numbers, records, progress, stop)
 
     tasks = []
@@ -121,10 +124,10 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
 
 
 class _Batch:
-    """Lanes of missions over one world."""
+    """Missions that advance together over one world."""
 
-    def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, lanes: int):
-        self.world, self.team, self.lanes = world_of(spaces[0]), team, lanes
+    def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, batch_size: int):
+        self.world, self.team, self.batch_size = world_of(spaces[0]), team, batch_size
         self.constants = np.concatenate([constants_of(space) for space in spaces])
         self.constants["seed"] = seed
         self.ranges = np.stack([ranges_of(space) for space in spaces])
@@ -132,57 +135,57 @@ class _Batch:
 
     def run(self, jobs, which, numbers, records, progress, stop) -> None:
         """Simulate the missions ``jobs`` and write their records, until told to stop."""
-        lanes, nodes = min(self.lanes, len(jobs)), len(self.world.nodes)
-        state = empty_state(lanes, self.uavs, nodes)
+        size, nodes = min(self.batch_size, len(jobs)), len(self.world.nodes)
+        state = empty_state(size, self.uavs, nodes)
         scratch = empty_scratch(self.uavs, nodes)
-        job_of_lane = np.full(lanes, -1)
+        job_of = np.full(size, -1)
         queue = np.array([0, 0])  # next job, jobs done
         source = (self.constants, self.ranges, which, numbers, jobs)
-        for lane in range(lanes):
-            _next_mission(lane, job_of_lane, queue, source, state)
+        for b in range(size):
+            _next_mission(b, job_of, queue, source, state)
         # Telling costs time that all threads share: a hundred times will do.
         told, step = 0, max(1, len(jobs) // 100)
         while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
-            _advance(job_of_lane, queue, source, state, self.world, scratch, records)
+            _advance(job_of, queue, source, state, self.world, scratch, records)
             if progress and (queue[1] >= told + step or queue[1] == len(jobs)):
                 progress(int(queue[1]) - told)
                 told = int(queue[1])
 
 
 @kernel
-def _next_mission(lane, job_of_lane, queue, source, state):
-    """Put the next job into a lane; without one the lane stays empty."""
+def _next_mission(b, job_of, queue, source, state):
+    """Put the next job into place ``b``; without one the place stays empty."""
     constants, ranges, which, numbers, jobs = source
-    mission = state.missions[lane]
+    mission = state.missions[b]
     if queue[0] == len(jobs):
-        job_of_lane[lane] = -1
+        job_of[b] = -1
         mission.active = 0
         return
     job = jobs[queue[0]]
     queue[0] += 1
-    job_of_lane[lane] = job
-    state.missions[lane] = constants[which[job]]
+    job_of[b] = job
+    state.missions[b] = constants[which[job]]
     mission.replication = numbers[job]
-    rules.launch(mission, ranges[which[job]], state.uavs[lane], state.residual[lane])
+    rules.launch(mission, ranges[which[job]], state.uavs[b], state.residual[b])
 
 
 @kernel
-def _advance(job_of_lane, queue, source, state, world, scratch, records):
-    """One mission slot of every lane; finished missions leave their record and make room."""
+def _advance(job_of, queue, source, state, world, scratch, records):
+    """One mission slot of every mission; finished missions leave their record and make room."""
     nodes, path_loss, order, means = world
     batches, search = scratch
     missions, uavs, residual = state
     arrivals = np.empty(len(nodes), np.int64)
-    for lane in range(len(missions)):
-        if job_of_lane[lane] < 0:
+    for b in range(len(missions)):
+        if job_of[b] < 0:
             continue
-        mission, team, data = missions[lane], uavs[lane], residual[lane]
+        mission, team, data = missions[b], uavs[b], residual[b]
         rules.advance(
             mission, team, data, arrivals, nodes, path_loss, order, means, batches, search
         )  # fmt: skip
         if mission.active == 0:
-            job = job_of_lane[lane]
+            job = job_of[b]
             write_record(mission, team, data, records.missions[job], records.uavs[job])
             queue[1] += 1
-            _next_mission(lane, job_of_lane, queue, source, state)
+            _next_mission(b, job_of, queue, source, state)

@@ -189,11 +189,11 @@ def _enter(mission, residual, order, means, row, rank, group, batch):
 
 
 @inlined
-def _draw(mission, lane, batch, width):
+def _draw(mission, substream, batch, width):
     """Draw the shadowing of a batch: the SNR of its nodes [dB], or a bound far out in the tail."""
     words, mean, snr = batch.words, batch.mean, batch.snr
     streams.blocks(
-        mission.seed, mission.replication, streams.SHADOWING, lane, mission.slot,
+        mission.seed, mission.replication, streams.SHADOWING, substream, mission.slot,
         batch.node, words, width,
     )  # fmt: skip
     for word in range(GROUP):

@@ -6,7 +6,7 @@ remembered between draws, so a replication alone equals the same one inside any 
 policies meet the same sea, and no draw is made that is not needed.
 
 One Philox block is four 32-bit words. The seed is the key; the counter words are ``index``,
-``slot``, ``stream`` with its lanes, and ``replication``.
+``slot``, ``stream`` with its substreams, and ``replication``.
 """
 
 import math
@@ -61,14 +61,14 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 
 @kernel
-def block(seed, replication, stream, lane, slot, index):
+def block(seed, replication, stream, substream, slot, index):
     """Four random 32-bit words of the coordinates of a draw.
 
     Args:
         seed: Seed of the study, ``uint64``.
         replication: Number of the replication, below 2**32.
         stream: Purpose of the draw, one of this module's stream constants.
-        lane: Second coordinate inside the stream (UAV and group of sub-slots), below 2**24.
+        substream: Second coordinate inside the stream (UAV and group of sub-slots), below 2**24.
         slot: Mission slot, below 2**32.
         index: Running number (node, or group of four nodes), below 2**32.
 
@@ -79,7 +79,7 @@ def block(seed, replication, stream, lane, slot, index):
     return philox(
         np.uint64(index),
         np.uint64(slot),
-        (np.uint64(stream) << np.uint64(24)) | np.uint64(lane),
+        (np.uint64(stream) << np.uint64(24)) | np.uint64(substream),
         np.uint64(replication),
         key & _MASK,
         key >> _SHIFT,
@@ -87,18 +87,18 @@ def block(seed, replication, stream, lane, slot, index):
 
 
 @kernel
-def blocks(seed, replication, stream, lane, slot, indices, words, count):
+def blocks(seed, replication, stream, substream, slot, indices, words, count):
     """The blocks of many indices at once; the loop becomes vector code for multiples of eight.
 
     Args:
-        seed, replication, stream, lane, slot: As for ``block``.
+        seed, replication, stream, substream, slot: As for ``block``.
         indices: (R,) running numbers.
         words: (4, R) their words, overwritten.
     """
     key = np.uint64(seed)
     low, high = key & _MASK, key >> _SHIFT
     c1, c3 = np.uint64(slot), np.uint64(replication)
-    c2 = (np.uint64(stream) << np.uint64(24)) | np.uint64(lane)
+    c2 = (np.uint64(stream) << np.uint64(24)) | np.uint64(substream)
     for r in range(count):
         w0, w1, w2, w3 = philox(np.uint64(indices[r]), c1, c2, c3, low, high)
         words[0, r] = w0

@@ -84,13 +84,13 @@ class Reference:
             self._slot()
         return self
 
-    def _word(self, stream: int, lane: int, index: int, word: int) -> int:
+    def _word(self, stream: int, substream: int, index: int, word: int) -> int:
         slot = 0 if stream in (streams.START, streams.INITIAL_DATA) else self.slot
         seed = np.uint64(self.seed)
-        return int(streams.block(seed, self.replication, stream, lane, slot, index)[word])
+        return int(streams.block(seed, self.replication, stream, substream, slot, index)[word])
 
-    def _uniform(self, stream: int, lane: int, index: int, word: int) -> float:
-        return (self._word(stream, lane, index, word) + 0.5) / 2**32
+    def _uniform(self, stream: int, substream: int, index: int, word: int) -> float:
+        return (self._word(stream, substream, index, word) + 0.5) / 2**32
 
     def _slot(self) -> None:
         active = [u for u in self.uavs if u.active]
@@ -169,8 +169,10 @@ class Reference:
         across = self.nodes - (start + n / m * (end - start))
         distance = np.sqrt((across**2).sum(1) + s.altitude**2)
         edge = np.sqrt(2) / 2 * s.grid * s.cell_size
-        lane, word = ((n - 1) // 4) * 2**16 + u.index, (n - 1) % 4
-        draws = [self._uniform(streams.SHADOWING, lane, k, word) for k in range(len(self.nodes))]
+        substream, word = ((n - 1) // 4) * 2**16 + u.index, (n - 1) % 4
+        draws = [
+            self._uniform(streams.SHADOWING, substream, k, word) for k in range(len(self.nodes))
+        ]
         eta = np.sqrt(s.shadowing_variance) * special.ndtri(draws)
         snr = 10 ** (s.edge_snr / 10) * (distance / edge) ** -s.path_loss_exponent
         snr = np.where(self.residual > 0, snr * 10 ** (eta / 10), -1.0)

@@ -17,9 +17,9 @@ import dess
 import policies
 from analysis import load_study
 from analysis.replication import paper
-from benchmarks import learning
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli
+from reports.tools import learning_curves
 
 ROOT = Path(__file__).parents[1]
 PATHS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -275,7 +275,7 @@ def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFix
 
 def test_the_table_of_what_learning_needs_is_that_of_the_shipped_curves() -> None:
     curves = pd.read_parquet(ROOT / "policies/trained/curves.parquet")
-    assert learning.table(curves) in PAGES["docs/learning.md"]
+    assert learning_curves.table(curves) in PAGES["docs/learning.md"]
     for variant in ("quick", "no transfer"):  # Fig. 3: three training seeds, the same budget
         runs = curves[curves["variant"] == variant].groupby("seed")["tick"].max()
         assert len(runs) >= 3

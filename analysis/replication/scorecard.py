@@ -96,16 +96,16 @@ def departures(training: Mapping[str, Any]) -> list[str]:
     Args:
         training: The settings of ``policies.ddqn``, as ``config.json`` of the policy has them.
     """
-    steps, lanes = training["steps"], training["lanes"]
+    n_step, num_envs = training["n_step"], training["num_envs"]
     greedy = all(phase["temperature"] == 0 for phase in training["phases"])
     found = {
         "the return guard, which masks actions that leave no way back": training["guard"],
         "missions that start with little battery": training["low_battery_starts"],
         "early returns": training["early_returns"],
-        f"{steps}-step returns": steps > 1,
+        f"{n_step}-step returns": n_step > 1,
         "the Huber loss": training["loss"] == "huber",
         "epsilon-greedy exploration without softmax": greedy,
-        f"{lanes:,} missions side by side": lanes > 1,
+        f"{num_envs:,} missions side by side": num_envs > 1,
         "a slow copy of the weights, which is the one evaluated": training["average_rate"] < 1,
     }
     return [words for words, ours in found.items() if ours]

@@ -7,7 +7,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
 from dess.env.observation import Observation, observation_names, observation_space, observe
-from dess.env.stepper import Lanes, checked_actions
+from dess.env.stepper import MissionStepper, checked_actions
 from dess.errors import InputError
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES
@@ -35,15 +35,15 @@ class BatchEnv:
     with fewer UAVs has absent ones, and a UAV that has ended stays inactive until its mission is
     over: ``info["active"]`` (N, I) says who acts next. The actions of the others are ignored.
 
-    A mission is reset automatically in the same step (``metadata["autoreset_mode"]``): when its
-    last UAV ends, its lane starts the next mission, and the observation returned is the new one's
-    first. ``info`` then has ``final_obs``, the last observations of the missions that are over, in
-    the rows of their lanes; ``_final_obs`` (N,), which lanes these are; and ``final_records``,
-    their records in the order of the lanes.
+    An environment is reset in the same step (``metadata["autoreset_mode"]``): when the last UAV of
+    its mission ends, it starts the next mission and returns that mission's first observation.
+    ``info`` then has ``final_obs``, the last observations of the missions that ended, in the rows
+    of their environments; ``_final_obs`` (N,), which environments these are; and
+    ``final_records``, their records in the order of the environments.
 
     Missions are numbered as they start: replications 0 to N - 1 at the first reset, then one after
-    the other, lower lanes first. So a seed gives the sequence of missions 0, 1, 2, ... whatever N
-    is, and how a mission goes depends on its number and the actions of its UAVs alone.
+    the other, lower environments first. So a seed gives the sequence of missions 0, 1, 2, ...
+    whatever N is, and a mission depends on its number and the actions of its UAVs alone.
 
     Attributes:
         num_envs: Missions under way (N).
@@ -60,15 +60,15 @@ class BatchEnv:
         if not isinstance(num_envs, int) or num_envs < 1:
             raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
         self.num_envs = num_envs
-        self._lanes = Lanes(scenario, num_envs, seed)
-        self.state, self.world = self._lanes.state, self._lanes.world
+        self._stepper = MissionStepper(scenario, num_envs, seed)
+        self.state, self.world = self._stepper.state, self._stepper.world
         self._components = len(observation_names(scenario))
         self.single_observation_space = observation_space(scenario)
         self.single_action_space = spaces.Discrete(len(ACTION_NAMES))
         self.action_space = spaces.MultiDiscrete(np.full(self.state.uavs.shape, len(ACTION_NAMES)))
 
     def reset(self, seed: int | None = None) -> tuple[Observation, dict[str, np.ndarray]]:
-        """Start a new mission in every lane.
+        """Start a new mission in every environment.
 
         Args:
             seed: Start over with replication 0 of this seed; without it, the numbering goes on.
@@ -80,9 +80,9 @@ class BatchEnv:
             InputError: If the seed is out of range.
         """
         if seed is not None:
-            self._lanes.start_at(seed, 0)
-        self._lanes.launch(self._lanes.numbers)
-        return self._observe(self._lanes.numbers), self._present()
+            self._stepper.start_at(seed, 0)
+        self._stepper.launch(self._stepper.indices)
+        return self._observe(self._stepper.indices), self._present()
 
     def step(
         self, actions: np.ndarray
@@ -94,7 +94,7 @@ class BatchEnv:
 
         Returns:
             Observations; rewards, terminated and truncated (N, I), the last two true in the step
-            in which the UAV ends; and info: of the slot the other arrays of ``lanes.Outcome``, of
+            in which the UAV ends; and info: of the slot the other arrays of ``stepper.Outcome``, of
             which ``acted`` tells the rows that are transitions, of the missions now under way
             ``active`` (N, I) and ``replication`` (N,), and of those that are over ``final_obs``,
             ``_final_obs`` and ``final_records``.
@@ -105,15 +105,15 @@ class BatchEnv:
         missions = self.state.missions
         if not missions["active"].all():
             raise InputError("step: no missions are under way; call reset() first")
-        info = self._lanes.step(checked_actions(actions, self.state.uavs.shape))._asdict()
+        info = self._stepper.step(checked_actions(actions, self.state.uavs.shape))._asdict()
         rewards, terminated, truncated = map(info.pop, ("reward", "terminated", "truncated"))
         over = missions["active"] == 0
         if over.any():
             done = np.nonzero(over)[0]
             info |= {"final_obs": self._observe(done), "_final_obs": over}
-            info["final_records"] = self._lanes.records(done)
-            self._lanes.launch(done)
-        observations = self._observe(self._lanes.numbers)
+            info["final_records"] = self._stepper.records(done)
+            self._stepper.launch(done)
+        observations = self._observe(self._stepper.indices)
         return observations, rewards, terminated, truncated, info | self._present()
 
     def view(self) -> View:
@@ -125,8 +125,8 @@ class BatchEnv:
     def close(self) -> None:
         """Nothing is held open."""
 
-    def _observe(self, lanes: np.ndarray) -> Observation:
-        return observe(self.state, lanes, self._components)
+    def _observe(self, environments: np.ndarray) -> Observation:
+        return observe(self.state, environments, self._components)
 
     def _present(self) -> dict[str, np.ndarray]:
         active, replication = self.state.uavs["active"], self.state.missions["replication"]

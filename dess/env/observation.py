@@ -62,12 +62,12 @@ def observation_space(scenario: Scenario | ScenarioSpace) -> spaces.Dict:
     return spaces.Dict({"observation": vector, "action_mask": mask})
 
 
-def observe(state: State, lanes: np.ndarray, components: int) -> dict[str, np.ndarray]:
+def observe(state: State, environments: np.ndarray, components: int) -> dict[str, np.ndarray]:
     """The observations of some missions of a state, in rows of the same number.
 
     Args:
         state: The state of N missions with up to I UAVs.
-        lanes: The missions to observe; the rows of the others are zeros.
+        environments: The missions to observe; the rows of the others are zeros.
         components: Length of an observation (F).
 
     Returns:
@@ -76,22 +76,22 @@ def observe(state: State, lanes: np.ndarray, components: int) -> dict[str, np.nd
     """
     vector = np.zeros((*state.uavs.shape, components), np.float32)
     mask = np.zeros((*state.uavs.shape, len(ACTION_NAMES)), np.int8)
-    _observe(state, lanes, vector, mask)
+    _observe(state, environments, vector, mask)
     return {"observation": vector, "action_mask": mask}
 
 
 @kernel
-def _observe(state, lanes, vector, mask):
+def _observe(state, environments, vector, mask):
     fleet = state.uavs.shape[1]
-    for lane in lanes:
-        mission, uavs = state.missions[lane], state.uavs[lane]
-        legal = legal_actions(state.missions, state.uavs, np.full(fleet, lane), np.arange(fleet))
+    for b in environments:
+        mission, uavs = state.missions[b], state.uavs[b]
+        legal = legal_actions(state.missions, state.uavs, np.full(fleet, b), np.arange(fleet))
         for i in range(fleet):
-            mask[lane, i, HOVER] = 1
+            mask[b, i, HOVER] = 1
             if i < mission.uavs:
                 if uavs[i].active:
-                    mask[lane, i] = legal[i]
-                _observe_uav(mission, uavs, i, state.residual[lane], vector[lane, i])
+                    mask[b, i] = legal[i]
+                _observe_uav(mission, uavs, i, state.residual[b], vector[b, i])
 
 
 @kernel

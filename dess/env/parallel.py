@@ -14,7 +14,7 @@ from dess.env.observation import (
     observe,
 )
 from dess.env.render import draw
-from dess.env.stepper import REWARD_TERMS, Lanes, Outcome, checked_actions
+from dess.env.stepper import REWARD_TERMS, MissionStepper, Outcome, checked_actions
 from dess.errors import InputError
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
@@ -63,8 +63,8 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"render_mode: {render_mode!r} is unknown; allowed: None, 'rgb_array'")
         self.render_mode = render_mode
-        self._lanes = Lanes(scenario, 1, seed)
-        fleet = self._lanes.space.uavs[1]
+        self._stepper = MissionStepper(scenario, 1, seed)
+        fleet = self._stepper.space.uavs[1]
         self._components = len(observation_names(scenario))
         self.agents: list[str] = []
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
@@ -93,11 +93,11 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         Raises:
             InputError: If the seed or the replication is out of range.
         """
-        lanes, replication = self._lanes, (options or {}).get("replication")
+        stepper, replication = self._stepper, (options or {}).get("replication")
         if seed is not None or replication is not None:
-            lanes.start_at(lanes.seed if seed is None else seed, replication or 0)
-        lanes.launch(lanes.numbers)
-        self.agents = self.possible_agents[: lanes.state.missions["uavs"][0]]
+            stepper.start_at(stepper.seed if seed is None else seed, replication or 0)
+        stepper.launch(stepper.indices)
+        self.agents = self.possible_agents[: stepper.state.missions["uavs"][0]]
         return self._observations(), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
@@ -120,7 +120,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         index = {agent: self.possible_agents.index(agent) for agent in acting}
         row = np.full((1, len(self.possible_agents)), HOVER)
         row[0, list(index.values())] = checked_actions([actions[a] for a in acting], (len(acting),))
-        out = self._lanes.step(row)
+        out = self._stepper.step(row)
         observations = self._observations()
         rewards = {a: float(out.reward[0, i]) for a, i in index.items()}
         terminated = {a: bool(out.terminated[0, i]) for a, i in index.items()}
@@ -135,15 +135,15 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
 
     def record(self) -> MissionRecord:
         """The record of the episode, as far as it has come."""
-        records = self._lanes.records(self._lanes.numbers)
+        records = self._stepper.records(self._stepper.indices)
         return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
 
     def render(self) -> np.ndarray | None:
         """A picture (H, W, 3) of uint8; None without a ``render_mode``."""
-        return draw(self._lanes.space, self._lanes.state) if self.render_mode else None
+        return draw(self._stepper.space, self._stepper.state) if self.render_mode else None
 
     def _observe(self) -> Observation:
-        return observe(self._lanes.state, self._lanes.numbers, self._components)
+        return observe(self._stepper.state, self._stepper.indices, self._components)
 
     def _observations(self) -> dict[str, Observation]:
         """Of the agents that are acting or have just acted."""

@@ -15,18 +15,18 @@ _IDLE, _CHARGING = (255, 255, 255), (0, 0, 0)
 _FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
 
-def draw(space: ScenarioSpace, state: State, lane: int = 0) -> np.ndarray:
+def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray:
     """Draw the zone, the nodes (dark: full of data) and the active UAVs (black frame: charging).
 
     Args:
         space: The scenario of the mission.
         state: The state that holds it.
-        lane: Its number there.
+        environment: Its index there.
 
     Returns:
         (16 M, 16 M, 3) of uint8, north on top.
     """
-    uavs, residual = state.uavs[lane], state.residual[lane]
+    uavs, residual = state.uavs[environment], state.residual[environment]
     image = np.full((space.grid * _CELL, space.grid * _CELL, 3), _SEA, np.uint8)
     x, y, width, height = (value * _CELL for value in space.zone)
     image[y : y + height, x : x + width] = _ZONE

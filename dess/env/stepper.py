@@ -1,4 +1,4 @@
-"""Missions under way that are steered from outside, each in its lane."""
+"""Missions under way that are steered from outside, one per environment."""
 
 from typing import Any, NamedTuple
 
@@ -50,23 +50,23 @@ class Outcome(NamedTuple):
     team_collected: np.ndarray
 
 
-class Lanes:
+class MissionStepper:
     """N missions of one scenario under way.
 
     Attributes:
         space: The space that each mission draws its scenario from.
         state: The arrays of the missions.
         world: The nodes and the path loss table.
-        numbers: (N,) the numbers of the lanes.
+        indices: (N,) the indices 0 to N - 1 of the environments.
     """
 
-    def __init__(self, scenario: Scenario | ScenarioSpace, lanes: int, seed: int):
+    def __init__(self, scenario: Scenario | ScenarioSpace, num_envs: int, seed: int):
         self.space = spaces_of([scenario])[0]
-        self.numbers = np.arange(lanes)
+        self.indices = np.arange(num_envs)
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.world, self._ranges = world_of(self.space), ranges_of(self.space)
         self._constants = constants_of(self.space)
-        self.state, self._scratch = empty_state(lanes, fleet, nodes), empty_scratch(fleet, nodes)
+        self.state, self._scratch = empty_state(num_envs, fleet, nodes), empty_scratch(fleet, nodes)
         self.start_at(seed, 0)
 
     @property
@@ -88,14 +88,14 @@ class Lanes:
         check_seed(seed, replication)
         self._constants["seed"], self._next = seed, replication
 
-    def launch(self, lanes: np.ndarray) -> None:
-        """Put the next replications into these lanes, in this order."""
-        check_seed(self.seed, self._next + len(lanes) - 1)
-        _launch(lanes, self._next, self._constants, self._ranges, self.state)
-        self._next += len(lanes)
+    def launch(self, environments: np.ndarray) -> None:
+        """Put the next replications into these environments, in this order."""
+        check_seed(self.seed, self._next + len(environments) - 1)
+        _launch(environments, self._next, self._constants, self._ranges, self.state)
+        self._next += len(environments)
 
     def step(self, actions: np.ndarray) -> Outcome:
-        """One mission slot of every lane; (N, I) actions 0..4, read of the UAVs that act."""
+        """One mission slot of every environment; (N, I) actions 0..4, read of the UAVs that act."""
         shape = self.state.uavs.shape
         outcome = Outcome(
             acted=np.empty(shape, np.bool_),
@@ -111,24 +111,24 @@ class Lanes:
         _step(self.state, self.world, self._scratch, actions, outcome)
         return outcome
 
-    def records(self, lanes: np.ndarray) -> Records:
-        """The records of these lanes' missions, as far as they have come."""
-        records = empty_records(len(lanes), self.state.uavs.shape[1])
-        for row, lane in enumerate(lanes):
-            mission, uavs, residual = (part[lane] for part in self.state)
+    def records(self, environments: np.ndarray) -> Records:
+        """The records of these environments' missions, as far as they have come."""
+        records = empty_records(len(environments), self.state.uavs.shape[1])
+        for row, b in enumerate(environments):
+            mission, uavs, residual = (part[b] for part in self.state)
             write_record(mission, uavs, residual, records.missions[row], records.uavs[row])
         return records
 
 
 @kernel
-def _launch(lanes, first, constants, ranges, state):
-    """Start the replications from ``first`` on in these lanes."""
-    for n in range(len(lanes)):
-        lane = lanes[n]
-        state.missions[lane] = constants[0]
-        mission = state.missions[lane]
+def _launch(environments, first, constants, ranges, state):
+    """Start the replications from ``first`` on in these environments."""
+    for n in range(len(environments)):
+        b = environments[n]
+        state.missions[b] = constants[0]
+        mission = state.missions[b]
         mission.replication = first + n
-        rules.launch(mission, ranges, state.uavs[lane], state.residual[lane])
+        rules.launch(mission, ranges, state.uavs[b], state.residual[b])
 
 
 @kernel

@@ -104,8 +104,8 @@ def save_training(path: Path, training: Training) -> None:
         tensors |= {f"{name}.{key}": value for key, value in network.items()}
     for index, state in learner.optimizer.state_dict()["state"].items():
         tensors |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
-    for name, array in training.lanes.state._asdict().items():
-        tensors[f"lanes.{name}"] = _bytes(array)
+    for name, array in training.stepper.state._asdict().items():
+        tensors[f"stepper.{name}"] = _bytes(array)
     if training.config.checkpoint_replay:
         for name, array in training.replay.arrays.items():
             tensors[f"replay.{name}"] = torch.from_numpy(array)
@@ -120,7 +120,7 @@ def save_training(path: Path, training: Training) -> None:
         "observation_version": training.observation.version,
         "progress": training.progress(),
         "random": training.generator.bit_generator.state,
-        "lanes": [training.lanes.seed, training.lanes.replication],
+        "stepper": [training.stepper.seed, training.stepper.replication],
         "replay": training.replay.count if training.config.checkpoint_replay else None,
         "curve": training.curve,
     }
@@ -176,10 +176,10 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
         states.setdefault(int(index), {})[field] = value
     groups = learner.optimizer.state_dict()["param_groups"]
     learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
-    training.lanes.start_at(*header["lanes"])
+    training.stepper.start_at(*header["stepper"])
     training.early[...] = tensors["early"].numpy()
-    parts = _part(tensors, "lanes")
-    for name, array in training.lanes.state._asdict().items():
+    parts = _part(tensors, "stepper")
+    for name, array in training.stepper.state._asdict().items():
         array[...] = _array(parts[name], array.dtype).reshape(array.shape)
     if header["replay"] is not None:
         training.replay.count = header["replay"]

@@ -36,7 +36,7 @@ class Phase(_Settings):
     """One phase of Algorithm 1."""
 
     name: str = Field(description="what curves and files call it")
-    ticks: Count = Field(description="slots that every lane flies")
+    ticks: Count = Field(description="mission slots of every environment")
     battery: StrictBool = Field(True, description="whether flying costs battery (line 7, 19)")
     epsilon: tuple[Share, Share] = Field(
         (0.1, 0.1), description="share of random actions at the beginning and the end"
@@ -60,7 +60,7 @@ class TrainingConfig(_Settings):
         1, description="of the training: weights, exploration, missions"
     )
 
-    observation: Literal["vector", "relations", "maps"] = Field(
+    observation: Literal["vector", "nodes", "maps"] = Field(
         "vector", description="(b), (b) with a row per node, or the paper's (a)"
     )
     hidden: tuple[Count, ...] = Field(
@@ -81,13 +81,15 @@ class TrainingConfig(_Settings):
     phases: tuple[Phase, ...] = Field(
         min_length=1, max_length=8, description="of Algorithm 1, in order"
     )
-    lanes: Count = Field(64, description="missions that fly side by side")
-    prefill: Count = Field(1000, description="slots per lane flown at random before learning")
-    replay: Count = Field(8000, description="slots per lane that the replay memory holds")
+    num_envs: Count = Field(64, description="missions that are simulated side by side")
+    learning_starts: Count = Field(
+        1000, description="slots of random actions per environment before learning starts"
+    )
+    replay: Count = Field(8000, description="slots per environment that the replay memory holds")
     batch: Count = Field(512, description="transitions per update")
     updates: Count = Field(1, description="updates per tick")
 
-    steps: Count = Field(5, description="n of the n-step return")
+    n_step: Count = Field(5, description="n of the n-step return")
     discount: Rate = Field(0.99, description="gamma per slot")
     reward_scale: float = Field(0.05, gt=0.0, description="factor of all rewards")
     loss: Literal["huber", "mse"] = Field("huber", description="of the difference to the target")
@@ -111,11 +113,13 @@ class TrainingConfig(_Settings):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
-        if self.replay < self.steps + 2:  # of two slots a lane has flown at least one
-            raise ValueError(f"replay: {self.replay} is not above steps {self.steps} + 1")
-        if self.prefill <= self.steps:
-            raise ValueError(f"prefill: {self.prefill} is not above steps {self.steps}")
-        if self.observation == "relations" and len(self.hidden) < 2:
+        if self.replay < self.n_step + 2:  # of two slots an environment has simulated at least one
+            raise ValueError(f"replay: {self.replay} is not above n_step {self.n_step} + 1")
+        if self.learning_starts <= self.n_step:
+            raise ValueError(
+                f"learning_starts: {self.learning_starts} is not above n_step {self.n_step}"
+            )
+        if self.observation == "nodes" and len(self.hidden) < 2:
             raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
         if self.evaluation_seed == MISSION_SEED + self.seed:
             raise ValueError(f"evaluation_seed: {self.evaluation_seed} is that of the training")

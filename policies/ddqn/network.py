@@ -102,7 +102,7 @@ class NodeNetwork(nn.Module):
         """Make the layers.
 
         Args:
-            shapes: Shapes of one row of the vector and of the nodes (``Relations.shapes``).
+            shapes: Shapes of one row of the vector and of the nodes (``Nodes.shapes``).
             hidden: Widths: of what is known of a node, of the own vector, then of the layers on
                 both.
             precision: Of the hidden layers, float32 or bfloat16.

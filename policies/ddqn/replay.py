@@ -1,8 +1,8 @@
 """The replay memory shared by all UAVs: compact states in the order in which they happened.
 
-A ring of T slots x N lanes. Row t of a lane holds the state before the slot, what each UAV did and
-what came of it; the state after n slots is row t + n. So a state is stored once, whatever n is.
-A lane gives every mission one last row, after its end, in which nobody acts.
+A ring of T slots x N environments. Row t of an environment holds the state before the slot, the
+action of each UAV and its reward; the state after n slots is row t + n. So a state is stored once,
+whatever n is. Each mission has one last row, after its end, in which no UAV acts.
 """
 
 from typing import NamedTuple
@@ -37,19 +37,19 @@ class Batch(NamedTuple):
 
 
 class ReplayMemory:
-    """A ring of the last T slots of N lanes.
+    """A ring of the last T slots of N environments.
 
     Attributes:
-        capacity: T [mission slots per lane].
+        capacity: T [mission slots per environment].
         count: Slots added since the beginning; the last ``capacity`` of them are there.
         arrays: Name -> array, all that the memory consists of.
     """
 
-    def __init__(self, capacity: int, lanes: int, uavs: int, nodes: int):
-        self.capacity, self.lanes, self.uavs = capacity, lanes, uavs
+    def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
+        self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
         self.count = 0
-        self._states = empty_snapshots(capacity * lanes, uavs, nodes)
-        shape = (capacity * lanes, uavs)
+        self._states = empty_snapshots(capacity * num_envs, uavs, nodes)
+        shape = (capacity * num_envs, uavs)
         self._action = np.zeros(shape, np.int8)
         self._reward = np.zeros(shape, np.float32)
         self._acted = np.zeros(shape, np.bool_)
@@ -64,10 +64,10 @@ class ReplayMemory:
         }
 
     @staticmethod
-    def bytes_for(capacity: int, lanes: int, uavs: int, nodes: int) -> int:
+    def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
         """Memory that such a ring takes [bytes]."""
         one = ReplayMemory(1, 1, uavs, nodes)
-        return capacity * lanes * sum(array.nbytes for array in one.arrays.values())
+        return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
     def add(
         self,
@@ -78,9 +78,9 @@ class ReplayMemory:
         terminated: np.ndarray,
         truncated: np.ndarray,
     ) -> None:
-        """Add one slot of all lanes: the states before it, then (N, I) arrays of what happened."""
-        first = self.count % self.capacity * self.lanes
-        here = slice(first, first + self.lanes)
+        """Add one slot of all environments: the states before it and (N, I) arrays of outcomes."""
+        first = self.count % self.capacity * self.num_envs
+        here = slice(first, first + self.num_envs)
         for ring, new in zip(self._states, states, strict=True):
             ring[here] = new
         self._action[here], self._reward[here], self._acted[here] = action, reward, acted
@@ -88,7 +88,7 @@ class ReplayMemory:
         self.count += 1
 
     def sample(
-        self, size: int, steps: int, discount: float, generator: np.random.Generator
+        self, size: int, n_step: int, discount: float, generator: np.random.Generator
     ) -> Batch:
         """Draw transitions uniformly, with replacement, among those whose later state is there.
 
@@ -96,24 +96,26 @@ class ReplayMemory:
 
         Args:
             size: Transitions (B).
-            steps: n of the n-step return.
+            n_step: n of the n-step return.
             discount: Discount factor gamma per slot.
             generator: Source of the draw.
 
         Raises:
-            ValueError: If fewer than ``steps + 1`` slots have been added, or in none of them a UAV
+            ValueError: If fewer than ``n_step + 1`` slots have been added, or in none of them a UAV
                 has done anything that can be learned from.
         """
         newest = self.count - 1
         oldest = max(0, self.count - self.capacity)
-        if newest - oldest < steps:
-            raise ValueError(f"{self.count} slots in memory: too few for {steps}-step returns")
+        if newest - oldest < n_step:
+            raise ValueError(f"{self.count} slots in memory: too few for {n_step}-step returns")
         rows: list[np.ndarray] = []
         uavs: list[np.ndarray] = []
         missing = size
         while missing > 0:
-            slot = generator.integers(oldest, newest - steps + 1, 2 * missing + 16)
-            row = slot % self.capacity * self.lanes + generator.integers(0, self.lanes, len(slot))
+            slot = generator.integers(oldest, newest - n_step + 1, 2 * missing + 16)
+            row = slot % self.capacity * self.num_envs + generator.integers(
+                0, self.num_envs, len(slot)
+            )
             uav = generator.integers(0, self.uavs, len(slot))
             good = self._acted[row, uav] & ~self._truncated[row, uav]
             keep = np.nonzero(good)[0][:missing]
@@ -126,7 +128,7 @@ class ReplayMemory:
         later, reward = np.empty(size, np.int64), np.empty(size, np.float32)
         factor = np.empty(size, np.float32)
         _returns(
-            row, uav, steps, discount, self.lanes, self._reward, self._terminated,
+            row, uav, n_step, discount, self.num_envs, self._reward, self._terminated,
             self._truncated, later, reward, factor,
         )  # fmt: skip
         return Batch(
@@ -136,7 +138,7 @@ class ReplayMemory:
 
 @kernel
 def _returns(
-    rows, uavs, steps, discount, lanes, rewards, terminated, truncated, later, total, factor
+    rows, uavs, n_step, discount, num_envs, rewards, terminated, truncated, later, total, factor
 ):
     """n-step returns: they end where the UAV's mission does.
 
@@ -147,10 +149,10 @@ def _returns(
     for b in range(len(rows)):
         row, i = rows[b], uavs[b]
         value, weight = 0.0, 1.0
-        for _ in range(steps):
+        for _ in range(n_step):
             if truncated[row, i] or weight == 0.0:
                 break
             value += weight * rewards[row, i]
             weight = 0.0 if terminated[row, i] else weight * discount
-            row = (row + lanes) % size
+            row = (row + num_envs) % size
         later[b], total[b], factor[b] = row, value, weight

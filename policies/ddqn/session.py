@@ -52,7 +52,7 @@ def device_of(name: str) -> torch.device:
 def memory_of(config: TrainingConfig) -> int:
     """What the replay memory of a config takes [bytes]."""
     space = load_scenario(config.scenario)
-    return ReplayMemory.bytes_for(config.replay, config.lanes, space.uavs[1], len(space.nodes))
+    return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
 
 
 def train(
@@ -99,7 +99,7 @@ def train(
     except MemoryError as error:
         raise InputError(
             f"replay: the memory takes {memory_of(config) / 2**30:.1f} GiB, too much for this "
-            "machine; allowed: fewer lanes or slots"
+            "machine; allowed: fewer environments or slots"
         ) from error
     if not resume:
         try:

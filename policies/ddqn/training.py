@@ -1,9 +1,8 @@
-"""Algorithm 1: missions fly side by side, all UAVs learn one network from one memory.
+"""Algorithm 1: many missions run in parallel; all UAVs train one network from one replay memory.
 
-A *tick* is one mission slot of all lanes, followed by the updates. Training missions, the missions
-that select the weights and those of an evaluation have seeds of their own: missions of training
-have ``MISSION_SEED`` + the seed of the training, those of selection the config's
-``evaluation_seed``; every other seed is free for evaluations.
+A *tick* is one mission slot of all environments, followed by the updates. Missions of training, of
+the selection of weights and of evaluations have different seeds: ``MISSION_SEED`` + the seed of the
+training, the config's ``evaluation_seed``, and any other.
 """
 
 import time
@@ -15,7 +14,7 @@ from torch import nn
 
 from dess.batch import simulate_batch
 from dess.compiled import kernel
-from dess.env.stepper import Lanes
+from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -23,7 +22,7 @@ from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
 from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.observations.maps import POOL, Maps
-from policies.ddqn.observations.nodes import Relations
+from policies.ddqn.observations.nodes import Nodes
 from policies.ddqn.observations.states import (
     ACTIVE,
     BATTERY,
@@ -45,7 +44,7 @@ from policies.ddqn.replay import ReplayMemory
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
-OBSERVATIONS: dict[str, Any] = {"vector": Vector, "relations": Relations, "maps": Maps}
+OBSERVATIONS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
 # What of a training is a plain value.
 _PROGRESS = (
@@ -65,13 +64,12 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
     precision = getattr(torch, config.precision)
     if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
         raise InputError(
-            f"observation: a grid of {layout.grid} is too small for maps; "
-            "allowed: vector, relations"
+            f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, nodes"
         )
     observation = OBSERVATIONS[config.observation](layout)
     if config.observation == "maps":
         return observation, PaperNetwork(observation.shapes, precision)
-    if config.observation == "relations":
+    if config.observation == "nodes":
         return observation, NodeNetwork(observation.shapes, config.hidden, precision)
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
@@ -120,16 +118,16 @@ class Training:
             self.seconds += time.perf_counter() - began
 
     def step(self) -> None:
-        """One tick: a slot of all lanes, the updates, an evaluation and the next phase if due."""
+        """Run one tick: a slot of all environments, the updates and, if due, an evaluation."""
         share = (self.tick - self.phase_start) / self.phase.ticks
         epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
         if self.replay.count == 0:
-            for _ in range(self.config.prefill):
+            for _ in range(self.config.learning_starts):
                 self._fly(1.0 if self.tick == 0 else epsilon)
         self._fly(epsilon)
         for _ in range(self.config.updates):
             batch = self.replay.sample(
-                self.config.batch, self.config.steps, self.config.discount, self.generator
+                self.config.batch, self.config.n_step, self.config.discount, self.generator
             )
             rate = _between(self.phase.learning_rate, share)
             self.losses.append(self.learner.update(batch, rate))
@@ -171,42 +169,44 @@ class Training:
         cost = 1 if self.phase.battery else 0
         self.phase_space = ScenarioSpace.of(self.space, flight_cost=cost)
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
-        self.lanes = Lanes(self.phase_space, config.lanes, MISSION_SEED + config.seed)
-        self.lanes.start_at(self.lanes.seed, index * MISSIONS_PER_PHASE)
-        self.early = np.zeros((config.lanes, fleet), bool)
-        self._launch(self.lanes.numbers)
-        self.replay = ReplayMemory(config.replay, config.lanes, fleet, nodes)
+        self.stepper = MissionStepper(self.phase_space, config.num_envs, MISSION_SEED + config.seed)
+        self.stepper.start_at(self.stepper.seed, index * MISSIONS_PER_PHASE)
+        self.early = np.zeros((config.num_envs, fleet), bool)
+        self._launch(self.stepper.indices)
+        self.replay = ReplayMemory(config.replay, config.num_envs, fleet, nodes)
         self.learner.restart()
         self.scores: list[float] = []
         self.best_score: float | None = None
 
-    def _launch(self, lanes: np.ndarray) -> None:
+    def _launch(self, environments: np.ndarray) -> None:
         """Start new missions, some of them in the zone on a low battery; who returns early?"""
-        self.lanes.launch(lanes)
-        draws = self.generator.random((len(lanes), self.early.shape[1]))
-        self.early[lanes] = draws < self.config.early_returns
-        if self.config.low_battery_starts > 0 and len(lanes):
-            low = lanes[self.generator.random(len(lanes)) < self.config.low_battery_starts]
+        self.stepper.launch(environments)
+        draws = self.generator.random((len(environments), self.early.shape[1]))
+        self.early[environments] = draws < self.config.early_returns
+        if self.config.low_battery_starts > 0 and len(environments):
+            low = environments[
+                self.generator.random(len(environments)) < self.config.low_battery_starts
+            ]
             draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
-            _run_low(*self.lanes.state, low, draws)
+            _run_low(*self.stepper.state, low, draws)
 
     def _fly(self, epsilon: float) -> None:
-        """One slot of all lanes under the exploring policy; remember it."""
-        state = self.lanes.state
+        """One slot of all environments under the exploring policy; remember it."""
+        state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
         states = snapshot(state, self.config.guard)
         missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
         actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
-        outcome = self.lanes.step(actions)
+        outcome = self.stepper.step(actions)
         self.replay.add(
             states, actions, outcome.reward, outcome.acted, outcome.terminated, outcome.truncated
         )
         self.uav_slots += int(outcome.acted.sum())
         ended = np.nonzero((state.missions["active"] == 0) & outcome.acted.any(1))[0]
         if len(ended):
-            self.finished.append(self.lanes.records(ended).missions)
+            self.finished.append(self.stepper.records(ended).missions)
         self._launch(over)
 
     def _explore(
@@ -291,20 +291,20 @@ def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
 
 
 @kernel
-def _run_low(missions, uavs, residual, lanes, draws):
+def _run_low(missions, uavs, residual, environments, draws):
     """Make newly launched missions ones that have flown: in the zone, latched, on a low battery.
 
     The battery is somewhere from 5 % to C_S, the same for the whole team as it is after a flight
     together. The quota is as far filled as that flight would have, and some share of the nodes,
     any from none to all, is empty.
     """
-    for n in range(len(lanes)):
-        mission, data = missions[lanes[n]], residual[lanes[n]]
+    for n in range(len(environments)):
+        mission, data = missions[environments[n]], residual[environments[n]]
         span = mission.charge_start - 5 + 1
         battery = min(5 + int(draws[n, 0] * span), mission.charge_start)
         flown = max(mission.flying_time - battery, 0)
         for i in range(mission.uavs):
-            u = uavs[lanes[n], i]
+            u = uavs[environments[n], i]
             u.battery = battery
             u.communications = min(flown * mission.communication_slots, mission.quota - 1)
             u.latch = True

@@ -193,8 +193,8 @@ display(
 # - **early returns**: some UAVs come home to charge as soon as they may.
 # - **none of the three**: none of these; the paper's means alone.
 # - **transfer**: phase I without battery decrease comes first.
-# - **relations**, **maps**: another observation and network; **maps** is the paper's.
-# - **lanes**: missions side by side; fewer bring less fresh experience per update.
+# - **nodes**, **maps**: another observation and network; **maps** is the paper's.
+# - **environments**: missions side by side; fewer bring less fresh experience per update.
 
 # %%
 last = curves.finals(trainings)
@@ -344,7 +344,7 @@ display(
 display(
     Markdown(
         "No study is read: the curves come with the policies, in `policies/trained`. To make them "
-        "anew:\n\n- `python benchmarks/learning.py --out runs/learning`"
+        "anew:\n\n- `python -m reports.tools.learning_curves --out runs/learning`"
         + "".join(
             f"\n- `dess train {config['name']} --seed {config['seed']} --out runs/{name}`"
             for name, config in configs.items()
@@ -360,7 +360,7 @@ html.table(
                 ", ".join(f"{p['name']} ({p['ticks']:,} ticks)" for p in config["phases"]),
                 config["seed"],
                 f"{config['discount']:g}",
-                config["steps"],
+                config["n_step"],
             ]
             for name, config in configs.items()
         ],

@@ -62,7 +62,7 @@ def _equal(one: Records, other: Records) -> bool:
 def test_both_engines_give_the_same_record(
     space: ScenarioSpace, team: Sequence[Any], seed: int, numbers: list[int]
 ) -> None:
-    records = simulate_batch(space, team, seed, numbers, lanes=2)
+    records = simulate_batch(space, team, seed, numbers, batch_size=2)
     for job, replication in enumerate(numbers):
         assert _is(records, job, simulate(space, team, seed, replication))
     for name, code in (("quota", QUOTA), ("battery", BATTERY), ("truncated", TRUNCATED)):
@@ -132,10 +132,10 @@ def test_a_batch_is_its_missions_in_any_order_and_grouping() -> None:
     numbers = np.array([5, 3, 2**32 - 1, 0, 77, 3, 12, 8])
     whole = simulate_batch(BUSY, Fidget(), 9, numbers)
     assert whole.missions["replication"].tolist() == numbers.tolist()
-    for lanes in (1, 3, 100):
-        assert _equal(simulate_batch(BUSY, Fidget(), 9, numbers, lanes=lanes), whole)
+    for batch_size in (1, 3, 100):
+        assert _equal(simulate_batch(BUSY, Fidget(), 9, numbers, batch_size=batch_size), whole)
     order = np.random.default_rng(1).permutation(len(numbers))
-    shuffled = simulate_batch(BUSY, Fidget(), 9, numbers[order], lanes=4)
+    shuffled = simulate_batch(BUSY, Fidget(), 9, numbers[order], batch_size=4)
     assert _equal(shuffled, Records(whole.missions[order], whole.uavs[order]))
     for job, number in enumerate(numbers):
         alone = simulate_batch(BUSY, Fidget(), 9, [number])
@@ -156,7 +156,9 @@ def test_scenarios_of_different_worlds_fly_in_one_batch(
     mixed = worlds + [ScenarioSpace.of(space, uavs=1) for space in worlds]
     mixed = data.draw(st.permutations(mixed))
     workers = data.draw(st.integers(1, 2))
-    records = simulate_batch(mixed, Fidget(), seed, range(len(mixed)), workers=workers, lanes=2)
+    records = simulate_batch(
+        mixed, Fidget(), seed, range(len(mixed)), workers=workers, batch_size=2
+    )
     for job, space in enumerate(mixed):
         assert _is(records, job, simulate(space, Fidget(), seed, job))
 
@@ -177,7 +179,7 @@ def test_a_count_of_replications_counts_from_0() -> None:
 @pytest.mark.parametrize("workers", [1, 2])
 def test_progress_counts_every_mission_once(workers: int) -> None:
     finished: list[int] = []
-    simulate_batch(BUSY, Wanderer(), 1, 30, lanes=4, workers=workers, progress=finished.append)
+    simulate_batch(BUSY, Wanderer(), 1, 30, batch_size=4, workers=workers, progress=finished.append)
     assert sum(finished) == 30
     assert len(finished) > 1
     assert min(finished) > 0
@@ -353,7 +355,7 @@ def test_bad_replications_and_workers_are_refused() -> None:
         simulate_batch(BUSY, Wanderer(), 0, [-1, 4])
     with pytest.raises(ValueError, match="integers"):
         simulate_batch(BUSY, Wanderer(), 0, [0.5])
-    for wrong in ({"workers": 0}, {"lanes": 0}):
+    for wrong in ({"workers": 0}, {"batch_size": 0}):
         with pytest.raises(ValueError, match="at least 1"):
             simulate_batch(BUSY, Wanderer(), 0, 3, **wrong)
 

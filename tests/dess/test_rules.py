@@ -361,9 +361,9 @@ def _reference_snr(
     d = np.sqrt((x - nodes[:, 0]) ** 2 + (y - nodes[:, 1]) ** 2 + scenario.altitude**2)
     d_edge = np.sqrt(2) / 2 * scenario.grid * c
     mean = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(d / d_edge)
-    lane, word = ((n - 1) // 4 << 16) + i, (n - 1) % 4
+    substream, word = ((n - 1) // 4 << 16) + i, (n - 1) % 4
     words = [
-        streams.block(np.uint64(seed), replication, streams.SHADOWING, lane, slot, k)[word]
+        streams.block(np.uint64(seed), replication, streams.SHADOWING, substream, slot, k)[word]
         for k in range(len(nodes))
     ]
     eta = special.ndtri((np.array(words, np.float64) + 0.5) / 2**32)

@@ -41,11 +41,11 @@ def test_philox_gives_the_published_answers(counter: str, key: str, words: str) 
 
 
 def test_a_block_is_philox_of_its_coordinates() -> None:
-    seed, replication, stream, lane, slot, index = 2**64 - 2, 2**32 - 3, 4, 2**24 - 5, 6, 7
-    counter = [index, slot, (stream << 24) + lane, replication]
+    seed, replication, stream, substream, slot, index = 2**64 - 2, 2**32 - 3, 4, 2**24 - 5, 6, 7
+    counter = [index, slot, (stream << 24) + substream, replication]
     key = [seed % 2**32, seed // 2**32]
     expected = streams.philox(*(np.uint64(word) for word in counter + key))
-    assert streams.block(np.uint64(seed), replication, stream, lane, slot, index) == expected
+    assert streams.block(np.uint64(seed), replication, stream, substream, slot, index) == expected
 
 
 COORDINATES = st.tuples(

@@ -59,9 +59,11 @@ def test_heuristics_are_legal_safe_and_without_memory(
     st.integers(1, 4),
 )
 def test_heuristics_do_the_same_in_any_batch(
-    space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], lanes: int
+    space: ScenarioSpace, team: list[Any], seed: int, numbers: list[int], batch_size: int
 ) -> None:
-    records = simulate_batch(space, team, seed, numbers, lanes=lanes, workers=1 + lanes % 2)
+    records = simulate_batch(
+        space, team, seed, numbers, batch_size=batch_size, workers=1 + batch_size % 2
+    )
     for job, number in enumerate(numbers):
         single = simulate(space, team, seed, number)
         assert single.metrics.tobytes() == records.missions[job].tobytes()

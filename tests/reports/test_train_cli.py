@@ -20,7 +20,7 @@ from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, one_thread, write
 
 SHORT = {
     "phases": [phase | {"ticks": 10} for phase in PHASES],
-    "prefill": 20,
+    "learning_starts": 20,
     "evaluate_every": 5,
 }
 
@@ -93,7 +93,7 @@ BAD = {
     "train tiny.toml --out out --resume": ["out/checkpoint.safetensors: no such file"],
     "train tiny.toml --out tiny.toml": ["tiny.toml: cannot be written"],
     "train tiny.toml --out done": ["done: holds a training", "--resume", "another folder"],
-    "train other.toml --out done --resume": ["of another config (lanes differ)"],
+    "train other.toml --out done --resume": ["of another config (num_envs differ)"],
     "evaluate --policy broken": ["broken/config.json: no readable description of a policy"],
     "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
 }
@@ -104,7 +104,7 @@ def test_bad_input_gets_one_line_and_changes_nothing(arguments, dess, tmp_path, 
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     if "done" in arguments:
         assert dess("train", "tiny.toml", "--out", "done")[0] == 0
-        text = (tmp_path / "tiny.toml").read_text().replace("lanes = 8", "lanes = 4")
+        text = (tmp_path / "tiny.toml").read_text().replace("num_envs = 8", "num_envs = 4")
         (tmp_path / "other.toml").write_text(text)
     for name in ("broken", "empty"):
         (tmp_path / name).mkdir()

@@ -12,7 +12,7 @@ from policies.ddqn.observations.vector import DATA_UNIT, SCALES, Vector, lead_of
 NODE = 22
 
 
-class Relations:
+class Nodes:
     """The observation of one UAV as a vector and one row per node.
 
     Attributes:

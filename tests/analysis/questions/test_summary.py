@@ -106,7 +106,9 @@ def trained_twice(tmp_path):
     scenario, folders = str(write_scenario(tmp_path)), []
     for seed, discount in ((1, 0.99), (2, 0.99), (1, 0.9)):
         phases = [PHASES[1] | {"ticks": 3}]
-        config = tiny(scenario=scenario, seed=seed, discount=discount, prefill=5, phases=phases)
+        config = tiny(
+            scenario=scenario, seed=seed, discount=discount, learning_starts=5, phases=phases
+        )
         training = Training(config, CPU)
         training.run(2)
         folders.append(str(tmp_path / f"{seed}-{discount}"))

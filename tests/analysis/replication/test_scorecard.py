@@ -392,8 +392,8 @@ def test_what_of_the_paper_s_network_is_ours() -> None:
     config = json.loads((TRAINED / module.PAPERS_NETWORK / "config.json").read_text("utf-8"))
     training = config["training"]
     words = ", ".join(departures(training))
-    assert "return guard" in words and f"{training['steps']}-step returns" in words
-    assert f"{training['lanes']} missions" in words and "early returns" not in words
-    papers = {"guard": False, "steps": 1, "lanes": 1, "average_rate": 1.0, "loss": "mse"}
+    assert "return guard" in words and f"{training['n_step']}-step returns" in words
+    assert f"{training['num_envs']} missions" in words and "early returns" not in words
+    papers = {"guard": False, "n_step": 1, "num_envs": 1, "average_rate": 1.0, "loss": "mse"}
     softmax = {"phases": [{"temperature": 0.1}]}
     assert departures(training | papers | softmax) == []

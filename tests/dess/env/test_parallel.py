@@ -268,17 +268,17 @@ def whim(replication: int, slot: int, uav: int) -> int:
 
 def batch_actions(env: BatchEnv) -> np.ndarray:
     """The whims of all UAVs of a batch."""
-    lanes = [(int(m["replication"]), int(m["slot"])) for m in env.state.missions]
-    return np.array([[whim(*lane, i) for i in range(env.state.uavs.shape[1])] for lane in lanes])
+    places = [(int(m["replication"]), int(m["slot"])) for m in env.state.missions]
+    return np.array([[whim(*b, i) for i in range(env.state.uavs.shape[1])] for b in places])
 
 
 QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], charge_start=[10, 50], max_slots=60)
 
 
-def assert_same(told: dict, batch: dict, lane: int) -> None:
-    """What the single environment told of its agents stands in the lane's rows of the batch."""
+def assert_same(told: dict, batch: dict, b: int) -> None:
+    """The single environment's observations equal those in row ``b`` of the batch."""
     for agent, observation in told.items():
-        row = (lane, int(agent.removeprefix("uav_")))
+        row = (b, int(agent.removeprefix("uav_")))
         assert all(np.array_equal(observation[key], batch[key][row]) for key in batch)
 
 
@@ -287,28 +287,28 @@ def test_lanes_of_a_batch_are_single_episodes(num_envs: int) -> None:
     batch = dess.batch_env(QUICK, num_envs, seed=5)
     singles = [dess.parallel_env(QUICK, seed=5) for _ in range(num_envs)]
     observations, info = batch.reset()
-    for lane, single in enumerate(singles):
-        assert_same(single.reset(options={"replication": lane})[0], observations, lane)
+    for b, single in enumerate(singles):
+        assert_same(single.reset(options={"replication": b})[0], observations, b)
     finished = 0
     for _ in range(180):
         actions = batch_actions(batch)
         observations, *outcome, info = batch.step(actions)
         over = info.get("_final_obs", np.zeros(num_envs, bool))
-        for lane, single in enumerate(singles):
+        for b, single in enumerate(singles):
             rows = [single.possible_agents.index(agent) for agent in single.agents]
-            assert info["acted"][lane].nonzero()[0].tolist() == rows
-            assert all(not part[lane][~info["acted"][lane]].any() for part in outcome)
-            told, *expected, _ = single.step({f"uav_{i}": actions[lane, i] for i in rows})
-            assert_same(told, info["final_obs"] if over[lane] else observations, lane)
+            assert info["acted"][b].nonzero()[0].tolist() == rows
+            assert all(not part[b][~info["acted"][b]].any() for part in outcome)
+            told, *expected, _ = single.step({f"uav_{i}": actions[b, i] for i in rows})
+            assert_same(told, info["final_obs"] if over[b] else observations, b)
             for part, values in zip(outcome, expected, strict=True):
-                assert part[lane, rows].tolist() == list(values.values())
-            assert over[lane] == (not single.agents)
-            if over[lane]:
-                metrics, uavs = (part[over[:lane].sum()] for part in info["final_records"])
+                assert part[b, rows].tolist() == list(values.values())
+            assert over[b] == (not single.agents)
+            if over[b]:
+                metrics, uavs = (part[over[:b].sum()] for part in info["final_records"])
                 assert single.record().metrics == metrics
                 assert np.array_equal(single.record().uavs, uavs[: metrics["uavs"]])
-                told, _ = single.reset(options={"replication": info["replication"][lane]})
-                assert_same(told, observations, lane)
+                told, _ = single.reset(options={"replication": info["replication"][b]})
+                assert_same(told, observations, b)
                 finished += 1
     assert finished > num_envs
 
@@ -328,7 +328,7 @@ def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
     assert started == list(range(len(started)))
     assert len(started) > num_envs
     _, info = env.reset()  # goes on
-    assert info["replication"].tolist() == [len(started) + lane for lane in range(num_envs)]
+    assert info["replication"].tolist() == [len(started) + b for b in range(num_envs)]
     again, info = env.reset(seed=1)
     assert info["replication"].tolist() == list(range(num_envs))
     fresh, _ = dess.batch_env(QUICK, num_envs, seed=1).reset()

@@ -33,7 +33,7 @@ from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny
 @pytest.fixture
 def training() -> Training:
     """A training that has just begun."""
-    training = Training(tiny(prefill=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
+    training = Training(tiny(learning_starts=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
     training.run(2)
     return training
 
@@ -72,10 +72,10 @@ def _refusal(load: Callable[..., Any], *arguments: Any) -> str:
         {},
         {"guard": False},
         {"precision": "bfloat16"},
-        {"observation": "relations"},
+        {"observation": "nodes"},
         {"observation": "maps"},
     ],
-    ids=["vector", "free", "bfloat16", "relations", "maps"],
+    ids=["vector", "free", "bfloat16", "nodes", "maps"],
 )
 def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) -> None:
     training = Training(tiny(**changes), CPU)
@@ -297,8 +297,8 @@ def test_the_checkpoint_of_another_version_is_refused(training: Training, file: 
         {"average.value.bias": torch.zeros(3)},
         {"best.value.bias": torch.zeros(1, dtype=torch.float64)},
         {"target.other": torch.zeros(1)},
-        {"lanes.uavs": None},
-        {"lanes.uavs": torch.zeros(7, dtype=torch.uint8)},
+        {"stepper.uavs": None},
+        {"stepper.uavs": torch.zeros(7, dtype=torch.uint8)},
         {"replay.reward": None},
         {"replay.reward": torch.zeros(3, 3)},
         {"random.torch": None},
@@ -317,7 +317,7 @@ def test_a_damaged_checkpoint_is_refused(
 
 @pytest.mark.parametrize(
     "header",
-    [{"progress": {}}, {"random": {}}, {"lanes": [1]}, {"lanes": [-1, 0]}, {"config": {}}],
+    [{"progress": {}}, {"random": {}}, {"stepper": [1]}, {"stepper": [-1, 0]}, {"config": {}}],
     ids=str,
 )
 def test_a_damaged_header_is_refused(
@@ -329,7 +329,7 @@ def test_a_damaged_header_is_refused(
 
 def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path: Path) -> None:
     scenario = write_scenario(tmp_path)
-    training = Training(tiny(scenario=str(scenario), prefill=5), CPU)
+    training = Training(tiny(scenario=str(scenario), learning_starts=5), CPU)
     training.run(1)
     save_training(tmp_path / CHECKPOINT, training)
     write_scenario(tmp_path, nodes=[[1, 1], [2, 2]])

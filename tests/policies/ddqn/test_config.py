@@ -13,9 +13,9 @@ PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"speed": 1}, "speed: unknown key"),
     ({"phases": [PHASE | {"speed": 1}]}, "phases.0.speed: unknown key"),
-    ({"lanes": "many"}, "lanes: "),
-    ({"lanes": 8.0}, "lanes: "),
-    ({"lanes": 0}, "lanes: "),
+    ({"num_envs": "many"}, "num_envs: "),
+    ({"num_envs": 8.0}, "num_envs: "),
+    ({"num_envs": 0}, "num_envs: "),
     ({"batch": True}, "batch: "),
     ({"seed": -1}, "seed: "),
     ({"name": 3}, "name: "),
@@ -23,7 +23,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"hidden": [16, 0]}, "hidden.1: "),
     ({"hidden": 16}, "hidden: "),
     ({"observation": "radar"}, "observation: "),
-    ({"observation": "relations", "hidden": [8]}, "hidden: [8] "),
+    ({"observation": "nodes", "hidden": [8]}, "hidden: [8] "),
     ({"precision": "float16"}, "precision: "),
     ({"loss": "l1"}, "loss: "),
     ({"discount": 1.5}, "discount: "),
@@ -36,8 +36,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [PHASE | {"epsilon": [0.5]}]}, "phases.0.epsilon"),
     ({"phases": [PHASE | {"epsilon": [0.5, 2]}]}, "phases.0.epsilon.1: "),
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
-    ({"steps": 60}, "prefill: 60 is not above steps 60"),
-    ({"replay": 4, "steps": 3}, "replay: 4 is not above steps 3 + 1"),
+    ({"n_step": 60}, "learning_starts: 60 is not above n_step 60"),
+    ({"replay": 4, "n_step": 3}, "replay: 4 is not above n_step 3 + 1"),
     ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: fig1, fig4, paper"),
 ]
 
@@ -66,7 +66,7 @@ def test_a_file_that_is_no_config_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         load_config(tmp_path)
     path = tmp_path / "bad.toml"
-    path.write_text("lanes = [8", "utf-8")
+    path.write_text("num_envs = [8", "utf-8")
     with pytest.raises(InputError, match=r"bad\.toml: not valid TOML"):
         load_config(path)
     path.write_bytes(b"name = '\xff'")
@@ -87,7 +87,7 @@ def test_a_file_holds_what_it_says(tmp_path: Path) -> None:
 
 def test_overrides_come_last(tmp_path: Path) -> None:
     path = write_config(tmp_path)
-    assert load_config(path, seed=5, lanes=4) == tiny(seed=5, lanes=4)
+    assert load_config(path, seed=5, num_envs=4) == tiny(seed=5, num_envs=4)
     with pytest.raises(InputError, match="seed: "):
         load_config(path, seed=-5)
 

@@ -78,10 +78,10 @@ def test_at_rate_one_it_is_a_copy() -> None:
 
 def _learner(**changes: Any) -> tuple[Learner, Batch]:
     """A new learner, and a batch of what a tiny training has seen."""
-    flown = tiny(prefill=300, replay=300, phases=PHASES[1:])  # some missions end
+    flown = tiny(learning_starts=300, replay=300, phases=PHASES[1:])  # some missions end
     training = Training(flown, CPU)
     training.run(1)
-    batch = training.replay.sample(1000, flown.steps, flown.discount, training.generator)
+    batch = training.replay.sample(1000, flown.n_step, flown.discount, training.generator)
     config = tiny(**changes)
     network = Training(config, CPU).learner.online
     return Learner(network, training.observation, config, CPU), batch

@@ -89,8 +89,8 @@ def test_what_is_not_allowed_is_never_chosen(
     event(f"charged {(record.uavs['slots_charging'] > 0).any()}")
 
 
-def _assert_same_records(policy: Any, seed: int, missions: int, lanes: int) -> None:
-    records = simulate_batch(PAPER, policy, seed, missions, lanes=lanes)
+def _assert_same_records(policy: Any, seed: int, missions: int, batch_size: int) -> None:
+    records = simulate_batch(PAPER, policy, seed, missions, batch_size=batch_size)
     for number in range(missions):
         single = simulate(PAPER, policy, seed, number)
         assert single.metrics.tobytes() == records.missions[number].tobytes()

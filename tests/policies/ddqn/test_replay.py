@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from policies.ddqn.observations.states import empty_snapshots
 from policies.ddqn.replay import Batch, ReplayMemory
 
-SLOT, LANE = 0, 1  # what the columns of the missions hold here
+SLOT, ENVIRONMENT = 0, 1  # what the columns of the missions hold here
 
 
 class Log(NamedTuple):
-    """What happened in T slots of N lanes of I UAVs: arrays (T, N, I)."""
+    """What happened in T slots of N environments of I UAVs: arrays (T, N, I)."""
 
     action: np.ndarray
     reward: np.ndarray
@@ -23,32 +23,32 @@ class Log(NamedTuple):
     truncated: np.ndarray
 
     def memory(self, capacity: int) -> ReplayMemory:
-        """A memory to which all of it was added; the states tell their slot and lane."""
-        slots, lanes, uavs = self.action.shape
-        memory = ReplayMemory(capacity, lanes, uavs, 1)
+        """A memory to which all of it was added; the states tell their slot and environment."""
+        slots, num_envs, uavs = self.action.shape
+        memory = ReplayMemory(capacity, num_envs, uavs, 1)
         for slot in range(slots):
-            states = empty_snapshots(lanes, uavs, 1)
-            states.missions[:, SLOT], states.missions[:, LANE] = slot, np.arange(lanes)
+            states = empty_snapshots(num_envs, uavs, 1)
+            states.missions[:, SLOT], states.missions[:, ENVIRONMENT] = slot, np.arange(num_envs)
             memory.add(states, *(part[slot] for part in self))
         return memory
 
     def transition(
-        self, slot: int, lane: int, uav: int, steps: int, discount: float
+        self, slot: int, environment: int, uav: int, n_step: int, discount: float
     ) -> tuple[float, float, int]:
         """The n-step return from a slot on, the factor of the later value and its slot."""
         total, factor = 0.0, 1.0
-        for n in range(slot, slot + steps):
-            if self.truncated[n, lane, uav]:
+        for n in range(slot, slot + n_step):
+            if self.truncated[n, environment, uav]:
                 return total, factor, n
-            total += factor * self.reward[n, lane, uav]
+            total += factor * self.reward[n, environment, uav]
             factor *= discount
-            if self.terminated[n, lane, uav]:
+            if self.terminated[n, environment, uav]:
                 return total, 0.0, n + 1
-        return total, factor, slot + steps
+        return total, factor, slot + n_step
 
 
 def _lone(rewards: list[float], terminated: int = -1, truncated: int = -1) -> Log:
-    """The log of one UAV in one lane, whose mission ends in the given slot."""
+    """The log of one UAV in one environment, whose mission ends in the given slot."""
     shape = (len(rewards), 1, 1)
     slots = np.arange(len(rewards)).reshape(shape)
     end = max(terminated, truncated)
@@ -61,13 +61,13 @@ def _lone(rewards: list[float], terminated: int = -1, truncated: int = -1) -> Lo
     )
 
 
-def _drawn(memory: ReplayMemory, size: int, steps: int, discount: float = 0.5) -> Batch:
-    return memory.sample(size, steps, discount, np.random.default_rng(1))
+def _drawn(memory: ReplayMemory, size: int, n_step: int, discount: float = 0.5) -> Batch:
+    return memory.sample(size, n_step, discount, np.random.default_rng(1))
 
 
-def _returns(log: Log, steps: int, capacity: int = 100) -> dict[int, tuple[float, float, int]]:
-    """By slot: the reward, the factor and the later slot that a sample of one lane holds."""
-    batch = _drawn(log.memory(capacity), 200, steps)
+def _returns(log: Log, n_step: int, capacity: int = 100) -> dict[int, tuple[float, float, int]]:
+    """By slot: the reward, the factor and the later slot that a sample of one environment holds."""
+    batch = _drawn(log.memory(capacity), 200, n_step)
     slots, later = (batch.state.missions[rows, SLOT] for rows in (batch.rows, batch.later))
     values = zip(batch.reward.tolist(), batch.discount.tolist(), later.tolist(), strict=True)
     return dict(zip(slots.tolist(), values, strict=True))
@@ -127,50 +127,54 @@ def test_the_ring_keeps_the_last_slots() -> None:
 
 @st.composite
 def _logs(draw: st.DrawFn) -> tuple[Log, int, int]:
-    """Missions one after another in every lane; n, and a capacity that fits."""
-    steps, lanes, uavs = draw(st.integers(1, 5)), draw(st.integers(1, 3)), draw(st.integers(1, 3))
-    slots = draw(st.integers(steps + 2, 30))
-    capacity = draw(st.integers(steps + 2, 35))
+    """Missions one after another in every environment; n, and a capacity that fits."""
+    n_step, num_envs, uavs = (
+        draw(st.integers(1, 5)),
+        draw(st.integers(1, 3)),
+        draw(st.integers(1, 3)),
+    )
+    slots = draw(st.integers(n_step + 2, 30))
+    capacity = draw(st.integers(n_step + 2, 35))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    shape = (slots, lanes, uavs)
+    shape = (slots, num_envs, uavs)
     acted, terminated, truncated = (np.zeros(shape, np.bool_) for _ in range(3))
-    for lane in range(lanes):
+    for environment in range(num_envs):
         slot = 0
         while slot < slots:
             lengths = rng.integers(1, 8, rng.integers(1, uavs + 1))  # of the UAVs of a mission
             for uav, length in enumerate(lengths):
-                acted[slot : slot + length, lane, uav] = True
+                acted[slot : slot + length, environment, uav] = True
                 if slot + length <= slots:
                     ends = terminated if rng.random() < 0.7 else truncated
-                    ends[slot + length - 1, lane, uav] = True
+                    ends[slot + length - 1, environment, uav] = True
             slot += int(lengths.max()) + 1  # nobody acts in the last row
     log = Log(rng.integers(0, 5, shape), rng.normal(size=shape), acted, terminated, truncated)
-    return log, steps, capacity
+    return log, n_step, capacity
 
 
 @given(_logs(), st.floats(0.1, 1.0))
 def test_all_that_can_be_drawn_is_drawn_and_right(
     world: tuple[Log, int, int], discount: float
 ) -> None:
-    log, steps, capacity = world
-    slots, lanes, uavs = log.action.shape
+    log, n_step, capacity = world
+    slots, num_envs, uavs = log.action.shape
     oldest = max(0, slots - capacity)
-    assume((log.acted & ~log.truncated)[oldest : slots - steps].any())
+    assume((log.acted & ~log.truncated)[oldest : slots - n_step].any())
     eligible = {
-        (slot, lane, uav)
-        for slot, lane, uav in np.argwhere(log.acted & ~log.truncated).tolist()
-        if oldest <= slot < slots - steps
+        (slot, environment, uav)
+        for slot, environment, uav in np.argwhere(log.acted & ~log.truncated).tolist()
+        if oldest <= slot < slots - n_step
     }
-    batch = _drawn(log.memory(capacity), 30 * slots * lanes * uavs, steps, discount)
-    assert batch.state.residual.shape == (capacity * lanes, 1)
+    batch = _drawn(log.memory(capacity), 30 * slots * num_envs * uavs, n_step, discount)
+    assert batch.state.residual.shape == (capacity * num_envs, 1)
     places = np.column_stack([batch.state.missions[batch.rows], batch.uav])
-    assert {(s, lane, uav) for s, lane, uav in places.tolist()} == eligible
-    for row, (slot, lane, uav) in enumerate(places.tolist()):
-        total, factor, later = log.transition(slot, lane, uav, steps, discount)
+    assert {(s, environment, uav) for s, environment, uav in places.tolist()} == eligible
+    for row, (slot, environment, uav) in enumerate(places.tolist()):
+        total, factor, later = log.transition(slot, environment, uav, n_step, discount)
         assert batch.reward[row] == pytest.approx(total, rel=1e-5, abs=1e-5)
         assert batch.discount[row] == pytest.approx(factor)
-        assert batch.state.missions[batch.later[row]].tolist() == [later, lane]
-        assert batch.action[row] == log.action[slot, lane, uav]
+        assert batch.state.missions[batch.later[row]].tolist() == [later, environment]
+        assert batch.action[row] == log.action[slot, environment, uav]
 
 
 def test_the_draw_is_uniform() -> None:
@@ -197,13 +201,13 @@ def test_too_few_slots_are_refused() -> None:
         _drawn(_lone([1.0] * 9).memory(3), 8, 3)
 
 
-@pytest.mark.parametrize(("capacity", "lanes", "uavs", "nodes"), [(1, 1, 1, 1), (50, 8, 3, 25)])
+@pytest.mark.parametrize(("capacity", "num_envs", "uavs", "nodes"), [(1, 1, 1, 1), (50, 8, 3, 25)])
 def test_its_size_is_known_before_it_is_made(
-    capacity: int, lanes: int, uavs: int, nodes: int
+    capacity: int, num_envs: int, uavs: int, nodes: int
 ) -> None:
-    memory = ReplayMemory(capacity, lanes, uavs, nodes)
+    memory = ReplayMemory(capacity, num_envs, uavs, nodes)
     taken = sum(array.nbytes for array in memory.arrays.values())
-    assert ReplayMemory.bytes_for(capacity, lanes, uavs, nodes) == taken
+    assert ReplayMemory.bytes_for(capacity, num_envs, uavs, nodes) == taken
     own = [value for value in vars(memory).values() if isinstance(value, np.ndarray)]
     own += memory._states
     assert taken == sum(array.nbytes for array in own)

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 import policies
-from dess.env.stepper import Lanes
+from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.scenario import load_scenario
 from policies.ddqn import session
@@ -25,7 +25,9 @@ from policies.ddqn.training import Training
 from tests.analysis.small import files_of
 from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, story_of, tiny
 
-SHORT = tiny(phases=[phase | {"ticks": 20} for phase in PHASES], prefill=20, evaluate_every=8)
+SHORT = tiny(
+    phases=[phase | {"ticks": 20} for phase in PHASES], learning_starts=20, evaluate_every=8
+)
 
 Progress = Callable[[Training, int], None]
 
@@ -208,7 +210,9 @@ def test_the_memory_that_it_takes_is_known_before() -> None:
     arrays = training.replay.arrays.values()
     assert memory_of(SHORT) == sum(array.nbytes for array in arrays)
     paper = load_scenario("paper")
-    assert isinstance(training.replay, ReplayMemory) and isinstance(training.lanes, Lanes)
+    assert isinstance(training.replay, ReplayMemory) and isinstance(
+        training.stepper, MissionStepper
+    )
     assert memory_of(SHORT) == ReplayMemory.bytes_for(80, 8, paper.uavs[1], len(paper.nodes))
 
 

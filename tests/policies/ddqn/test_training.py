@@ -68,9 +68,9 @@ def test_a_stopped_training_goes_on_as_if_nothing_had_been(
     [
         {"average_rate": 1.0, "updates": 2, "precision": "bfloat16"},
         {"guard": False, "early_returns": 0.5},
-        {"observation": "relations", "hidden": [8, 16, 16]},
+        {"observation": "nodes", "hidden": [8, 16, 16]},
     ],
-    ids=["online alone, bfloat16", "free, early returns", "relations"],
+    ids=["online alone, bfloat16", "free, early returns", "nodes"],
 )
 def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
     config = tiny(**changes, phases=[phase | {"ticks": 20} for phase in PHASES], evaluate_every=15)
@@ -80,7 +80,13 @@ def test_so_do_others(changes: dict[str, Any], tmp_path: Path) -> None:
 
 def test_so_does_one_on_maps(tmp_path: Path) -> None:
     phases = [phase | {"ticks": 4} for phase in PHASES]
-    small = {"lanes": 2, "batch": 8, "prefill": 8, "evaluation_missions": 1, "evaluate_every": 3}
+    small = {
+        "num_envs": 2,
+        "batch": 8,
+        "learning_starts": 8,
+        "evaluation_missions": 1,
+        "evaluate_every": 3,
+    }
     config = tiny(observation="maps", phases=phases, **small)
     parts = _stopped(_trained(Training(config, CPU), 3), tmp_path / "checkpoint")
     parts = _stopped(_trained(parts, 3), tmp_path / "checkpoint")
@@ -99,7 +105,7 @@ def test_without_its_memory_a_stopped_training_fills_a_new_one(tmp_path: Path) -
     assert all(torch.equal(value, theirs[name]) for name, value in ours.items())
     assert resumed.replay.count == 0
     resumed.run(1)
-    assert resumed.replay.count == config.prefill + 1
+    assert resumed.replay.count == config.learning_starts + 1
     assert _trained(resumed, 1000).done
 
 
@@ -114,13 +120,13 @@ def test_the_seed_makes_the_training(whole: Training) -> None:
 
 def test_the_first_phase_spends_no_battery() -> None:
     training = _trained(Training(tiny(low_battery_starts=0.0), CPU), 40)
-    state = training.lanes.state
+    state = training.stepper.state
     active = state.uavs["active"]
     start = np.broadcast_to(state.missions["flying_time"][:, None], active.shape)
     assert state.uavs["slots_flying"][active].min() > 50
     assert (state.uavs["battery"] == start)[active].all()
-    training.run(41)  # one in the second phase, after the prefill
-    state = training.lanes.state
+    training.run(41)  # one in the second phase, after the random slots
+    state = training.stepper.state
     flown = state.uavs["active"] & (state.uavs["slots_charging"] == 0)
     spent = state.missions["flying_time"][:, None] - state.uavs["battery"]
     assert (spent == state.uavs["slots_flying"])[flown].all()
@@ -129,19 +135,19 @@ def test_the_first_phase_spends_no_battery() -> None:
 
 def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
     training = _trained(Training(tiny(), CPU), 79)
-    flown = training.lanes.replication
+    flown = training.stepper.replication
     assert training.phase.name == "harvest"
-    assert training.replay.count == training.config.prefill + 79
+    assert training.replay.count == training.config.learning_starts + 79
     assert training.learner.optimizer.state_dict()["state"]
     training.run(1)
     assert training.phase.name == "battery"
     assert training.replay.count == 0
     assert not training.learner.optimizer.state_dict()["state"]
-    missions = training.lanes.state.missions
+    missions = training.stepper.state.missions
     assert (missions["seed"] == MISSION_SEED + training.config.seed).all()
     assert missions["replication"].min() >= flown
     training.run(1)
-    assert training.replay.count == training.config.prefill + 1
+    assert training.replay.count == training.config.learning_starts + 1
 
 
 def _scripted(monkeypatch: pytest.MonkeyPatch, scores: list[float]) -> None:
@@ -233,7 +239,7 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training, "_fly", note_fly)
     monkeypatch.setattr(training.learner, "update", note_update)
     training.run(1000)
-    # The first phase is prefilled at random, the second as it begins.
+    # The first phase starts at random, the second as it begins.
     falling = [0.5 - 0.49 * min(tick / 40, 1) for tick in range(80)]
     assert flown == pytest.approx([1.0] * 60 + [0.1] * 80 + [0.5] * 60 + falling)
     assert learned == pytest.approx([1e-3 - 9e-4 * tick / 80 for tick in range(80)] + [1e-4] * 80)
@@ -247,8 +253,8 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
-    """Snapshots of what the lanes are in, and their UAVs that act, many times over."""
-    states = snapshot(training.lanes.state, training.config.guard)
+    """Snapshots of what the environments are in, and their UAVs that act, many times over."""
+    states = snapshot(training.stepper.state, training.config.guard)
     missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
     return states, np.tile(missions, 2000), np.tile(uavs, 2000)
 
@@ -300,7 +306,7 @@ def test_actions_are_explored_as_told(
         assert (abs(count - mean) <= 5 * spread).all()
 
 
-def test_the_prefill_is_random(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_actions_are_random_before_learning_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     training = Training(tiny(), CPU)
 
     def refuse(*_: Any) -> None:
@@ -309,15 +315,20 @@ def test_the_prefill_is_random(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(training.learner, "values", refuse)
     with pytest.raises(AssertionError, match="was asked"):
         training.run(1)
-    assert training.replay.count == training.config.prefill
+    assert training.replay.count == training.config.learning_starts
 
 
 def _reserves(early_returns: float) -> np.ndarray:
     """Battery above C_S of the UAVs that begin to charge, in a training that does not explore."""
     phase = {"name": "one", "ticks": 75, "epsilon": [0.0, 0.0]}
-    settings = {"lanes": 40, "prefill": 4, "low_battery_starts": 0.0, "evaluate_every": 100}
+    settings = {
+        "num_envs": 40,
+        "learning_starts": 4,
+        "low_battery_starts": 0.0,
+        "evaluate_every": 100,
+    }
     training = Training(tiny(**settings, early_returns=early_returns, phases=[phase]), CPU)
-    missions, uavs, _ = training.lanes.state
+    missions, uavs, _ = training.stepper.state
     begun = []
     for _ in range(74):
         before = uavs["battery"] - missions["charge_start"][:, None]
@@ -339,8 +350,8 @@ def test_early_returns_come_home_as_soon_as_they_may_charge() -> None:
 
 
 def test_low_starts_are_low_latched_and_near_their_quota() -> None:
-    training = Training(tiny(low_battery_starts=1.0, lanes=200), CPU)
-    missions, uavs, residual = training.lanes.state
+    training = Training(tiny(low_battery_starts=1.0, num_envs=200), CPU)
+    missions, uavs, residual = training.stepper.state
     present = uavs["active"]
     start = np.broadcast_to(missions["charge_start"][:, None], present.shape)
     assert (uavs["battery"] <= start)[present].all()
@@ -366,12 +377,12 @@ def test_low_starts_are_low_latched_and_near_their_quota() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
 def test_the_share_of_low_starts(share: float) -> None:
-    training = Training(tiny(low_battery_starts=share, lanes=1000), CPU)
-    missions, uavs = training.lanes.state.missions, training.lanes.state.uavs
+    training = Training(tiny(low_battery_starts=share, num_envs=1000), CPU)
+    missions, uavs = training.stepper.state.missions, training.stepper.state.uavs
     low = uavs["battery"][:, 0] < missions["flying_time"]
     assert low.mean() == pytest.approx(share, abs=5 * np.sqrt(share * (1 - share) / 1000))
     assert (uavs["latch"][:, 0] == low).all()
-    assert training.lanes.state.residual[~low].all()
+    assert training.stepper.state.residual[~low].all()
 
 
 # --- curves ---
@@ -385,7 +396,7 @@ def test_the_curve_tells_how_the_training_stands(whole: Training) -> None:
     # A mission has three UAVs at most, and a last row in which nobody acts.
     slots = whole.curve[-1]["uav_slots"]
     assert slots == whole.uav_slots
-    flown = (config.ticks + 2 * config.prefill) * config.lanes
+    flown = (config.ticks + 2 * config.learning_starts) * config.num_envs
     assert flown < slots < 3 * flown
     for row in whole.curve:
         assert row["loss"] > 0

@@ -8,7 +8,7 @@ from hypothesis import event, given
 
 import policies
 from dess.batch import simulate_batch
-from dess.env.stepper import Lanes
+from dess.env.stepper import MissionStepper
 from dess.mission import simulate
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, State
@@ -93,12 +93,12 @@ def test_snapshots_of_many_missions() -> None:
 def _state(uavs: list[dict[str, Any]], **scenario: Any) -> State:
     """One mission with UAVs in given states, 400 communications short of the quota."""
     space = ScenarioSpace.of(**({"uavs": len(uavs), "charge_start": 30} | scenario))
-    lanes = Lanes(space, 1, 1)
-    lanes.launch(lanes.numbers)
-    for u, values in zip(lanes.state.uavs[0], uavs, strict=True):
+    stepper = MissionStepper(space, 1, 1)
+    stepper.launch(stepper.indices)
+    for u, values in zip(stepper.state.uavs[0], uavs, strict=True):
         for name, value in ({"battery": 60, "communications": 40} | values).items():
             u[name] = value
-    return lanes.state
+    return stepper.state
 
 
 def test_a_uav_far_out_by_hand() -> None:

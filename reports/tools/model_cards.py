@@ -2,7 +2,7 @@
 
 Replaces the part between the two marks; what is written around them stays.
 
-    python benchmarks/model_card.py policies/trained/ddqn --command "dess train ddqn --out DIR"
+    python -m reports.tools.model_cards policies/trained/ddqn --command "dess train ddqn --out DIR"
 """
 
 import argparse
@@ -21,7 +21,10 @@ from dess import load_scenario, simulate_batch
 from policies.ddqn.config import MISSION_SEED, config_of, load_config
 from policies.registry import SHIPPED
 
-BEGIN, END = "<!-- computed by benchmarks/model_card.py -->", "<!-- end of the computed part -->"
+BEGIN, END = (
+    "<!-- computed by reports/tools/model_cards.py -->",
+    "<!-- end of the computed part -->",
+)
 # Never used by a training or a selection of weights, and for nothing else than these cards.
 EVALUATION_SEED = 20_261_121
 PRODUCT = "collection_ratio_and_communication"

@@ -3,11 +3,12 @@
 Runs the variants of ``VARIANTS`` from the shipped config ``quick``, each with several training
 seeds, and keeps the curve of each. A training whose curve is already there is not run again. The
 final figures are those of the selected weights on missions that no training and no selection has
-seen.
+used.
 
-    python benchmarks/learning.py --out runs/learning --seeds 1 2 3
-    python benchmarks/learning.py --out runs/learning --gather policies/trained/curves.parquet
-    python benchmarks/learning.py --table policies/trained/curves.parquet
+    python -m reports.tools.learning_curves --out runs/learning --seeds 1 2 3
+    python -m reports.tools.learning_curves --out runs/learning \\
+        --gather policies/trained/curves.parquet
+    python -m reports.tools.learning_curves --table policies/trained/curves.parquet
 """
 
 import argparse
@@ -44,10 +45,10 @@ def _variants() -> dict[str, dict[str, Any]]:
         },
         "none of the three": means,
         "none of the three, no transfer": means | alone,
-        "1-step returns": {"steps": 1},
+        "1-step returns": {"n_step": 1},
         "discount 0.99": {"discount": 0.99},
-        "64 lanes": {"lanes": 64, "replay": 8000},
-        "relations": {"observation": "relations", "hidden": (64, 256, 256)},
+        "64 environments": {"num_envs": 64, "replay": 8000},
+        "nodes": {"observation": "nodes", "hidden": (64, 256, 256)},
         "maps": {"observation": "maps"},
     }
 

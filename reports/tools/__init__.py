@@ -1,0 +1,1 @@
+"""Tools that make data which is shipped with the packages; run with ``python -m``."""
