@@ -1,26 +1,62 @@
-"""``KEY=VALUE`` on the command line: fields of a scenario, and parameters of notebooks."""
+"""Options that commands share, and the ``KEY=VALUE`` of ``--set`` and ``--parameter``.
+
+Values are in TOML syntax: ``setting("initial_data=[5, 20]")`` is ``("initial_data", [5, 20])``.
+"""
 
 import math
 import os
 import tomllib
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from dess.errors import InputError
 
+if TYPE_CHECKING:
+    from dess import ScenarioSpace
+
+RESULTS = Path("results")
 FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
 PARAMETER = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
 
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a field of the scenario, the value in TOML syntax; repeatable.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all randomness.")]
+WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 
-def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str, Any]:
-    """``KEY=VALUE`` as key and value.
 
-    Args:
-        text: What was given.
-        option: The option that it was given to.
-        allowed: What that takes.
+def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
+    """A scenario by name or file, with the fields that ``--set`` sets.
 
     Raises:
-        InputError: If it is something else.
+        InputError: If there is no such scenario, or a setting is not valid.
+    """
+    from dess import load_scenario
+
+    return load_scenario(name, **dict(setting(text) for text in settings or []))
+
+
+def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str, Any]:
+    """Parse ``KEY=VALUE``.
+
+    Args:
+        text: The argument.
+        option: The option it was given to, for the message.
+        allowed: What the option accepts, for the message.
+
+    Raises:
+        InputError: If the text has another form.
     """
     key, equals, value = text.partition("=")
     try:
@@ -32,20 +68,24 @@ def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str
     return key.strip(), parsed["value"]
 
 
-def from_here(value: Any) -> Any:
-    """A value of a parameter; paths, also those in a team, from here: a notebook runs elsewhere."""
+def with_absolute_paths(value: Any) -> Any:
+    """A parameter's value with absolute paths, since notebooks run in another folder.
+
+    A path is a word with a path separator, or one that ends with ``.toml``, also inside a team:
+    ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
+    """
     if isinstance(value, list):
-        return [from_here(each) for each in value]
+        return [with_absolute_paths(item) for item in value]
     if not isinstance(value, str):
         return value
-    parts = value.split(",")
-    is_path = [os.sep in part or part.endswith(".toml") for part in parts]
-    found = zip(parts, is_path, strict=True)
-    return ",".join(os.path.abspath(part) if path else part for part, path in found)
+    return ",".join(
+        os.path.abspath(word) if os.sep in word or word.endswith(".toml") else word
+        for word in value.split(",")
+    )
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether a value is of those that fields and parameters have: no date, and no nan."""
+    """Whether fields and parameters can have a value: dates and nan are not allowed."""
     if isinstance(value, list | dict):
         return all(map(_is_plain, value.values() if isinstance(value, dict) else value))
     return isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))

@@ -21,8 +21,8 @@ from nbformat import NotebookNode
 from dess.errors import InputError
 from reports.pages.notebook import Report
 
-# Called with the report's name, and the cells done and the cells in all, of all reports.
-Progress = Callable[[str, int, int], None]
+# Called with the cells done and the cells in all, of all reports, and the name of this one.
+Progress = Callable[[int, int, str], None]
 
 AT_ONCE = 2
 
@@ -73,7 +73,7 @@ class Kernels:
                 report.done += 1
                 if self.progress:
                     done, total = sum(r.done for r in reports), sum(len(r.cells) for r in reports)
-                    self.progress(report.name, done, total)
+                    self.progress(done, total, report.name)
 
         for attempt in (1, 2):
             try:

@@ -151,7 +151,7 @@ def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_pat
     assert (running.returncode, out) == (1, "")
     stopped = load_training(tmp_path / "out" / "checkpoint.safetensors", load_config(config), CPU)
     assert 0 < stopped.tick < 340
-    hint = f"interrupted at tick {stopped.tick}: go on with "
+    hint = f"interrupted at tick {stopped.tick}: continue with "
     hint += "dess train tiny.toml --out out --device cpu --resume"
     assert err.splitlines()[-1] == hint
     assert "Traceback" not in err

@@ -52,7 +52,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def progress() -> list[tuple[str, int, int]]:
+def progress() -> list[tuple[int, int, str]]:
     return []
 
 
@@ -146,9 +146,9 @@ def test_names_have_their_index_in_text_and_nowhere_else() -> None:
 
 def test_progress_counts_the_cells(pages: dict[str, str], progress: list[Any]) -> None:
     total = sum(len(read(name).cells) for name in NAMES)  # and those with parameters
-    assert [done for _, done, _ in progress] == list(range(1, len(progress) + 1))
-    assert total < len(progress) == progress[0][2] <= total + len(NAMES)
-    assert {name for name, _, _ in progress} == {*NAMES}
+    assert [done for done, _, _ in progress] == list(range(1, len(progress) + 1))
+    assert total < len(progress) == progress[0][1] <= total + len(NAMES)
+    assert {name for *_, name in progress} == {*NAMES}
 
 
 def elsewhere(results: Path, out: Path, folder: Path, patch: pytest.MonkeyPatch) -> Path:

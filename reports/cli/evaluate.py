@@ -1,0 +1,89 @@
+"""``dess evaluate``: metrics of many missions, with intervals."""
+
+import json
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from reports.cli import console
+from reports.cli.settings import (
+    JsonOption,
+    ScenarioOption,
+    SeedOption,
+    SetOption,
+    WorkersOption,
+    load_space,
+)
+
+if TYPE_CHECKING:
+    import numpy as np
+
+app = typer.Typer()
+
+
+@app.command()
+def evaluate(
+    policy: Annotated[
+        list[str], typer.Option(metavar="P[,P...]", help="A policy or a team; repeatable.")
+    ],
+    scenario: ScenarioOption = "paper",
+    settings: SetOption = None,
+    missions: Annotated[int, typer.Option(min=1, help="Replications 0, 1, ... to run.")] = 1000,
+    seed: SeedOption = 0,
+    engine: Annotated[
+        Literal["batch", "events"], typer.Option(help="Both engines give the same records.")
+    ] = "batch",
+    workers: WorkersOption = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Metrics of many missions, with 95 % intervals."""
+    from analysis.execution.runner import evaluate
+    from dess.state import check_seed
+    from policies import load_team
+
+    space = load_space(scenario, settings)
+    for team in policy:
+        load_team(team)
+    check_seed(seed, missions - 1)
+    with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
+        evaluations = [
+            evaluate(space, team, missions, seed, engine, workers, bar.update) for team in policy
+        ]
+    rows = [
+        {
+            "policy": evaluation.policy,
+            "missions": missions,
+            "seed": seed,
+            "engine": engine,
+            "uav_slots": evaluation.uav_slots,
+            "seconds": evaluation.seconds,
+        }
+        | _intervals(evaluation.records.missions)
+        for evaluation in evaluations
+    ]
+    if as_json:
+        print(json.dumps(rows, indent=2))
+    else:
+        _print_rows(rows)
+
+
+def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:
+    """Mean, low and high of every metric."""
+    import pandas as pd
+
+    from analysis.stats.intervals import summary
+
+    rows = summary(pd.DataFrame(missions), by=[]).set_index("metric")[["mean", "low", "high"]]
+    return rows.to_dict("index")
+
+
+def _print_rows(rows: list[dict[str, Any]]) -> None:
+    for row in rows:
+        metrics = {name: value for name, value in row.items() if isinstance(value, dict)}
+        cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
+        console.print_table([row["policy"], "mean", "low", "high"], cells)
+        speed = row["uav_slots"] / row["seconds"]
+        print(
+            f" {row['missions']} missions, {row['uav_slots']} UAV-slots in "
+            f"{row['seconds']:.2f} s: {speed:,.0f} UAV-slots/s"
+        )

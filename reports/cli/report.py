@@ -1,0 +1,140 @@
+"""``dess report``, ``dess verify`` and ``dess timing``: pages, their checks and their timings."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dess.errors import InputError
+from reports.cli import console
+from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting, with_absolute_paths
+
+if TYPE_CHECKING:
+    from reports.pages.verify import Verdict
+
+WHAT_IF = "what-if"  # the only report that has --set
+
+app = typer.Typer()
+
+
+@app.command()
+def report(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Reports; all by default.")
+    ] = None,
+    results: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
+    ] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = Path(
+        "build/reports"
+    ),
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="A change that the report what-if asks about: a field of the scenario, the value "
+            "in TOML syntax; repeatable.",
+        ),
+    ] = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--parameter",
+            metavar="NAME=VALUE",
+            help="A parameter of the notebooks, such as missions or policies of what-if, the "
+            "value in TOML syntax; repeatable.",
+        ),
+    ] = None,
+) -> None:
+    """Run the notebooks on the results and render them to HTML, with an index."""
+    parsed = [setting(text, "--parameter", PARAMETER) for text in parameters or []]
+    values = {name: with_absolute_paths(value) for name, value in parsed}
+    if settings:
+        if names and WHAT_IF not in names:
+            raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
+        values["settings"] = dict(setting(text) for text in settings)
+        values.setdefault("baseline", {})  # the scenario itself, not that of the default question
+    from reports.pages.render import ReportError, render
+
+    try:
+        with console.counted_bar("cell") as progress:
+            print(render(names or [], results, out, progress=progress, parameters=values))
+    except ReportError as error:
+        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
+
+
+@app.command()
+def verify(
+    path: Annotated[
+        Path, typer.Argument(metavar="PAGE|DIR", help="A page of dess report, or results.")
+    ],
+    missions: Annotated[
+        int, typer.Option(min=1, help="Missions of every study to simulate again, at most.")
+    ] = 20,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the sample.  [default: a random one]")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a page or results: simulate a random sample of the missions again, and compare."""
+    import secrets
+
+    from reports.pages.verify import verify_page, verify_results
+
+    seed = secrets.randbelow(2**32) if seed is None else seed
+    check = verify_results if path.is_dir() else verify_page
+    with console.compile_notice():
+        verdicts = check(path, missions, seed)
+    if as_json:
+        checks = [asdict(verdict) for verdict in verdicts]
+        print(json.dumps({"seed": seed, "checks": checks}, indent=2))
+    else:
+        _print_verdicts(path, verdicts)
+    if differing := [line for verdict in verdicts for line in verdict.differing]:
+        for line in differing:
+            console.fail(f"differs: {line}", 1)
+        compared = sum(verdict.compared for verdict in verdicts)
+        line = f"{path}: {len(differing)} of {compared} differ (--seed {seed})"
+        raise typer.Exit(console.fail(f"dess: error: {line}", 1))
+
+
+def _print_verdicts(path: Path, verdicts: "list[Verdict]") -> None:
+    rows = [[v.what, str(v.compared), str(len(v.differing))] for v in verdicts]
+    console.print_table([str(path), "compared", "differing"], rows)
+    for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):
+        print(f"note: {note}")
+
+
+@app.command()
+def timing(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the measurements.")] = RESULTS
+    / "timing",
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="P[,P...]", help="Repeatable.  [default: those of the study comparison]"
+        ),
+    ] = None,
+    missions: Annotated[int, typer.Option(min=1, help="Missions per policy.")] = 30,
+) -> None:
+    """Measure the time of a decision; measurements of this machine and code are kept."""
+    from analysis.execution.decision_time import is_current, measure, read, writing
+    from analysis.study.study import load_study
+
+    teams = policy or [*load_study("comparison").policies]
+    if not is_current(out, teams, missions):
+        with (
+            writing(out) as path,
+            console.compile_notice(),
+            console.counted_bar("step") as progress,
+        ):
+            measured = measure(teams, missions=missions, progress=progress)
+            path.write_text(measured.text, "utf-8")
+    rows = [
+        [cost.policy, *(f"{1e6 * t:,.1f} µs" for t in (cost.median, cost.slow, cost.batch))]
+        for cost in read(out).costs
+    ]
+    console.print_table(["policy", "median", "95 % below", "in a batch, per UAV"], rows)

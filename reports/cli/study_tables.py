@@ -1,0 +1,208 @@
+"""Tables of ``dess study``: the plan of a run, and the results of a study in a terminal."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from analysis.names import PRODUCT, SHORT_METRICS
+from reports.cli import console
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.execution.dry_run import Plan
+    from analysis.results.tables import Results
+    from analysis.study.study import Study
+
+MANY_POINTS = 40  # more design points are not listed
+
+
+def print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
+    """Print the missions that a run would simulate, and an estimate of the time."""
+    rows = [
+        [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
+        for p in plan.policies
+    ]
+    console.print_table(["policy", "missions", "present", "time on one core"], rows)
+    per_cell = f"{study.first} replications"
+    if plan.at_most is not None:
+        rule = "selection" if study.selection else "precision"
+        per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
+    print(
+        f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
+        f"x {plan.points} design points x {per_cell})"
+    )
+    more = "at least " if plan.at_most is not None else ""
+    print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
+
+
+def print_summary(results: "Results", folder: Path, short: bool) -> None:
+    """Print the means at the only design point, or the selected points and their check."""
+    from analysis.questions import summary
+    from analysis.replication import paper
+
+    study = results.manifest["study"]
+    print(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
+    printed = paper.PRINTED.get(study["name"], {})
+    if study["selection"]:
+        _print_selections(summary.selections(results))
+        if checks := study["selection"]["check"]:
+            _print_means(summary.checks(results), f"{checks} further missions", printed)
+    elif len(summary.settings(results)) == 1:
+        _print_means(summary.means(results), "mean, 95 % interval", printed)
+    elif short:
+        _print_by_point(results, summary.means(results), [PRODUCT])
+
+
+def print_details(results: "Results", tables: "Mapping[str, pd.DataFrame]") -> None:
+    """Print the tables of ``dess study show``, by their names in its JSON; none that is empty."""
+    _print_sensitivities(tables["sensitivities"])
+    _print_by_point(results, tables["means"], [*SHORT_METRICS])
+    _print_distributions(tables["distributions"])
+    _print_precisions(results, tables["precisions"])
+    _print_comparisons(tables["comparisons"])
+    _print_learners(tables["learned_against_heuristic"])
+    _print_worst(tables["worst"])
+
+
+def _print_frame(title: str, cells: "pd.DataFrame") -> None:
+    """Print a table of text under its title; the index is its first column."""
+    rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
+    console.print_table([title, *map(str, cells.columns)], rows)
+
+
+def _print_selections(selected: "pd.DataFrame") -> None:
+    """The selected point of every policy, and the guarantee of the procedure."""
+    cells = selected.set_index("policy")[["setting", "missions", "left"]]
+    cells["missions"] = cells["missions"].map("{:,}".format)
+    _print_frame("selected for", cells)
+    for guarantee in dict.fromkeys(selected["guarantee"]):
+        print(f" {guarantee}")
+
+
+def _print_means(means: "pd.DataFrame", title: str, printed: Mapping[str, float]) -> None:
+    """A row per policy, and one with the values that the paper prints; a column per metric."""
+    from analysis import numbers
+
+    cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], "policy")
+    if printed:
+        cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
+    _print_frame(title, cells.rename(columns=SHORT_METRICS))
+
+
+def _print_by_point(results: "Results", means: "pd.DataFrame", metrics: list[str]) -> None:
+    """A table per metric, a row per design point, if there are several and not too many."""
+    from analysis import numbers
+    from analysis.questions.summary import settings
+
+    points = settings(results)
+    if len(points) == 1:
+        return
+    if len(points) > MANY_POINTS:
+        print(f"{len(points)} design points are too many to list; --json has them")
+        return
+    for metric in metrics:
+        cells = numbers.wide(means[means["metric"] == metric], "point", "policy")
+        _print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
+
+
+def _print_distributions(table: "pd.DataFrame") -> None:
+    """Quantiles of the product over the missions, and the mean of the worst ones."""
+    from analysis import numbers
+
+    if table.empty:
+        return
+    rows = []
+    for policy, views in table.groupby("policy", sort=False):
+        quantiles = views[views["view"] == "quantile"].set_index("share")["value"]
+        (worst,) = views[views["view"] == "worst mean"].itertuples()
+        cells = [numbers.percent(quantiles[share]) for share in (0.05, 0.5, 0.95)]
+        rows.append([policy, *cells, numbers.interval(worst.value, worst.low, worst.high)])
+    head = ["spread of the product", "5 % quantile", "median", "95 % quantile"]
+    console.print_table([*head, "mean of the worst 5 %"], rows)
+
+
+def _print_precisions(results: "Results", table: "pd.DataFrame") -> None:
+    """The precision that each estimate reached, beside its target."""
+    from analysis.questions.summary import settings
+
+    if table.empty:
+        return
+    points = settings(results)
+    rows = [
+        [
+            f"{row.policy} {points[row.point]}".strip(),
+            row.metric,
+            f"{row.missions:,}",
+            f"{row.mean:.4g} ± {row.half_width:.2g}",
+            f"{row.target:.2g}",
+            "yes" if row.met else "no: the budget ended",
+        ]
+        for row in table.itertuples()
+    ]
+    console.print_table(["precision", "metric", "missions", "mean", "target", "reached"], rows)
+
+
+def _print_sensitivities(table: "pd.DataFrame") -> None:
+    """A table per policy, a row per parameter: its effect alone, and with all interactions."""
+    from analysis import numbers
+
+    if table.empty:
+        return
+    for policy, rows in table[table["metric"] == PRODUCT].groupby("policy", sort=False):
+        cells = [
+            [
+                row.parameter,
+                numbers.interval(row.first, row.first_low, row.first_high),
+                numbers.interval(row.total, row.total_low, row.total_high),
+            ]
+            for row in rows.itertuples()
+        ]
+        console.print_table([f"{policy}: share of the product's variance", "alone", "total"], cells)
+
+
+def _print_comparisons(table: "pd.DataFrame") -> None:
+    """Differences of the other policies from the best one."""
+    if table.empty:
+        return
+    cells, product = _differences(table, "policy")
+    cells["pairing saves"] = product["variance_reduction"].map(_gain)
+    _print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
+
+
+def _print_learners(table: "pd.DataFrame") -> None:
+    """Differences of the learners from the best heuristic."""
+    if table.empty:
+        return
+    cells, product = _differences(table, "learner")
+    cells = cells.assign(about=product["about"], trainings=product["trainings"])
+    _print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
+
+
+def _differences(table: "pd.DataFrame", who: str) -> "tuple[pd.DataFrame, pd.DataFrame]":
+    """Differences in every metric and the p-value of the product, as text; rows of the product."""
+    from analysis import numbers
+
+    estimates = table.rename(columns={"difference": "mean"})
+    cells = numbers.wide(estimates, who, write=numbers.points).rename(columns=SHORT_METRICS)
+    product = table[table["metric"] == PRODUCT].set_index(who)
+    cells["p (Holm)"] = product["p_adjusted"].map(numbers.p_value)
+    return cells, product
+
+
+def _gain(reduction: float) -> str:
+    """How many times as many missions the comparison needs without common random numbers."""
+    return f"{1 / (1 - reduction):.1f} x" if reduction < 1 else ""
+
+
+def _print_worst(table: "pd.DataFrame") -> None:
+    """The worst missions of a policy, with the commands that simulate them again."""
+    from analysis import numbers
+
+    if len(table):
+        print(
+            f" worst missions of {table['policy'].iloc[0]}, by collection ratio and communication:"
+        )
+    for row in table.itertuples():
+        outcome = "" if row.success else ", no success"
+        print(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")

@@ -1,0 +1,78 @@
+"""``dess train``: train a policy into a folder."""
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from reports.cli import console
+
+if TYPE_CHECKING:
+    from policies.ddqn.training import Training
+
+app = typer.Typer()
+
+
+@app.command()
+def train(
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A config or a TOML file.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the training.")],
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the training in the folder.")
+    ] = False,
+    device: Annotated[
+        Literal["auto", "cpu", "cuda"], typer.Option(help="auto takes CUDA if there is a device.")
+    ] = "auto",
+    seed: Annotated[int | None, typer.Option(help="Seed, in place of that of the config.")] = None,
+) -> None:
+    """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly."""
+    from policies.ddqn.config import load_config
+
+    config = load_config(name, **({} if seed is None else {"seed": seed}))
+    from policies.ddqn.session import train
+
+    with console.compile_notice(), _bar(config.ticks) as progress:
+        training = train(
+            config, out, resume=resume, device=device, announce=_print_memory, progress=progress
+        )
+    if not training.done:
+        options = ["--out", str(out), *([] if seed is None else ["--seed", str(seed)])]
+        options += [] if device == "auto" else ["--device", device]
+        command = shlex.join(["dess", "train", name, *options, "--resume"])
+        raise typer.Exit(
+            console.fail(f"interrupted at tick {training.tick}: continue with {command}", 1)
+        )
+    print(
+        f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
+        f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
+    )
+
+
+@contextmanager
+def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
+    """Progress of a training, with the metrics of its last evaluation."""
+    with console.bar("tick", ticks) as bar:
+
+        def show(training: "Training", done: int) -> None:
+            if bar.n == 0:  # a resumed training begins at its tick
+                bar.initial = bar.n = training.tick - done
+            bar.update(training.tick - bar.n)
+            if training.curve:
+                last = training.curve[-1]
+                bar.set_postfix(
+                    phase=last["phase"],
+                    success=f"{last['evaluation_success']:.3f}",
+                    product=f"{last['evaluation_collection_ratio_and_communication']:.3f}",
+                    refresh=False,
+                )
+
+        yield show
+
+
+def _print_memory(size: int) -> None:
+    """Print the size of the replay memory [bytes]."""
+    print(f"replay memory: {size / 2**20:,.0f} MiB", file=sys.stderr)
