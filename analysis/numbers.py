@@ -1,6 +1,6 @@
 """How numbers are written, on pages and in the terminal: shares in percent, with a proper minus."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import pandas as pd
 
@@ -42,6 +42,12 @@ def p_value(p: float) -> str:
     return f"{p:.3f}" if p >= 0.001 else "< 0.001"
 
 
+def span(values: Iterable[float], form: str = "{:,}") -> str:
+    """The least and the largest of some numbers: ``300``, or ``20 to 1,200``."""
+    ordered = sorted(values)
+    return " to ".join(dict.fromkeys(map(form.format, (ordered[0], ordered[-1]))))
+
+
 def words(names: Sequence[str]) -> str:
     """``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
@@ -66,4 +72,5 @@ def wide(
     heads = [columns] if isinstance(columns, str) else [*columns]
     cells = table.assign(text=text).set_index([*rows, *heads])["text"].unstack(heads)
     order = table.drop_duplicates(rows).set_index(rows).index
-    return cells.loc[order, table.drop_duplicates(heads).set_index(heads).index]
+    cells = cells.loc[order, table.drop_duplicates(heads).set_index(heads).index]
+    return cells.rename_axis(columns=[None] * len(heads))

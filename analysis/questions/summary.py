@@ -1,17 +1,25 @@
-"""What a study says, in tidy tables: means, what was selected, and the worst missions."""
+"""The summary of a study, in tidy tables: means, comparisons, selections, the worst missions.
+
+    results = load_results("results/table4")
+    best_policy(results.missions)
+    comparisons(results)
+
+Every function takes results, or the missions in them.
+"""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
 
-from analysis.names import METRICS, PRODUCT
+from analysis import numbers
+from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.tables import Results, parts_of
 from analysis.stats.correction import for_choice
 from analysis.stats.distribution import distribution
-from analysis.stats.intervals import summary
+from analysis.stats.intervals import groups, summary
 from analysis.stats.learners import compare_learners
 from analysis.stats.paired import compare
 from analysis.study.design import Saltelli
@@ -25,6 +33,27 @@ def means(results: Results) -> pd.DataFrame:
         A row per policy, design point and metric, as ``analysis.summary`` has it.
     """
     return summary(results.missions, by=["policy", "point"])
+
+
+def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
+    """Means with intervals of every policy by number of UAVs.
+
+    Returns:
+        Rows of ``analysis.summary`` by ``policy`` (in order of appearance) and ``uavs`` (sorted).
+    """
+    policies = [part for _, part in groups(missions, ["policy"])]
+    return pd.concat(
+        [summary(part.sort_values("uavs"), by=["policy", "uavs"]) for part in policies],
+        ignore_index=True,
+    )
+
+
+def fleet_table(fleets: pd.DataFrame) -> pd.DataFrame:
+    """The rows of ``by_fleet`` as a table of text: a row per policy and number of UAVs."""
+    rows = fleets[fleets["metric"].isin(METRICS)]
+    table = numbers.wide(rows, ["policy", "uavs", "n"]).reset_index()
+    table["n"] = table["n"].map("{:,}".format)
+    return table.rename(columns={"policy": "Policy", "uavs": "UAVs", "n": "Missions", **METRICS})
 
 
 def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
@@ -50,33 +79,33 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
 
 def settings(results: Results) -> list[str]:
     """Every design point in words: the fields that the design sets, with their values."""
-    points = results.store.manifest.points
-    return [", ".join(f"{key} {_plain(v)}" for key, v in point.values.items()) for point in points]
+    return [
+        ", ".join(f"{field} {_value(value)}" for field, value in point.values.items())
+        for point in results.store.manifest.points
+    ]
 
 
 def worst(results: Results, policy: str, missions: int = 5) -> pd.DataFrame:
     """The missions of a policy with the lowest collection ratio and communication.
 
     Returns:
-        A row per mission, the worst first, of those alike first those that collected the smaller
-        part: ``policy``, ``point``, ``replication``, the metrics, and ``command``, which simulates
+        A row per mission, the worst first, of those alike first the one with the lower collection
+        ratio: ``policy``, ``point``, ``replication``, the metrics, and ``command``, which simulates
         it again.
     """
-    metrics = ["success", "collection_ratio", PRODUCT, "reward"]
-    ours = results.missions[results.missions["policy"] == policy]
-    ordered = ours.sort_values([PRODUCT, "collection_ratio"], kind="stable").head(missions)
-    commands = [results.replay(policy, p, r) for p, r in _mission_of(ordered)]
-    table = ordered[["policy", "point", "replication", *metrics]].assign(command=commands)
-    return table.reset_index(drop=True)
+    policy_missions = results.missions[results.missions["policy"] == policy]
+    ordered = policy_missions.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)
+    table = ordered.loc[: missions - 1, ["policy", "point", "replication", *SHARES, *MEANS]]
+    keys = zip(table["point"], table["replication"], strict=True)
+    return table.assign(command=[results.replay(policy, *key) for key in keys])
 
 
 def comparisons(results: Results) -> pd.DataFrame:
     """Every policy against the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as ``stats.paired.compare`` has it, ``p_adjusted`` also
-        for the choice of the best; empty if there is one policy, or a rule gave each its own
-        missions.
+        A row per policy and metric, as of ``analysis.compare``, ``p_adjusted`` also for the choice
+        of the best; empty if there is one policy, or a stopping rule gave each its own missions.
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
@@ -90,30 +119,32 @@ def learners(results: Results) -> dict[str, list[str]]:
     Returns:
         Name of the learner -> its policies, in the order of the study.
     """
-    found: dict[str, list[str]] = {}
+    policies: dict[str, list[str]] = {}
     for team in results.store.manifest.policies:
         if len(team.members) == 1 and (learner := team.members[0].learner):
-            found.setdefault(learner, []).append(team.policy)
-    names = [learner.rpartition(" ")[0] for learner in found]  # without the hash, if they differ
-    return dict(zip(names, found.values(), strict=True)) if len({*names}) == len(names) else found
+            policies.setdefault(learner, []).append(team.policy)
+    names = [learner.rpartition(" ")[0] for learner in policies]  # without the hash
+    unique = len({*names}) == len(names)
+    return dict(zip(names, policies.values(), strict=True)) if unique else policies
 
 
 def learned_against_heuristic(results: Results) -> pd.DataFrame:
     """Every learner against the best policy that has not learned, on the same missions.
 
     Returns:
-        A row per learner and metric, as ``stats.paired.compare_learners`` has it: about the
-        learner where there are several trainings of it, else about this one checkpoint;
-        ``p_adjusted`` also for the choice of the best. Empty if there is nothing to compare, or a
-        rule gave each policy its own missions.
+        A row per learner and metric, as of ``analysis.compare_learners``: about the learner where
+        it has several trainings, else about this one checkpoint; ``p_adjusted`` also for the choice
+        of the best. Empty if there is nothing to compare, or a stopping rule gave each policy its
+        own missions.
     """
     trained = learners(results)
-    learned = {policy for policies in trained.values() for policy in policies}
-    others = results.missions[~results.missions["policy"].isin(learned)]
-    if not trained or others.empty or not _same_missions(results):
+    learned = {policy for checkpoints in trained.values() for policy in checkpoints}
+    heuristics = [policy for policy in results.policies if policy not in learned]
+    if not trained or not heuristics or not _same_missions(results):
         return pd.DataFrame()
-    table = compare_learners(results.missions, trained, best_policy(others), [*METRICS])
-    return for_choice(table, others["policy"].nunique())
+    baseline = best_policy(results.missions, heuristics)
+    table = compare_learners(results.missions, trained, baseline, [*METRICS])
+    return for_choice(table, len(heuristics))
 
 
 def _same_missions(results: Results) -> bool:
@@ -125,8 +156,8 @@ def distributions(results: Results) -> pd.DataFrame:
     """How collection ratio and communication spreads over the missions of every policy.
 
     Returns:
-        A row per policy and view, as ``stats.intervals.distribution`` has it; empty if there
-        are several design points, whose missions are not alike.
+        A row per policy and view, as of ``analysis.distribution``; empty if there are several
+        design points, whose missions are not alike.
     """
     if len(results.store.manifest.points) > 1:
         return pd.DataFrame()
@@ -135,11 +166,11 @@ def distributions(results: Results) -> pd.DataFrame:
 
 
 def precisions(results: Results) -> pd.DataFrame:
-    """How narrow the intervals became that the study asked for.
+    """How narrow the intervals are, for a study with targets.
 
     Returns:
         A row per policy, design point and metric: ``policy``, and the fields of
-        ``analysis.study.stopping.Reached``. Empty if the study asked for none.
+        ``analysis.study.stopping.Reached``. Empty if the study has no targets.
     """
     data, manifest = results.manifest["study"]["precision"], results.store.manifest
     if data is None:
@@ -158,8 +189,8 @@ def sensitivities(results: Results) -> pd.DataFrame:
     """How much each metric of each policy depends on each parameter, and on the noise.
 
     Returns:
-        A row per policy, metric and parameter: ``policy``, and as ``questions.sensitivity`` has it.
-        Empty if the design is not made for it.
+        A row per policy, metric and parameter: ``policy``, and the columns of
+        ``questions.sensitivity``. Empty if the design is not of the kind ``saltelli``.
     """
     design = results.manifest["study"]["design"]
     if not design or design["kind"] != "saltelli":
@@ -174,20 +205,21 @@ def sensitivities(results: Results) -> pd.DataFrame:
 
 
 def selections(results: Results) -> pd.DataFrame:
-    """What was selected for every policy, and what is known of it.
+    """The design point that was selected for every policy, and its guarantee.
 
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, ``missions`` that it took,
         ``left`` (points not ruled out), ``guaranteed``, ``guarantee`` in words. Empty if the study
         selects nothing.
     """
-    rows = []
-    for policy in results.policies:
-        if choice := results.choice(policy):
-            setting = settings(results)[choice.best]
-            told = (choice.missions, len(choice.survivors), choice.guaranteed, choice.guarantee)
-            rows.append((policy, choice.best, setting, *told))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
+    words = settings(results)
+    choices = [(policy, results.choice(policy)) for policy in results.policies]
+    rows = [
+        (policy, c.best, words[c.best], c.missions, len(c.survivors), c.guaranteed, c.guarantee)
+        for policy, c in choices
+        if c is not None
+    ]
     return pd.DataFrame(rows, columns=columns)
 
 
@@ -196,11 +228,7 @@ def checks(results: Results) -> pd.DataFrame:
     return summary(results.checks, by=["policy", "point"])
 
 
-def _mission_of(missions: pd.DataFrame) -> Sequence[tuple[int, int]]:
-    return [*zip(missions["point"], missions["replication"], strict=True)]
-
-
-def _plain(value: object) -> str:
+def _value(value: object) -> str:
     if isinstance(value, list | tuple):
-        return "..".join(map(_plain, value))
+        return "..".join(map(_value, value))
     return f"{value:g}" if isinstance(value, float) else str(value)

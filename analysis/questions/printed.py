@@ -1,0 +1,85 @@
+"""Estimates beside the figures that the paper prints: tables of text, and lists in words.
+
+A mark says where the whole interval of an estimate lies, relative to the printed figure.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.names import METRICS
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, POSITIONS, position
+
+PAPER = "paper"
+MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}
+
+
+def with_mark(estimate: Any, printed: float) -> str:
+    """An estimate (``mean``, ``low``, ``high``) with its mark: ``97.3 % [96.1, 98.1] ▲``."""
+    return f"{_text(estimate)} {MARKS[position(estimate, printed)]}"
+
+
+def beside(estimates: pd.DataFrame, printed: Mapping[str, float]) -> pd.DataFrame:
+    """The metrics of every policy, and their differences to printed figures.
+
+    Args:
+        estimates: Rows of ``analysis.summary`` by ``policy``.
+        printed: The printed figures by metric.
+
+    Returns:
+        A row of the printed figures, and one per policy; two columns of text per metric: the mean
+        with its interval, and the difference in percentage points with its mark.
+    """
+    columns = {("", "Policy"): [PAPER, *estimates["policy"].unique()]}
+    for metric, figure in printed.items():
+        rows = [*estimates[estimates["metric"] == metric].itertuples()]
+        gaps = [numbers.difference(row.mean, figure) for row in rows]
+        marks = [MARKS[position(row, figure)] for row in rows]
+        name = METRICS[metric]
+        columns[name, "mean"] = [numbers.percent(figure), *map(_text, rows)]
+        columns[name, "to paper"] = ["", *map(" ".join, zip(gaps, marks, strict=True))]
+    return pd.DataFrame(columns)
+
+
+def beside_by_fleet(
+    estimates: pd.DataFrame, printed: Mapping[int, Mapping[str, float]]
+) -> pd.DataFrame:
+    """The metrics of every policy by number of UAVs, with marks relative to printed figures.
+
+    Args:
+        estimates: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
+        printed: The printed figures by number of UAVs, then by metric.
+
+    Returns:
+        A row of the printed figures, and one per policy; a column of text per metric and number.
+    """
+    columns = {("", "Policy"): [PAPER, *estimates["policy"].unique()]}
+    for metric in next(iter(printed.values())):
+        for uavs, figures in printed.items():
+            figure = figures[metric]
+            rows = estimates[(estimates["metric"] == metric) & (estimates["uavs"] == uavs)]
+            texts = [with_mark(row, figure) for row in rows.itertuples()]
+            columns[METRICS[metric], f"I = {uavs}"] = [numbers.percent(figure), *texts]
+    return pd.DataFrame(columns)
+
+
+def positions_in_words(estimates: pd.DataFrame, printed: Mapping[str, float]) -> str:
+    """A Markdown list of which policies are above, around and below the figure of each metric."""
+    return "\n".join(
+        _line(estimates[estimates["metric"] == metric], metric, figure)
+        for metric, figure in printed.items()
+    )
+
+
+def _line(estimates: pd.DataFrame, metric: str, figure: float) -> str:
+    policies: dict[str, list[str]] = {side: [] for side in POSITIONS}
+    for row in estimates.itertuples():
+        policies[position(row, figure)].append(row.policy)
+    parts = [f"{side}: {numbers.words(names)}" for side, names in policies.items() if names]
+    return f"- **{METRICS[metric]}** (paper {numbers.percent(figure)}), {'; '.join(parts)}."
+
+
+def _text(estimate: Any) -> str:
+    return numbers.interval(estimate.mean, estimate.low, estimate.high)

@@ -1,0 +1,42 @@
+"""How numbers are written."""
+
+import pandas as pd
+import pytest
+
+from analysis import numbers
+
+
+def test_shares_are_in_percent_with_a_proper_minus() -> None:
+    assert numbers.percent(0.97312) == "97.3 %"
+    assert numbers.interval(0.5, -0.012, 1) == "50.0 % [−1.2, 100.0]"
+    assert numbers.percent(-0.0001) == "0.0 %"  # no minus on zero
+
+
+def test_differences_are_in_points_with_a_sign() -> None:
+    assert numbers.difference(0.5, 0.426) == "+7.4"
+    assert numbers.difference(0.5, 0.521) == "−2.1"
+    assert numbers.difference(0.5, 0.50001) == "0.0"
+    assert numbers.points(0.01, -0.002, 0.0222) == "+1.0 [−0.2, +2.2]"
+
+
+@pytest.mark.parametrize(
+    ("values", "text"), [([300, 300], "300"), ([1200, 20, 300], "20 to 1,200"), ([7], "7")]
+)
+def test_a_span_is_one_number_where_all_are_alike(values: list[int], text: str) -> None:
+    assert numbers.span(values) == text
+
+
+def test_names_are_joined_as_in_a_sentence() -> None:
+    assert numbers.words(["a"]) == "a"
+    assert numbers.words(["a", "b", "c"]) == "a, b and c"
+
+
+def test_a_wide_table_keeps_the_order_of_appearance() -> None:
+    rows = [("tour", 2, "z", 0.2), ("tour", 2, "a", 0.3), ("greedy", 1, "z", 0.4)]
+    table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean"])
+    estimates = table.assign(low=table["mean"], high=table["mean"])
+    wide = numbers.wide(estimates, ["policy", "uavs"], write=lambda mean, low, high: f"{mean:g}")
+    assert wide.index.tolist() == [("tour", 2), ("greedy", 1)]
+    assert wide.columns.tolist() == ["z", "a"]
+    assert wide["z"].tolist() == ["0.2", "0.4"]
+    assert wide.columns.name is None
