@@ -4,90 +4,113 @@ Verdicts are computed, for two policies: the best learned one of each study, and
 paper's observation, network and algorithm.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import pandas as pd
 
-from analysis.replication.claims import Claim, section_v
-from analysis.replication.evidence_of_policy import Case, Finding, MissingError, Quantity, Studies
-from analysis.replication.rules import MARGIN, NO_RESULTS
+from analysis.replication.claims import SECTIONS, TRAININGS, Claim, Section
+from analysis.replication.evidence_of_policy import (
+    EvidenceOfPolicy,
+    MissingError,
+    evidence_of_policy,
+    evidence_of_trainings,
+)
+from analysis.replication.measures import Measured, Quantity
+from analysis.replication.rules import MARGIN, NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
-from analysis.stats.verdict import INCONCLUSIVE
+from analysis.stats.verdict import INCONCLUSIVE, position
 from dess.errors import InputError
 
-# By learner: that with the paper's observation, network and algorithm.
+# The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
 # Trainings with and without transfer learning, with the means of the best learned policy.
 VARIANTS = ("quick", "no transfer")
 
-# Missions flown again for each number of UAVs, to see where they fly.
-FLIGHTS = 12
+Evidence = Callable[[str], Any]  # from the name of a study, as of ``evidence_of_policy``
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the results of a policy say of a claim.
+
+    Attributes:
+        verdict: One of ``rules.VERDICTS``.
+        policy: The policy; empty where it is about trainings.
+        quantities: The figures that it rests on; the first is the one to set beside the paper's.
+        against: Where its interval lies to the printed figure, as by ``stats.verdict.position``;
+            empty if there is none to compare.
+        note: More of it in words, or why there are no results.
+    """
+
+    verdict: str
+    policy: str = ""
+    quantities: tuple[Quantity, ...] = ()
+    against: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A claim of the paper with its verdicts.
+    """A claim of the paper, its section, its rule in words, and the findings of each policy."""
 
-    Attributes:
-        part: The heading that it belongs under.
-        claim: The claim.
-        place: Where the paper makes it.
-        printed: The paper's figures; empty if it prints none.
-        rule: In words, how the verdicts are computed.
-        evidence: The page that shows it, and the section: ``mission.html#fig-4``.
-        learned: By the best learned policy of each study.
-        papers_network: By the policy with the paper's observation, network and algorithm.
-    """
-
-    part: str
-    claim: str
-    place: str
-    printed: tuple[Quantity, ...]
+    section: Section
+    claim: Claim
     rule: str
-    evidence: str
-    learned: Finding
-    papers_network: Finding
+    findings: tuple[Finding, ...]
 
 
-def scorecard(
-    studies: Mapping[str, Results], trainings: pd.DataFrame, flights: int = FLIGHTS
-) -> list[Row]:
-    """Every claim with its verdicts.
+def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[Row]:
+    """Every claim with its verdicts, the same for the same results.
 
     Args:
         studies: Results by the name of the study: ``table4``, ``fig4``, ``fig5``, ``sweet-spot``,
             those there are.
-        trainings: Learning curves, with the columns that ``curves`` reads; may be empty.
-        flights: How many missions of Fig. 4 are flown again for each number of UAVs.
+        trainings: Learning curves, with the columns that ``questions.learning`` reads; may be
+            empty.
 
     Returns:
-        A row per claim, the same for the same results.
+        A row per claim. The findings are those of the best learned policy of each study, and of
+        the one with the paper's observation, network and algorithm.
     """
-    everything = Studies(studies, trainings, flights)
-    cases = Case(everything, (), VARIANTS), Case(everything, (PAPERS_NETWORK,))
-    return [
-        Row(
-            c.part,
-            c.text,
-            c.place,
-            c.printed,
-            c.rule,
-            c.evidence,
-            *(_judged(c, each) for each in cases),
-        )
-        for c in section_v(margin(studies))
+
+    def evidence(learner: str, variants: tuple[str, str] | None, study: str) -> Any:
+        if study == TRAININGS:
+            return evidence_of_trainings(trainings, variants)
+        return evidence_of_policy(studies, study, learner)
+
+    policies = partial(evidence, "", VARIANTS), partial(evidence, PAPERS_NETWORK, None)
+    return [row for section in SECTIONS for row in _rows(section, margin(studies), policies)]
+
+
+def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> list[Row]:
+    """The claims of a section with what the results of one policy say, whatever it is."""
+    return _rows(section, margin(studies), [partial(evidence_of_policy, studies, policy=policy)])
+
+
+def listed(rows: Iterable[Row]) -> str:
+    """Claims with the verdict on one policy and the rule, a line of Markdown each."""
+    lines = [
+        f"- {row.claim.text}: **{row.findings[0].verdict}**"
+        + (f"; {row.findings[0].note}" if row.findings[0].note else "")
+        + f". ({row.rule})"
+        for row in rows
     ]
+    return "\n".join(lines)
 
 
-def of_policy(
-    studies: Mapping[str, Results], policy: str, part: str
-) -> list[tuple[Claim, Finding]]:
-    """The claims under a heading with what the results of one policy say, whatever it is."""
-    case = Case(Studies(studies, pd.DataFrame(), FLIGHTS), named=policy)
-    own = (claim for claim in section_v(margin(studies)) if claim.part == part)
-    return [(claim, _judged(claim, case)) for claim in own]
+def counted(rows: Iterable[Row]) -> str:
+    """How many claims have each verdict on one policy, as ``holds: 3; inconclusive: 1``."""
+    verdicts = [row.findings[0].verdict for row in rows]
+    return "; ".join(f"{v}: {verdicts.count(v)}" for v in VERDICTS if v in verdicts)
+
+
+def margin(studies: Mapping[str, Results]) -> float:
+    """The difference that does not matter: the indifference of the sweet spot's selection."""
+    rule = studies["sweet-spot"].manifest["study"]["selection"] if "sweet-spot" in studies else None
+    return (rule or {}).get("indifference") or MARGIN
 
 
 def departures(training: Mapping[str, Any]) -> list[str]:
@@ -98,7 +121,7 @@ def departures(training: Mapping[str, Any]) -> list[str]:
     """
     n_step, num_envs = training["n_step"], training["num_envs"]
     greedy = all(phase["temperature"] == 0 for phase in training["phases"])
-    found = {
+    differs = {
         "the return guard, which masks actions that leave no way back": training["guard"],
         "missions that start with little battery": training["low_battery_starts"],
         "early returns": training["early_returns"],
@@ -108,25 +131,48 @@ def departures(training: Mapping[str, Any]) -> list[str]:
         f"{num_envs:,} missions side by side": num_envs > 1,
         "a slow copy of the weights, which is the one evaluated": training["average_rate"] < 1,
     }
-    return [words for words, ours in found.items() if ours]
+    return [words for words, applies in differs.items() if applies]
 
 
-def _judged(claim: Claim, case: Case) -> Finding:
-    """What a policy's results say of a claim; without results, why there are none.
+def _rows(section: Section, margin: float, policies: Iterable[Evidence]) -> list[Row]:
+    """The claims of a section, with findings by the evidence of several policies."""
+    evidence = [cache(partial(of_study, section.study)) for of_study in policies]
+    return [
+        Row(
+            section,
+            claim,
+            claim.rule_in_words(margin),
+            tuple(_finding(claim, margin, of_policy) for of_policy in evidence),
+        )
+        for claim in section.claims
+    ]
 
-    A single mission, or training, has no spread that could make anything sure.
-    """
+
+def _finding(claim: Claim, margin: float, evidence: Callable[[], Any]) -> Finding:
+    """What a policy's results say of a claim; without results, why there are none."""
     try:
-        found = claim.judge(case)
-        alone = any(quantity.n == 1 for quantity in found.quantities)
-        return replace(found, verdict=INCONCLUSIVE) if alone else found
+        of_study = evidence()
+        measured = claim.measure(of_study)
     except MissingError as missing:
         return Finding(NO_RESULTS, note=str(missing))
-    except InputError:  # another design, or missions that this code flies in another way
+    except InputError:  # a study of another design
         return Finding(NO_RESULTS, note="the results there are were not made for it")
+    policy = of_study.policy if isinstance(of_study, EvidenceOfPolicy) else ""
+    verdict, against = _verdict(claim, margin, measured), _against(claim, measured)
+    return Finding(verdict, policy, measured.quantities, against, measured.note)
 
 
-def margin(studies: Mapping[str, Results]) -> float:
-    """The indifference of the sweet spot's selection; the page on parameters goes by it, too."""
-    rule = studies["sweet-spot"].manifest["study"]["selection"] if "sweet-spot" in studies else None
-    return (rule or {}).get("indifference") or MARGIN
+def _verdict(claim: Claim, margin: float, measured: Measured) -> str:
+    """By the rule; a single mission, or training, has no spread that could make anything sure."""
+    if any(quantity.n == 1 for quantity in measured.quantities):
+        return INCONCLUSIVE
+    known = {"margin": margin, "printed": claim.printed and claim.printed.interval}
+    return claim.rule.judge(*measured.arguments, **{name: known[name] for name in claim.rule.takes})
+
+
+def _against(claim: Claim, measured: Measured) -> str:
+    """Where the interval of the first figure lies to the printed one, if both are of a kind."""
+    first, printed = measured.quantities[0], claim.printed
+    if printed is None or first.low is None or first.unit != printed.unit:
+        return ""
+    return position(first.interval, printed.value)

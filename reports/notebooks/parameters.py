@@ -34,8 +34,8 @@ from analysis.questions import main_effects as effects
 from analysis.questions import summary as findings
 from analysis.replication import paper
 from analysis.replication.claims import FIG_5
-from analysis.replication.rules import NO_RESULTS, VERDICTS, margin_in_words
-from analysis.replication.scorecard import margin, of_policy
+from analysis.replication.rules import NO_RESULTS, margin_in_words
+from analysis.replication.scorecard import counted, listed, margin, of_policy
 from analysis.stats.intervals import LEVEL
 from analysis.study.design import NOISE
 from reports.pages import html
@@ -145,29 +145,21 @@ display(Markdown("\n".join(lines)))
 # %%
 too_little = margin_in_words(margin({"sweet-spot": sweet}))  # to matter
 of_leading = of_policy({"fig5": fig5, "sweet-spot": sweet}, leading, FIG_5)
-claims = [(claim, found) for claim, found in of_leading if found.verdict != NO_RESULTS]
+claims = [row for row in of_leading if row.findings[0].verdict != NO_RESULTS]
 display(
     Markdown(
         f"The claims of the paper on its Fig. 5, and what they are worth for {leading}; by the "
-        "rules of the replication scorecard. One cannot be told where the missions are too few for "
-        "either answer.\n\n"
-        + "\n".join(
-            f"- {claim.text}: **{found.verdict}**"
-            + (f"; {found.note}" if found.note else "")
-            + f". ({claim.rule})"
-            for claim, found in claims
-        )
+        "rules of the replication scorecard. One is inconclusive where the missions are too few "
+        "for either answer.\n\n" + listed(claims)
     )
 )
 
 # %%
-verdicts = [found.verdict for _, found in claims]
-counted = [f"{v}: {verdicts.count(v)}" for v in VERDICTS if v in verdicts]
 sizes = {field: max(pairs[leading, field, PRODUCT]["difference"].abs()) for field in fields}
 order = sorted(fields, key=sizes.get, reverse=True)
 display(
     Markdown(
-        f"So for {leading}, of {len(claims)} claims, {'; '.join(counted)}. They overlap, so their "
+        f"So for {leading}, of {len(claims)} claims, {counted(claims)}. They overlap, so their "
         "number is no score. By the largest difference between two values, the "
         "parameters rank: "
         + numbers.words([f"{parameter(f).within} ({100 * sizes[f]:.1f} points)" for f in order])

@@ -25,7 +25,7 @@ STUDIES: dict[str, dict[str, Any]] = {
     "fig1": {"missions": 8},
     "comparison": {"policies": POLICIES, "missions": 40},
     "verification": {"missions": 200, "logged": 8},
-    "fig4": {"policies": POLICIES, "missions": 8},
+    "fig4": {"policies": POLICIES, "missions": 8, "logged": 2},
     "fig5": {"policies": POLICIES, "missions": 8},
     "sweet-spot": {
         "policies": POLICIES,

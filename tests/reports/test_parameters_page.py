@@ -44,11 +44,11 @@ def test_the_page_tells_what_the_studies_found(results: Path) -> None:
 def test_verdicts_are_those_of_the_scorecard(results: Path) -> None:
     text = said_by("parameters", results=str(results))
     studies = {name: load_results(results / name) for name in ("fig5", "sweet-spot")}
-    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.part == FIG_5]
-    told = [row for row in rows if row.learned.verdict != NO_RESULTS]
+    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.section == FIG_5]
+    told = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
     assert len(told) > 5
     for row in told:
-        assert f"- {row.claim}: {row.learned.verdict}" in text
+        assert f"- {row.claim.text}: {row.findings[0].verdict}" in text
         assert row.rule in text
     assert f"So for ddqn, of {len(told)} claims" in text
 

@@ -24,7 +24,7 @@ SUMMARY, ALL = 4, 99
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     run_study(load_study(NAME, **SMALL), folder / NAME)
-    run_study(load_study("fig4", policies=["random"], missions=2), folder / "fig4")
+    run_study(load_study("fig4", policies=["random"], missions=2, logged=1), folder / "fig4")
     return folder
 
 

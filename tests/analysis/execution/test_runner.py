@@ -323,7 +323,7 @@ def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
     assert ours == results.scenario(1)
     assert ours.max_slots == 99
     assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]
-    shipped = load_study("fig4", policies=["greedy"], missions=1)
+    shipped = load_study("fig4", policies=["greedy"], missions=1, logged=0)
     command = run_study(shipped, tmp_path / "fig4").replay("greedy", 1, 0)
     assert command == (
         "dess simulate --scenario fig4 --set uavs=2 --policy greedy --seed 2022 --replication 0"

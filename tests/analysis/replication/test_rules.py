@@ -1,36 +1,49 @@
 """Every rule can be met, refuted and left open, by figures made up for it."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from analysis.questions import main_effects
+from analysis.questions.learning import Transfer
+from analysis.questions.main_effects import Shape
 from analysis.replication import paper, rules
-from analysis.replication.rules import NO_RESULTS, VERDICTS
+from analysis.replication.evidence_of_policy import Pairs, negated
 from analysis.stats.intervals import Interval
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from analysis.study.selection import Choice
 from tests.analysis.questions.test_main_effects import pairs_of
 
-RULES = (
-    rules.reached,
-    lambda difference: rules.gained(difference, 0.2),
-    rules.higher,
-    rules.lower,
-    rules.slightly_lower,
-    lambda difference: rules.kept(difference, 0.01),
-    rules.most,
+OF_ONE_INTERVAL: tuple[Callable[[Interval], str], ...] = (
+    lambda mean: rules.reached.judge(mean, exactly(0.5)),
+    lambda difference: rules.gained.judge(difference, exactly(0.2)),
+    rules.higher.judge,
+    rules.lower.judge,
+    rules.slightly_lower.judge,
+    lambda difference: rules.kept.judge(difference, 0.01),
+    rules.most.judge,
 )
+
+
+def exactly(figure: float) -> Interval:
+    return Interval(figure, figure, figure)
 
 
 def around(mean: float, half: float = 0.01) -> Interval:
     return Interval(mean, mean - half, mean + half)
 
 
-@given(st.floats(-1, 1), st.integers(0, len(RULES) - 1))
-def test_what_is_not_known_at_all_is_never_told(mean: float, rule: int) -> None:
-    assert RULES[rule](Interval(mean, -9.0, 9.0)) == INCONCLUSIVE
+@given(st.floats(-1, 1), st.sampled_from(OF_ONE_INTERVAL))
+def test_an_interval_from_end_to_end_is_inconclusive(
+    mean: float, judge: Callable[[Interval], str]
+) -> None:
+    assert judge(Interval(mean, -9.0, 9.0)) == INCONCLUSIVE
 
 
 @pytest.mark.parametrize(
@@ -47,19 +60,17 @@ def test_what_is_not_known_at_all_is_never_told(mean: float, rule: int) -> None:
     ],
 )
 def test_a_figure_is_reached(mean: float, half: float, verdict: str) -> None:
-    assert rules.reached(around(mean, half)) == verdict
+    assert rules.reached.judge(around(0.5 + mean, half), exactly(0.5)) == verdict
 
 
 def test_the_paper_s_figures_vary_as_well() -> None:
     """Newcombe's example: 56 of 70 against 48 of 80, 20 points [5.2, 33.4]."""
     ours, theirs = paper.spread(56 / 70, 70), paper.spread(48 / 80, 80)
     assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
-    exact = rules.gap(around(0.8, 0.02), Interval(0.7, 0.7, 0.7))
-    assert tuple(exact) == pytest.approx((0.1, 0.08, 0.12))
-    assert rules.reached(rules.gap(around(0.89, 0.01), Interval(0.9, 0.9, 0.9))) == HOLDS
+    assert tuple(rules.gap(around(0.8, 0.02), exactly(0.7))) == pytest.approx((0.1, 0.08, 0.12))
     below = around(0.89, 0.009)
-    assert rules.reached(rules.gap(below, Interval(0.9, 0.9, 0.9))) == IN_PART
-    assert rules.reached(rules.gap(below, Interval(0.9, 0.88, 0.92))) == HOLDS
+    assert rules.reached.judge(below, exactly(0.9)) == IN_PART
+    assert rules.reached.judge(below, Interval(0.9, 0.88, 0.92)) == HOLDS
 
 
 def test_the_interval_of_a_printed_share_is_wilsons() -> None:
@@ -80,7 +91,7 @@ def test_the_interval_of_a_printed_share_is_wilsons() -> None:
     ],
 )
 def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -> None:
-    assert rules.gained(around(mean, half), 0.26) == verdict
+    assert rules.gained.judge(around(mean, half), exactly(0.26)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -88,7 +99,7 @@ def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -
     [(0.02, HOLDS), (0.005, INCONCLUSIVE), (-0.001, INCONCLUSIVE), (-0.02, REFUTED)],
 )
 def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
-    assert rules.higher(around(mean)) == rules.lower(around(-mean)) == verdict
+    assert rules.higher.judge(around(mean)) == rules.lower.judge(around(-mean)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -103,7 +114,7 @@ def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
     ],
 )
 def test_slightly_lower(mean: float, half: float, verdict: str) -> None:
-    assert rules.slightly_lower(around(mean, half)) == verdict
+    assert rules.slightly_lower.judge(around(mean, half)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -118,38 +129,40 @@ def test_slightly_lower(mean: float, half: float, verdict: str) -> None:
     ],
 )
 def test_kept_up_to_a_margin(mean: float, half: float, verdict: str) -> None:
-    assert rules.kept(around(mean, half), 0.01) == verdict
+    assert rules.kept.judge(around(mean, half), 0.01) == verdict
 
 
 def test_shares_of_missions() -> None:
-    assert rules.most(around(0.6, 0.05)) == HOLDS
-    assert rules.most(around(0.6, 0.2)) == rules.most(around(0.4, 0.2)) == INCONCLUSIVE
-    assert rules.most(around(0.4, 0.05)) == REFUTED
+    assert rules.most.judge(around(0.6, 0.05)) == HOLDS
+    assert rules.most.judge(around(0.6, 0.2)) == rules.most.judge(around(0.4, 0.2)) == INCONCLUSIVE
+    assert rules.most.judge(around(0.4, 0.05)) == REFUTED
 
 
 def test_missions_that_collect_everything() -> None:
     none, some, every = Interval(0, 0, 0.01), Interval(0.1, 0.05, 0.2), Interval(1, 0.9, 1)
-    assert rules.never_all(none, around(0.9)) == HOLDS
-    assert rules.never_all(some, around(0.9)) == IN_PART
-    assert rules.never_all(Interval(0, 0, 0.2), around(0.9)) == IN_PART  # few missions
-    assert rules.never_all(some, around(0.99)) == INCONCLUSIVE
-    assert rules.never_all(every, around(1.0, 0)) == REFUTED
+    assert rules.never_all.judge(around(0.9), none) == HOLDS
+    assert rules.never_all.judge(around(0.9), some) == IN_PART
+    assert rules.never_all.judge(around(0.9), Interval(0, 0, 0.2)) == IN_PART  # few missions
+    assert rules.never_all.judge(around(0.99), some) == INCONCLUSIVE
+    assert rules.never_all.judge(around(1.0, 0), every) == REFUTED
 
 
 def test_ignored_nodes() -> None:
-    assert rules.ignored(around(0.8), around(0.5)) == HOLDS
-    assert rules.ignored(around(0.4), around(0.2)) == IN_PART  # more than others, not most
-    assert rules.ignored(around(0.9), around(-0.1)) == IN_PART  # most, but the others too
-    assert rules.ignored(around(0.2), around(-0.1)) == REFUTED
-    assert rules.ignored(around(0.5), around(0.0)) == INCONCLUSIVE
+    assert rules.ignored.judge(around(0.8), around(0.5)) == HOLDS
+    assert rules.ignored.judge(around(0.4), around(0.2)) == IN_PART  # more than others, not most
+    assert rules.ignored.judge(around(0.9), around(-0.1)) == IN_PART  # most, but the others too
+    assert rules.ignored.judge(around(0.2), around(-0.1)) == REFUTED
+    assert rules.ignored.judge(around(0.5), around(0.0)) == INCONCLUSIVE
 
 
 def test_divided_nodes() -> None:
-    assert rules.divided(around(0.2), around(0.95)) == HOLDS
-    assert rules.divided(around(0.0), around(0.95)) == IN_PART  # nodes of their own, no sectors
-    assert rules.divided(around(0.2), around(0.6)) == IN_PART
-    assert rules.divided(around(0.0), around(0.6)) == REFUTED
-    assert rules.divided(around(0.0), around(0.75)) == INCONCLUSIVE
+    assert rules.divided.judge(around(0.2), around(0.95)) == HOLDS
+    assert (
+        rules.divided.judge(around(0.0), around(0.95)) == IN_PART
+    )  # nodes of their own, no sectors
+    assert rules.divided.judge(around(0.2), around(0.6)) == IN_PART
+    assert rules.divided.judge(around(0.0), around(0.6)) == REFUTED
+    assert rules.divided.judge(around(0.0), around(0.75)) == INCONCLUSIVE
 
 
 @pytest.mark.parametrize(
@@ -163,81 +176,111 @@ def test_divided_nodes() -> None:
 )
 def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> None:
     choice = Choice(best, left, (), (), "kn", "", True, True, 0, 0, 0)
-    assert rules.chosen(choice, [4, 5]) == verdict
+    assert rules.chosen.judge(choice, [4, 5]) == verdict
+
+
+def transfer(last: Interval, verdict: str = HOLDS, throughout: bool = True) -> Transfer:
+    """Trainings that are as long as the paper's."""
+    return Transfer(verdict, 0, throughout, last, paper.CROSSING, (3, 3))
 
 
 def test_learning_curves() -> None:
-    assert rules.throughout(HOLDS, True) == HOLDS
-    assert rules.throughout(HOLDS, False) == IN_PART  # it ends above, but was below
-    assert rules.throughout(INCONCLUSIVE, True) == INCONCLUSIVE
-    assert rules.throughout(REFUTED, False) == REFUTED
-    assert rules.levels_off(0.4, around(0.1)) == HOLDS
-    assert rules.levels_off(0.4, around(0.0)) == IN_PART  # early, not shown to be low
-    assert rules.levels_off(0.9, around(0.1)) == IN_PART  # low, not early
-    assert rules.levels_off(0.9, around(0.0)) == INCONCLUSIVE
-    assert rules.levels_off(0.9, around(-0.1)) == REFUTED
+    throughout, levels_off = rules.throughout.judge, rules.levels_off.judge
+    above = around(0.1)
+    assert throughout(transfer(above)) == rules.passes.judge(transfer(above)) == HOLDS
+    below_at_first = transfer(above, throughout=False)
+    assert (throughout(below_at_first), rules.passes.judge(below_at_first)) == (IN_PART, HOLDS)
+    for verdict in (INCONCLUSIVE, REFUTED):
+        assert throughout(transfer(above, verdict)) == verdict
+    assert levels_off(0.4, transfer(above)) == HOLDS
+    assert levels_off(0.4, transfer(around(0.0))) == IN_PART  # early, not shown to be low
+    assert levels_off(0.9, transfer(above)) == IN_PART  # low, not early
+    assert levels_off(0.9, transfer(around(0.0))) == INCONCLUSIVE
+    assert levels_off(0.9, transfer(around(-0.1))) == REFUTED
 
 
-def test_single_trainings_leave_it_open() -> None:
-    assert rules.levels_off(0.9, Interval(0.1, np.nan, np.nan)) == INCONCLUSIVE
+def test_single_and_short_trainings_leave_it_open() -> None:
+    single = transfer(Interval(0.1, np.nan, np.nan))
+    assert rules.levels_off.judge(0.9, single) == INCONCLUSIVE
+    short = replace(transfer(around(0.1)), length=paper.CROSSING - 1)
+    assert rules.levels_off.judge(0.4, short) == INCONCLUSIVE
 
 
 def test_the_margin_is_in_the_words() -> None:
-    for words in (rules.kept_words, rules.no_lower_words, rules.alike_words):
-        assert "1 point" in words(0.01) and "2.5 points" in words(0.025)
+    for rule in (rules.kept, rules.no_lower, rules.alike):
+        assert "1 point" in rule.in_words(0.01) and "2.5 points" in rule.in_words(0.025)
 
 
-def test_the_verdicts_are_five_words() -> None:
-    assert {*VERDICTS} == {HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS}
+def leads_of(
+    steps: list[float], *positions: int, sure: bool = True, half: float = 0.001
+) -> pd.DataFrame:
+    """The differences of some values of a parameter to all others, from the steps in between."""
+    changes = pairs_of(steps, sure, half)
+    return Pairs(changes, {str(n): n for n in range(len(steps) + 1)}).leads(*map(str, positions))
 
 
-def test_best_at() -> None:
-    assert rules.best_at(pairs_of([1, 1]), 2) == HOLDS
-    assert rules.best_at(pairs_of([1, -2]), 1) == HOLDS
-    assert rules.best_at(pairs_of([1, 1]), 1) == REFUTED
-    assert rules.best_at(pairs_of([1, 0]), 2) == INCONCLUSIVE  # as high as the one before
-    assert rules.best_at(pairs_of([1, 1], sure=False), 2) == INCONCLUSIVE
+def test_the_best_value() -> None:
+    best = rules.best.judge
+    assert best(leads_of([1, 1], 2)) == HOLDS
+    assert best(leads_of([1, -2], 1)) == HOLDS
+    assert best(leads_of([1, 1], 1)) == REFUTED
+    assert best(leads_of([1, 0], 2)) == INCONCLUSIVE  # as high as the one before
+    assert best(leads_of([1, 1], 2, sure=False)) == INCONCLUSIVE
+
+
+def test_the_lowest_value_is_the_best_of_the_negative() -> None:
+    lowest = rules.lowest.judge
+    assert lowest(negated(leads_of([1, 1], 0))) == HOLDS
+    assert lowest(negated(leads_of([1, 1], 1))) == REFUTED
+    assert lowest(negated(leads_of([0, 1], 0))) == INCONCLUSIVE
 
 
 def test_no_lower() -> None:
-    assert rules.no_lower(pairs_of([0, 0, 0]), [0, 1], 0.01) == HOLDS
-    assert rules.no_lower(pairs_of([0, -1, 0]), [0, 1], 0.01) == HOLDS
-    assert rules.no_lower(pairs_of([0, 1, 0]), [0, 1], 0.01) == REFUTED
-    assert rules.no_lower(pairs_of([0, -1, 0]), [2, 3], 0.01) == REFUTED
-    assert rules.no_lower(pairs_of([0, 0, 0], half=0.02), [0, 1], 0.01) == INCONCLUSIVE
-    assert rules.no_lower(pairs_of([1, 0, 0]), [0, 1], 0.01) == REFUTED  # the first is lower
-    assert rules.no_lower(pairs_of([0, 0.005, 0]), [0, 1], 0.01) == HOLDS  # by less than matters
+    no_lower = rules.no_lower.judge
+    assert no_lower(leads_of([0, 0, 0], 0, 1), 0.01) == HOLDS
+    assert no_lower(leads_of([0, -1, 0], 0, 1), 0.01) == HOLDS
+    assert no_lower(leads_of([0, 1, 0], 0, 1), 0.01) == REFUTED
+    assert no_lower(leads_of([0, -1, 0], 2, 3), 0.01) == REFUTED
+    assert no_lower(leads_of([0, 0, 0], 0, 1, half=0.02), 0.01) == INCONCLUSIVE
+    assert no_lower(leads_of([1, 0, 0], 0, 1), 0.01) == REFUTED  # the first is lower
+    assert no_lower(leads_of([0, 0.005, 0], 0, 1), 0.01) == HOLDS  # by less than matters
 
 
-def test_no_lower_is_refuted_beyond_the_margin_alone() -> None:
-    """Surely lower, but perhaps by less than matters; or beyond, but not with all at once."""
-    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.015), [0, 1], 0.01) == INCONCLUSIVE
-    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.006), [0, 1], 0.01) == INCONCLUSIVE
-    assert rules.no_lower(pairs_of([0, 0.02, 0], half=0.004), [0, 1], 0.01) == REFUTED
+@pytest.mark.parametrize(
+    ("half", "verdict"),
+    [(0.015, INCONCLUSIVE), (0.006, INCONCLUSIVE), (0.004, REFUTED)],
+)
+def test_only_what_is_wholly_beyond_the_margin_is_refuted(half: float, verdict: str) -> None:
+    """Surely lower, perhaps by less than matters; beyond, but not with all at once; beyond."""
+    assert rules.no_lower.judge(leads_of([0, 0.02, 0], 0, 1, half=half), 0.01) == verdict
+    assert rules.alike.judge(pairs_of([0, 0.02], half=half), 0.01) == verdict
 
 
 def test_alike() -> None:
-    assert rules.alike(pairs_of([0, 0.005]), 0.01) == HOLDS
-    assert rules.alike(pairs_of([0.005, 0.005]), 0.01) == INCONCLUSIVE  # it might be a little more
-    assert rules.alike(pairs_of([0, 0.05]), 0.01) == REFUTED
-    assert rules.alike(pairs_of([0, -0.05]), 0.01) == REFUTED
+    alike = rules.alike.judge
+    assert alike(pairs_of([0, 0.005]), 0.01) == HOLDS
+    assert alike(pairs_of([0.005, 0.005]), 0.01) == INCONCLUSIVE  # perhaps a little more
+    assert alike(pairs_of([0, 0.05]), 0.01) == REFUTED
+    assert alike(pairs_of([0, -0.05]), 0.01) == REFUTED
 
 
-def test_alike_is_refuted_beyond_the_margin_alone() -> None:
-    """The differences are sure, and by their means beyond the margin: that is not enough."""
-    assert rules.alike(pairs_of([0, 0.02], half=0.015), 0.01) == INCONCLUSIVE
-    assert rules.alike(pairs_of([0, 0.02], half=0.006), 0.01) == INCONCLUSIVE  # not all at once
-    assert rules.alike(pairs_of([0, 0.02], half=0.004), 0.01) == REFUTED
+@pytest.mark.parametrize(
+    ("shape", "verdict"),
+    [
+        (Shape(main_effects.PEAK, (2,)), HOLDS),
+        (Shape(main_effects.PEAK, (1,)), REFUTED),
+        (Shape(main_effects.RISES, (2, 3)), INCONCLUSIVE),  # nothing is seen to fall
+        (Shape(main_effects.LEVELS, (0, 1, 2, 3)), INCONCLUSIVE),
+        (Shape(main_effects.VALLEY, ()), REFUTED),
+    ],
+)
+def test_a_peak(shape: Shape, verdict: str) -> None:
+    assert rules.peaks.judge(shape, 2) == verdict
 
 
-def test_peaks_at() -> None:
-    assert rules.peaks_at(pairs_of([1, 1, -1]), 2) == HOLDS
-    assert rules.peaks_at(pairs_of([1, 1, -1]), 1) == REFUTED
-    assert rules.peaks_at(pairs_of([1, 1, 0]), 2) == INCONCLUSIVE  # nothing is seen to fall
-    assert rules.peaks_at(pairs_of([0, 0, 0]), 2) == INCONCLUSIVE
-
-
-def test_rises() -> None:
-    assert rules.rises(pairs_of([0, 1])) == HOLDS
-    assert rules.rises(pairs_of([0, 0])) == INCONCLUSIVE
-    assert rules.rises(pairs_of([0, -1])) == rules.rises(pairs_of([1, -1])) == REFUTED
+def test_a_rise() -> None:
+    judge = rules.rises.judge
+    assert judge(Shape(main_effects.RISES, (1,))) == HOLDS
+    assert judge(Shape(main_effects.LEVELS, (0, 1))) == INCONCLUSIVE
+    assert judge(Shape(main_effects.FALLS, (0,))) == REFUTED
+    assert judge(Shape(main_effects.PEAK, (1,))) == REFUTED

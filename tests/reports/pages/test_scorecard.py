@@ -8,42 +8,56 @@ from html.parser import HTMLParser
 import pytest
 
 from analysis import numbers
-from analysis.replication import paper
-from analysis.replication.evidence_of_policy import Finding, Quantity
+from analysis.replication import measures, paper, rules
+from analysis.replication.claims import Claim, Section
+from analysis.replication.measures import Quantity
 from analysis.replication.rules import NO_RESULTS, VERDICTS
-from analysis.replication.scorecard import Row
-from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from analysis.replication.scorecard import Finding, Row
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.scorecard import scorecard
 
 ABSENT = Finding(NO_RESULTS, note="the study fig4 has not run")
+
+
+def row(
+    section: tuple[str, str],
+    text: str,
+    place: str,
+    rule: str,
+    printed: Quantity | None,
+    *findings: Finding,
+) -> Row:
+    """A row of the scorecard; pages do not look at how a claim is measured and judged."""
+    claim = Claim(text, place, rules.most, measures.missed_data, printed)
+    return Row(Section(*section, "fig4", [claim]), claim, rule, findings)
+
+
+TABLE_4, FIG_4 = ("Table IV", "performance.html#table-4"), ("Fig. 4", "mission.html#fig-4")
 ROWS = [
-    Row(
-        "Table IV",
+    row(
+        TABLE_4,
         "Collection ratio <over> missions",
         "Table IV",
-        (Quantity(0.798, n=1000),),
         "Holds if it is reached.",
-        "performance.html#table-4",
-        Finding(HOLDS, "ddqn", (Quantity(0.859, 0.85, 0.867, 1000),), paper.ABOVE),
-        Finding(IN_PART, "plain", (Quantity(0.758, 0.751, 0.765, 1000),), paper.BELOW),
+        Quantity(0.798, n=1000),
+        Finding(HOLDS, "ddqn", (Quantity(0.859, 0.85, 0.867, 1000),), ABOVE),
+        Finding(IN_PART, "plain", (Quantity(0.758, 0.751, 0.765, 1000),), BELOW),
     ),
-    Row(
-        "Fig. 4",
+    row(
+        FIG_4,
         "Success at C_S 10 %",
         "Fig. 4b",
-        (),
         "Holds if C_S does not matter.",
-        "mission.html#fig-4",
+        None,
         Finding(INCONCLUSIVE, "ddqn", (Quantity(-0.0001, -0.009, 0.009, 300, "points", "change"),)),
         ABSENT,
     ),
-    Row(
-        "Fig. 4",
+    row(
+        ("Fig. 3", "learning.html"),
         "The reward is higher",
         "Fig. 3a",
-        (Quantity(800_000, unit="steps", name="crossing"),),
         "Holds if it is.",
-        "learning.html",
+        Quantity(800_000, unit="steps", name="crossing"),
         Finding(
             REFUTED,
             "quick",
@@ -85,7 +99,7 @@ class Elements(HTMLParser):
 def test_every_row_is_told(html: str) -> None:
     text = text_of(html)
     for row in ROWS:
-        assert row.place in text
+        assert row.claim.place in text
         assert row.rule in text
     for shown in (
         "Collection ratio <over> missions",
@@ -107,7 +121,7 @@ def test_every_row_is_told(html: str) -> None:
 
 def test_verdicts_are_words_and_signs_and_are_counted(html: str) -> None:
     text = text_of(html)
-    counts = "1 ✓ holds 1 ? cannot be told 1 ✗ does not hold"
+    counts = "1 ✓ holds 1 ? inconclusive 1 ✗ does not hold"
     assert f"The best learned policy (ddqn) , of 3 claims: {counts}" in text
     other = "The paper's network and algorithm, with means of ours (plain)"
     assert f"{other} , of 3 claims: 1 ◐ holds in part 2 – no results" in text
@@ -138,7 +152,7 @@ def test_the_same_rows_give_the_same_bytes(html: str) -> None:
 
 
 def test_without_any_results_columns_have_no_policy() -> None:
-    rows = [Row("Part", "Claim", "Place", (), "Holds if so.", "x.html", ABSENT, ABSENT)]
+    rows = [row(FIG_4, "Claim", "Place", "Holds if so.", None, ABSENT, ABSENT)]
     text = text_of(scorecard(rows).data)
     assert "The best learned policy , of 1 claim: 1 – no results" in text
     assert "()" not in text
@@ -146,7 +160,7 @@ def test_without_any_results_columns_have_no_policy() -> None:
 
 def test_it_says_how_to_read_it() -> None:
     success = Quantity(*paper.spread(0.901, 1000), n=1000)
-    rows = [replace(ROWS[0], printed=(success,)), *ROWS[1:]]
+    rows = [replace(ROWS[0], claim=replace(ROWS[0].claim, printed=success)), *ROWS[1:]]
     text = text_of(scorecard(rows, departures=["a guard", "5-step returns"]).data)
     spread = numbers.interval(*success.interval).partition(" % ")[2]
     assert f"At 95 % (Wilson) they are {spread} for a success in 90.1 % of 1,000 missions" in text

@@ -1,0 +1,291 @@
+"""What is measured for the paper's claims: from evidence to figures, and what a rule judges by.
+
+Claims hold a function of these with its metric and values filled in:
+
+    >>> partial(mean, metric="success")(evidence).quantities
+"""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from analysis.names import RATIO, parameter, value_text
+from analysis.questions import main_effects, node_shares
+from analysis.questions.learning import Transfer
+from analysis.replication import paper
+from analysis.replication.evidence_of_policy import (
+    EventLog,
+    EvidenceOfPolicy,
+    EvidenceOfTrainings,
+    MissingError,
+    negated,
+)
+from analysis.replication.rules import MARGIN
+from analysis.stats.intervals import Interval, mean_interval, summary, wilson
+
+Unit = Literal["share", "points", "reward", "steps", "number"]
+
+# Times that the nodes are shuffled, to see what chance gives.
+SHUFFLES = 100
+
+
+class Quantity(NamedTuple):
+    """A figure, with its interval if it has one.
+
+    Attributes:
+        value: The figure, in its unit.
+        low: Lower end of its interval, or none.
+        high: Upper end.
+        n: Number of missions, or trainings, that it is from; 0 if none are counted.
+        unit: A ``share``; ``points``, a difference of shares; a ``reward``; training ``steps``; or
+            a ``number``.
+        name: What it is, where the claim does not say so.
+    """
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+    n: int = 0
+    unit: Unit = "share"
+    name: str = ""
+
+    @property
+    def interval(self) -> Interval:
+        """Value and ends; degenerate where it has none."""
+        low = self.value if self.low is None else self.low
+        return Interval(self.value, low, self.value if self.high is None else self.high)
+
+
+class Measured(NamedTuple):
+    """What is measured for a claim.
+
+    Attributes:
+        arguments: What the judge of the claim's rule takes.
+        quantities: The figures to show; the first is the one to set beside the paper's.
+        note: More of it in words.
+    """
+
+    arguments: tuple[Any, ...]
+    quantities: tuple[Quantity, ...]
+    note: str = ""
+
+
+# Means.
+
+
+def mean(evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Measured:
+    """The mean of a metric over all missions, or those of a number of UAVs."""
+    quantity = _mean_of(evidence.missions(uavs), metric)
+    return Measured((quantity.interval,), (quantity,))
+
+
+def mean_of_checks(evidence: EvidenceOfPolicy, metric: str) -> Measured:
+    """The mean of a metric over the missions that check a selection."""
+    quantity = _mean_of(evidence.checks(), metric)
+    return Measured((quantity.interval,), (quantity,))
+
+
+def missed_data(evidence: EvidenceOfPolicy) -> Measured:
+    """The mean collection ratio, and the share of missions that collected everything."""
+    missions = evidence.missions()
+    ratio = _mean_of(missions, RATIO)
+    whole = _share_of(missions[RATIO].to_numpy() >= 1, "missions that collected everything")
+    return Measured((ratio.interval, whole.interval), (ratio, whole))
+
+
+# Event logs.
+
+
+def single_charges(evidence: EvidenceOfPolicy) -> Measured:
+    """The share of missions in which a lone UAV charges once."""
+    charges = [(log.events["event"] == "charge_start").sum() for log in evidence.logs(uavs=1)]
+    share = _share_of(np.array(charges) == 1, "missions with one charge")
+    return Measured((share.interval,), (share,))
+
+
+def ignored_nodes(evidence: EvidenceOfPolicy) -> Measured:
+    """The shares of nodes that a lone UAV ignores, on the far edges and elsewhere."""
+    far, others = np.transpose([_left_behind(log) for log in evidence.logs(uavs=1)])
+    shares = _mean_share(far, "ignored of these nodes"), _mean_share(others, "of the others")
+    return Measured((shares[0].interval, mean_interval(far - others)), shares)
+
+
+def reached_nodes(evidence: EvidenceOfPolicy) -> Measured:
+    """How many more nodes of the far edges two UAVs reach than one, in the same missions."""
+    one, two = ([_left_behind(log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
+    more = np.array([alone - team for alone, team in zip(one, two, strict=False)])
+    name = "more of these nodes than by a lone UAV"
+    gain = Quantity(*mean_interval(more), len(more), "points", name)
+    reached = _mean_share(1 - np.array(two), "of these nodes not ignored")
+    return Measured((gain.interval,), (gain, reached))
+
+
+def sectors(evidence: EvidenceOfPolicy) -> Measured:
+    """The share of data that two UAVs collect each on its own side, beside what chance gives."""
+    generator = np.random.default_rng(evidence.results.store.manifest.seed)
+    rows = [row for log in evidence.logs(uavs=2) if (row := _division(log, generator))]
+    if not rows:
+        raise MissingError("no data was collected")
+    sides, chance, most = np.transpose(rows)
+    quantities = (
+        _mean_share(sides, "data collected on the own side"),
+        Quantity(float(np.mean(chance)), name="by chance"),
+        _mean_share(most, "data by the UAV that serves the node most"),
+    )
+    return Measured((mean_interval(sides - chance), quantities[2].interval), quantities)
+
+
+def _left_behind(log: EventLog) -> tuple[float, float]:
+    """The shares left behind, of the nodes of the far edges and of the others."""
+    left = node_shares.left_behind(log.events, log.uavs, len(log.nodes))
+    far = node_shares.far_edges(log.nodes)
+    if far.all():
+        raise MissingError("all nodes are on the edges")
+    return float(left[far].mean()), float(left[~far].mean())
+
+
+def _division(log: EventLog, generator: np.random.Generator) -> tuple[float, ...]:
+    """The share on the own side, the same by chance, and by the UAV that serves a node most."""
+    data = node_shares.collected(log.events, log.uavs, len(log.nodes))
+    if not data.any():
+        return ()
+    shuffled = (generator.permutation(data, axis=1) for _ in range(SHUFFLES))
+    chance = np.mean([node_shares.sectors(by_chance, log.nodes) for by_chance in shuffled])
+    return node_shares.sectors(data, log.nodes), float(chance), node_shares.division(data)
+
+
+# The values of a parameter, compared mission by mission.
+
+
+def change(
+    evidence: EvidenceOfPolicy, field: str, metric: str, first: str, second: str
+) -> Measured:
+    """How much a metric changes from one value of a parameter to another."""
+    quantity = _points(evidence.pairs(field, metric).change(first, second))
+    return Measured((quantity.interval,), (quantity,))
+
+
+def lead(
+    evidence: EvidenceOfPolicy, field: str, metric: str, values: tuple[str, ...], name: str
+) -> Measured:
+    """By how much a metric is higher at some values of a parameter than at all others."""
+    leads = evidence.pairs(field, metric).leads(*values)
+    return Measured((leads,), (_least(leads, name),))
+
+
+def lag(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
+    """By how much a metric is lower at a value of a parameter than at all others."""
+    lags = negated(evidence.pairs(field, metric).leads(value))
+    return Measured((lags,), (_least(lags, "the next lowest is higher by"),))
+
+
+def spread(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
+    """The differences between all values of a parameter."""
+    changes = evidence.pairs(field, metric).changes
+    largest = changes.loc[changes["difference"].abs().idxmax()]
+    return Measured((changes,), (_points(largest, "largest difference"),))
+
+
+def course(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
+    """How a metric goes along the values of a parameter, from the first to the last."""
+    pairs = evidence.pairs(field, metric)
+    first, *_, last = pairs.positions
+    shape = main_effects.shape(pairs.changes)
+    tops = [value for value, position in pairs.positions.items() if position in shape.peaks]
+    peak = f", highest at {' or '.join(tops)}" if shape.words == main_effects.PEAK else ""
+    quantity = _points(pairs.change(first, last), f"from {first} to {last}")
+    return Measured((shape,), (quantity,), f"it {shape.words}{peak}")
+
+
+def peak(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
+    """As ``course``, beside the lead of a value over all others."""
+    pairs, along = evidence.pairs(field, metric), course(evidence, field, metric)
+    ahead = _least(pairs.leads(value), f"{setting(field, value)} above the best other")
+    return Measured((*along.arguments, pairs.position(value)), (ahead,), along.note)
+
+
+def selected_uavs(evidence: EvidenceOfPolicy) -> Measured:
+    """The number of UAVs of the setting that a study selects, beside the paper's."""
+    choice = evidence.results.choice(evidence.policy)
+    points = evidence.results.store.manifest.points
+    if choice is None or "uavs" not in points[choice.best].values:
+        raise MissingError(f"the study {evidence.study} selects no number of UAVs")
+    wanted = [n for n, point in enumerate(points) if point.values.get("uavs") == paper.BEST_UAVS]
+    best = points[choice.best].values
+    uavs = Quantity(best["uavs"], n=choice.missions, unit="number", name="UAVs")
+    note = ", ".join(setting(field, value_text(value)) for field, value in best.items())
+    return Measured((choice, wanted), (uavs,), note)
+
+
+def setting(field: str, value: str) -> str:
+    """``C_S 30``."""
+    return f"{parameter(field).short} {value}"
+
+
+# Learning curves.
+
+
+def end(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
+    """By how much training with transfer learning ends above training without it."""
+    transfer = evidence.transfer(metric)
+    where = "ends below, or level"
+    if transfer.throughout:
+        where = "above at every step"
+    elif transfer.since is not None:
+        where = f"above from step {transfer.since:,} on"
+    note = f"trainings {evidence.using} and {evidence.without}: {where}{_if_short(transfer)}"
+    return Measured((transfer,), _at_the_end(transfer, unit), note)
+
+
+def level_from(evidence: EvidenceOfTrainings, metric: str) -> Measured:
+    """The step from which on the mean curve without transfer learning stays near its end."""
+    transfer, curves = evidence.transfer(metric), evidence.curves(metric)
+    curves = curves[curves["variant"] == evidence.without]
+    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
+    means = curves.groupby("updates")["value"].mean()
+    far = np.flatnonzero((means - means.iloc[-1]).abs() > MARGIN)
+    since = int(means.index[far[-1] + 1 if len(far) else 0])
+    settled = Quantity(since, unit="steps", name="level from")
+    quantities = settled, *_at_the_end(transfer, "points")
+    note = f"trainings {evidence.without}{_if_short(transfer)}"
+    return Measured((since / means.index[-1], transfer), quantities, note)
+
+
+def _at_the_end(transfer: Transfer, unit: Unit) -> tuple[Quantity, Quantity]:
+    """The last difference, and how long the trainings are."""
+    last = Quantity(*transfer.last, min(transfer.trainings), unit, "with transfer, at the end")
+    return last, Quantity(transfer.length, unit="steps", name="length of the trainings")
+
+
+def _if_short(transfer: Transfer) -> str:
+    return "" if transfer.length >= paper.CROSSING else "; too short to tell"
+
+
+# Figures.
+
+
+def _mean_of(missions: pd.DataFrame, metric: str) -> Quantity:
+    row = summary(missions, by=[]).set_index("metric").loc[metric]
+    return Quantity(float(row["mean"]), float(row["low"]), float(row["high"]), int(row["n"]))
+
+
+def _share_of(occurs: np.ndarray, name: str) -> Quantity:
+    """The share of missions in which something occurs."""
+    return Quantity(*wilson(int(occurs.sum()), len(occurs)), n=len(occurs), name=name)
+
+
+def _mean_share(values: np.ndarray, name: str) -> Quantity:
+    """The mean of a share per mission; its interval ends where shares do."""
+    middle, low, high = mean_interval(values)
+    return Quantity(middle, max(low, 0.0), min(high, 1.0), len(values), name=name)
+
+
+def _points(row: pd.Series, name: str = "") -> Quantity:
+    """A row of ``main_effects.changes``."""
+    value, low, high = (float(row[column]) for column in ("difference", "low", "high"))
+    return Quantity(value, low, high, int(row["n"]), "points", name)
+
+
+def _least(leads: pd.DataFrame, name: str) -> Quantity:
+    return _points(leads.sort_values("difference", kind="stable").iloc[0], name)
