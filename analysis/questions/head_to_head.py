@@ -1,46 +1,44 @@
-"""Where one policy is ahead of another in the space of scenario parameters, and where behind.
+"""Two policies in the same missions: how far one is ahead of the other, and where it is worst.
 
-For studies of one design point that draws its scenarios: the missions themselves cover the space.
-Two policies meet the same missions, so they are compared mission by mission.
+For studies of one design point that draws its scenarios. Both policies meet the same realisations,
+so they are compared mission by mission:
+
+    pair = pair_of(results)           # the best learned policy and the best baseline
+    missions = duels(results, pair)   # a row per mission, with the difference of the two
+    overall(missions, pair)           # mean differences with intervals
+
+``questions.regions`` says where in the space of parameters a policy is ahead.
 """
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import stats
-from sklearn.tree import DecisionTreeRegressor
 
-from analysis.names import METRICS, PRODUCT, parameter, value_text
-from analysis.questions.summary import learners, ranked_policies
+from analysis import numbers
+from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter
+from analysis.questions.summary import learners
 from analysis.results.tables import Results
-from analysis.stats.correction import adjust, for_choice
-from analysis.stats.intervals import LEVEL, Interval, wilson
-from analysis.stats.paired import compare, paired
-from analysis.stats.verdict import INCONCLUSIVE
+from analysis.stats.intervals import wilson
+from analysis.stats.paired import compare
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 from dess.errors import InputError
-from dess.scenario import Scenario
-
-PARAMETERS = ("uavs", "flying_time", "charge_start", "charge_complete", "initial_data")
 
 AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be INCONCLUSIVE
+OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
 
-BINS = 5  # of a parameter, at most
-DEPTH, LEAST, SHARE = 3, 20, 0.05  # of the tree: its depth, and the missions in a leaf at least
-
-_TINY = 1e-12  # a difference below is rounding
-_OF_BASELINE = "_baseline"
-
-Range = tuple[float, float]
+_VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
+_ROUNDING = 1e-12  # the largest difference between equal results
 
 
 class Pair(NamedTuple):
     """Two policies to compare.
 
     Attributes:
-        policy: The one whose lead is told, over the other.
-        baseline: The other one.
+        policy: The policy whose lead over the other is shown.
+        baseline: The other policy.
         candidates: Number of pairs that these data chose it from.
     """
 
@@ -54,7 +52,7 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
 
     The best by collection ratio and communication. A learner of several trainings counts by their
     mean, and its first training stands for it: the best of several is not the learner. Where all
-    have learned, or none has, the best two.
+    policies have learned, or none has, the best two.
 
     Args:
         results: The study.
@@ -64,38 +62,44 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     Raises:
         InputError: If the study has no two policies, or not the ones that are named.
     """
-    ranked = ranked_policies(results.missions)
     for name, given in (("learned", learned), ("heuristic", heuristic)):
-        if given is not None and given not in ranked:
-            allowed = ", ".join(ranked)
+        if given is not None and given not in results.policies:
+            allowed = ", ".join(results.policies)
             raise InputError(f"{name}: {given!r} is not in the study; allowed: {allowed}")
-    trained = learners(results).values()
-    others = [policy for policy in ranked if not any(policy in own for own in trained)]
-    taught = [own[0] for own in sorted(trained, key=lambda own: -_mean(results, own))]
-    if not taught or not others:
-        taught = others = ranked
-    pairs = [
-        (first, second)
-        for first in ([learned] if learned else taught)
-        for second in ([heuristic] if heuristic else others)
-        if first != second
-    ]
+    trained, baselines = _ranked(results)
+    firsts = [trainings[0] for trainings in trained]
+    if not firsts or not baselines:
+        firsts = baselines = [*_means(results).index]
+    firsts = [learned] if learned else firsts
+    baselines = [heuristic] if heuristic else baselines
+    pairs = [pair for pair in product(firsts, baselines) if pair[0] != pair[1]]
     if not pairs:
         raise InputError(
-            f"learned, heuristic: no two policies to compare among {', '.join(ranked)}; "
+            f"learned, heuristic: no two policies to compare among {', '.join(results.policies)}; "
             "allowed: two or more, and not one for both"
         )
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
 
 
+def role(results: Results, policy: str) -> str:
+    """What a policy is in a study, such as ``training 1 of 3 of the best learner of the study``."""
+    trained, baselines = _ranked(results)
+    for rank, trainings in enumerate(trained):
+        if policy in trainings:
+            number, article = trainings.index(policy) + 1, "a" if rank else "the best"
+            return f"training {number} of {len(trainings)} of {article} learner of the study"
+    article = "the best" if policy == baselines[0] else "a"
+    return f"{article} policy of the study that has not learned"
+
+
 def duels(results: Results, pair: Pair) -> pd.DataFrame:
-    """Two policies on the same missions.
+    """Two policies in the same missions.
 
     Returns:
-        A row per mission that both have flown: ``replication``, the parameters (``initial_data`` is
-        the mean of its nodes), ``METRICS`` of the policy, those of the baseline under names that
-        end in ``_baseline``, and ``difference``, by how much the policy is ahead in collection
-        ratio and communication.
+        A row per mission: ``replication``, the parameters (``initial_data`` is the mean over the
+        nodes), ``METRICS`` of the policy, those of the baseline under names that end in
+        ``_baseline``, and ``difference``, by how much the policy is ahead in collection ratio and
+        communication.
 
     Raises:
         InputError: If the study has several design points.
@@ -103,14 +107,17 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
     if (points := len(results.store.manifest.points)) > 1:
         name = results.store.manifest.study["name"]
         raise InputError(f"study {name}: {points} design points; allowed: one for all missions")
-    ours, theirs = (_flown(results, policy) for policy in (pair.policy, pair.baseline))
-    both = ours.merge(theirs[["replication", *METRICS]], "inner", "replication",
-                      suffixes=("", _OF_BASELINE))  # fmt: skip
-    both["initial_data"] = both["initial"] / len(results.scenario().nodes)
-    gap = both[PRODUCT] - both[PRODUCT + _OF_BASELINE]
-    both["difference"] = gap.where(gap.abs() > _TINY, 0.0)
-    metrics = [*METRICS, *(m + _OF_BASELINE for m in METRICS)]
-    return both[["replication", *PARAMETERS, *metrics, "difference"]]
+    table = results.missions.assign(
+        initial_data=results.missions["initial"] / len(results.scenario().nodes)
+    )
+    of_policy, of_baseline = (
+        table[table["policy"] == name] for name in (pair.policy, pair.baseline)
+    )
+    both = of_policy[["replication", *PARAMETERS, *METRICS]].merge(
+        of_baseline[["replication", *METRICS]], on="replication", suffixes=("", OF_BASELINE)
+    )
+    difference = both[PRODUCT] - both[PRODUCT + OF_BASELINE]
+    return both.assign(difference=difference.where(difference.abs() > _ROUNDING, 0.0))
 
 
 def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
@@ -120,140 +127,92 @@ def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
         A row per metric, as of ``stats.paired.compare``; ``p_adjusted`` also for the choice
         of the pair.
     """
-    names = {pair.policy: "", pair.baseline: _OF_BASELINE}
     parts = [
-        pd.DataFrame({m: missions[m + end] for m in METRICS}).assign(
+        pd.DataFrame({metric: missions[metric + end] for metric in METRICS}).assign(
             policy=policy, replication=missions["replication"]
         )
-        for policy, end in names.items()
+        for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE))
     ]
-    return for_choice(compare(pd.concat(parts), pair.baseline, [*METRICS]), pair.candidates)
+    generator = np.random.default_rng(0)
+    # The intervals shown are Student's; those of the bootstrap may be rough.
+    table = compare(pd.concat(parts), pair.baseline, generator, [*METRICS], resamples=100)
+    return table.assign(p_adjusted=(table["p_adjusted"] * pair.candidates).clip(upper=1))
 
 
-def varied(missions: pd.DataFrame) -> list[str]:
-    """The parameters that differ between the missions of ``duels``."""
-    return [field for field in PARAMETERS if missions[field].nunique() > 1]
+def verdict(difference: float, p_adjusted: float) -> str:
+    """Whether a policy is ``AHEAD`` or ``BEHIND``, or whether that is ``INCONCLUSIVE``."""
+    return _VERDICTS[position_by_test(difference, p_adjusted)]
 
 
-def halves(missions: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The missions of even replications, and those of odd ones.
+def standing(name: str, comparison: pd.DataFrame) -> str:
+    """How a policy or a learner compares with its baseline in every metric, in a sentence.
 
-    What is found on the one half is told by the other, which had no part in it.
+    Args:
+        name: What it is called.
+        comparison: A row per metric, as of ``stats.paired.compare``.
     """
-    even = missions["replication"] % 2 == 0
-    return missions[even], missions[~even]
+    metrics: dict[str, list[str]] = {AHEAD: [], BEHIND: [], INCONCLUSIVE: []}
+    for row in comparison.itertuples():
+        text = f"{METRICS[row.metric].lower()} ({_points(row, 'difference')} points)"
+        metrics[verdict(row.difference, row.p_adjusted)].append(text)
+    parts = [f"{which} in {numbers.words(texts)}" for which, texts in metrics.items() if texts]
+    return f"**{name}** against {comparison['baseline'].iloc[0]}: {'; '.join(parts)}."
+
+
+def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
+    """Comparisons as a table to print: differences and p-values, a row per policy.
+
+    Args:
+        comparisons: A row per policy and metric, as of ``stats.paired.compare``.
+        name: The column that tells the rows apart.
+    """
+    lines = []
+    for policy, rows in comparisons.groupby(name, sort=False):
+        line = {("", "Difference"): f"{policy} − {rows['baseline'].iloc[0]}"}
+        for row in rows.itertuples():
+            line[METRICS[row.metric], "points"] = _points(row, "difference")
+            line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
+        lines.append(line)
+    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(lines[0]))
 
 
 def outcomes(missions: pd.DataFrame) -> pd.DataFrame:
     """In what share of the missions of ``duels`` the policy is ahead, level and behind.
 
     Returns:
-        A row per outcome: ``outcome``, ``count``, ``share``, ``low``, ``high`` (Wilson), ``n``.
+        A row per outcome, its index: ``count``, ``share``, ``low``, ``high`` (Wilson), ``n``.
     """
-    sign = np.sign(missions["difference"])
-    rows = []
-    for outcome, value in ((AHEAD, 1), (EVEN, 0), (BEHIND, -1)):
-        count = int((sign == value).sum())
-        rows.append((outcome, count, *wilson(count, len(missions)), len(missions)))
-    return pd.DataFrame(rows, columns=["outcome", "count", "share", "low", "high", "n"])
+    sign, n = np.sign(missions["difference"]), len(missions)
+    counts = {
+        name: int((sign == value).sum()) for name, value in ((AHEAD, 1), (EVEN, 0), (BEHIND, -1))
+    }
+    rows = [(count, *wilson(count, n), n) for count in counts.values()]
+    return pd.DataFrame(rows, index=[*counts], columns=["count", "share", "low", "high", "n"])
 
 
-def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
-    """The mean difference along every parameter that varies.
+def only_failures(missions: pd.DataFrame) -> tuple[int, int]:
+    """In how many missions of ``duels`` only the policy fails, and in how many only the baseline."""
+    more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
+    return int((more < 0).sum()), int((more > 0).sum())
+
+
+def pairing_factor(comparison: pd.DataFrame) -> float:
+    """How many times as many missions independent samples need for intervals as narrow.
 
     Args:
-        missions: Rows of ``duels``.
-        candidates: Pairs that the two policies were chosen from.
-
-    Returns:
-        A row per parameter and bin, at most ``BINS`` of about as many missions each: ``field``,
-        ``position``, ``value`` in words, and the columns of a comparison: ``mean``, ``low``,
-        ``high`` (of Student's t, 95 % each), ``p``, ``p_adjusted`` (Holm over all rows, Bonferroni
-        for the choice of the pair), ``verdict``, ``n``, and ``behind``, the share of missions in
-        which the policy is behind, with ``behind_low`` and ``behind_high``.
+        comparison: A row per metric, as of ``stats.paired.compare``; collection ratio and
+            communication counts.
     """
-    parts = []
-    for field in varied(missions):
-        codes, names = bins(missions[field])
-        parts += [((field, code, name), missions[codes == code]) for code, name in enumerate(names)]
-    return _compared(parts, ["field", "position", "value"], candidates)
-
-
-def across(missions: pd.DataFrame, first: str, second: str, candidates: int = 1) -> pd.DataFrame:
-    """The mean difference over two parameters at once.
-
-    Returns:
-        A row per pair of bins with missions: ``position``, ``value`` (of the first), ``position_2``
-        and ``value_2`` (of the second), and the columns of a comparison, as of ``along``.
-    """
-    (codes, names), (codes_2, names_2) = bins(missions[first]), bins(missions[second])
-    parts = [
-        ((code, name, code_2, name_2), missions[(codes == code) & (codes_2 == code_2)])
-        for code, name in enumerate(names)
-        for code_2, name_2 in enumerate(names_2)
-    ]
-    columns = ["position", "value", "position_2", "value_2"]
-    return _compared([part for part in parts if len(part[1])], columns, candidates)
-
-
-def dependence(missions: pd.DataFrame) -> pd.DataFrame:
-    """Whether the difference depends on each parameter.
-
-    Returns:
-        A row per parameter that varies, the one that explains most first: ``field``, ``explained``
-        (share of the variance between the bins of ``along``), ``p`` (Alexander and Govern's test
-        of equal means, which lets the variances differ; 1 where there is too little to test) and
-        ``p_adjusted`` (Holm).
-    """
-    rows = []
-    for field in varied(missions):
-        codes, _ = bins(missions[field])
-        own = missions["difference"].groupby(codes)
-        total = float(missions["difference"].var(ddof=0))
-        between = float(own.transform("mean").var(ddof=0))
-        rows.append((field, between / total if total else 0.0, _equal_means(own)))
-    table = pd.DataFrame(rows, columns=["field", "explained", "p"])
-    table["p_adjusted"] = adjust(table["p"].to_numpy(float), "holm")
-    return table.sort_values("explained", ascending=False, kind="stable", ignore_index=True)
-
-
-def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
-    """Regions of the space in which the difference differs, by a regression tree.
-
-    The regions are found on the missions of even replications, and what is told of them comes from
-    the odd ones, which had no part in it: else the regions that chance favours would look real.
-
-    Args:
-        missions: Rows of ``duels``.
-        candidates: As of ``along``.
-
-    Returns:
-        A row per region that has missions to tell of, the lowest mean first: ``rule`` in words,
-        ``found_on`` (number of missions), and the columns of a comparison, as of ``along``.
-    """
-    fields = varied(missions) or [*PARAMETERS[:1]]
-    train, test = halves(missions)
-    columns = ["rule", "found_on"]
-    if train.empty or test.empty:
-        return _compared([], columns, candidates)
-    least = max(LEAST, int(np.ceil(SHARE * len(train))))
-    tree = DecisionTreeRegressor(max_depth=DEPTH, min_samples_leaf=least, random_state=0)
-    tree.fit(train[fields].to_numpy(float), train["difference"])
-    found, met = (tree.apply(part[fields].to_numpy(float)) for part in (train, test))
-    parts = [
-        ((_rule(missions, box), int((found == leaf).sum())), test[met == leaf])
-        for leaf, box in _leaves(tree.tree_, fields)
-    ]
-    table = _compared([part for part in parts if len(part[1])], columns, candidates)
-    return table.sort_values("mean", kind="stable", ignore_index=True)
+    reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
+    return float(1 / (1 - reduction)) if reduction < 1 else np.inf
 
 
 def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     """The missions of ``duels`` with the policy's lowest collection ratio and communication.
 
-    The worst first; of those alike, first those that collected the smaller part.
+    The worst first; of equal ones, first those that collected the smaller part.
     """
-    return missions.sort_values([PRODUCT, "collection_ratio"], kind="stable").head(count)
+    return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
 
 
 def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
@@ -262,121 +221,55 @@ def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     return lost.sort_values("difference", kind="stable").head(count)
 
 
-def quotas(results: Results, policy: str, replication: int) -> str:
-    """How many UAVs of a mission filled their quota: ``2 of 3``."""
+def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
+    """The number of UAVs of a policy whose battery is depleted before their quota is filled."""
+    uavs = _uavs(results, policy, replications)
+    return int((uavs["end"] == "battery").sum())
+
+
+def listed(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
+    """Missions of ``duels`` as a table to print: their parameters, and the outcome of both policies."""
+    lines = [
+        {("", "Mission"): f"{row['replication']:.0f}"}
+        | {("", parameter(field).short): f"{row[field]:.3g}" for field in PARAMETERS}
+        | {("", "Points"): numbers.difference(row["difference"], 0)}
+        | _outcome(row, results, pair.policy, "")
+        | _outcome(row, results, pair.baseline, OF_BASELINE)
+        for _, row in missions.iterrows()
+    ]
+    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(lines[0]))
+
+
+def _outcome(
+    mission: Mapping[str, Any], results: Results, policy: str, end: str
+) -> dict[tuple[str, str], str]:
+    """The outcome of a mission of ``duels`` for a policy, as cells of a row of ``listed``."""
+    ends = _uavs(results, policy, [mission["replication"]])["end"]
+    return {
+        (policy, "Success"): "yes" if mission[SUCCESS + end] else "no",
+        (policy, "Quotas"): f"{(ends == 'quota').sum()} of {len(ends)}",
+        (policy, "Collected"): numbers.percent(mission[RATIO + end]),
+    }
+
+
+def _uavs(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
     uavs = results.uavs
-    own = uavs[(uavs["policy"] == policy) & (uavs["replication"] == replication)]
-    return f"{int((own['end'] == 'quota').sum())} of {len(own)}"
+    return uavs[(uavs["policy"] == policy) & uavs["replication"].isin([*replications])]
 
 
-def stranded(events: pd.DataFrame, scenario: Scenario) -> pd.DataFrame:
-    """The UAVs of a mission that ran dry without their quota.
-
-    Args:
-        events: The event log of the mission.
-        scenario: Its scenario.
-
-    Returns:
-        A row per such UAV, the first first: ``uav``, ``time`` [mission slots], ``x``, ``y`` and
-        ``moves``, how many it was away from the charging zone.
-    """
-    dry = events[events["event"] == "battery_empty"]
-    left, top, width, height = scenario.zone
-    away = [
-        np.maximum(np.maximum(first - dry[axis], dry[axis] - (first + size - 1)), 0)
-        for axis, first, size in (("x", left, width), ("y", top, height))
-    ]
-    table = dry[["uav", "time", "x", "y"]].assign(moves=away[0] + away[1])
-    return table.astype({"x": int, "y": int, "moves": int}).reset_index(drop=True)
+def _means(results: Results) -> pd.Series:
+    """The mean collection ratio and communication of every policy, the best first."""
+    means = results.missions.groupby("policy", sort=False)[PRODUCT].mean()
+    return means.sort_values(ascending=False, kind="stable")
 
 
-def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
-    """Values in at most so many bins: one each if they are that few, else by quantiles.
-
-    Returns:
-        (n,) the bin of each value, and the names of the bins, from the lowest on.
-    """
-    numbers = values.to_numpy()
-    distinct = np.unique(numbers)
-    edges = distinct[:-1]
-    if len(distinct) > most:
-        edges = np.quantile(numbers, np.arange(1, most) / most)
-    _, codes = np.unique(np.searchsorted(edges, numbers), return_inverse=True)
-    return codes, [_named(numbers[codes == code]) for code in range(codes.max() + 1)]
+def _ranked(results: Results) -> tuple[list[list[str]], list[str]]:
+    """The trainings of every learner, and the policies that have not learned; the best first."""
+    means, trained = _means(results), [*learners(results).values()]
+    learned = {policy for trainings in trained for policy in trainings}
+    by_mean = sorted(trained, key=lambda trainings: -means[trainings].mean())
+    return by_mean, [policy for policy in means.index if policy not in learned]
 
 
-def _mean(results: Results, policies: Sequence[str]) -> float:
-    """The mean over policies of their collection ratio and communication."""
-    means = results.missions.groupby("policy")[PRODUCT].mean()
-    return float(means[[*policies]].mean())
-
-
-def _flown(results: Results, policy: str) -> pd.DataFrame:
-    return results.missions[results.missions["policy"] == policy]
-
-
-def _compared(
-    parts: Sequence[tuple[tuple[Hashable, ...], pd.DataFrame]],
-    columns: list[str],
-    candidates: int,
-) -> pd.DataFrame:
-    """A row per part of the missions of ``duels``, which has some: its labels, its comparison."""
-    rows = []
-    for labels, part in parts:
-        of = part[PRODUCT].to_numpy(float), part[PRODUCT + _OF_BASELINE].to_numpy(float)
-        pair = paired(*of)
-        behind = wilson(int((part["difference"] < 0).sum()), len(part))
-        ends = Interval(pair.difference, pair.low, pair.high)
-        rows.append((*labels, *ends, pair.p, len(part), *behind))
-    names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]
-    table = pd.DataFrame(rows, columns=[*columns, *names])
-    adjusted = np.minimum(adjust(table["p"].to_numpy(float), "holm") * candidates, 1)
-    table.insert(table.columns.get_loc("n"), "p_adjusted", adjusted)
-    table.insert(table.columns.get_loc("n"), "verdict", _verdicts(table))
-    return table
-
-
-def _verdicts(table: pd.DataFrame) -> list[str]:
-    sure = table["p_adjusted"] <= 1 - LEVEL
-    return [
-        (AHEAD if mean > 0 else BEHIND) if told else INCONCLUSIVE
-        for mean, told in zip(table["mean"], sure, strict=True)
-    ]
-
-
-def _equal_means(groups: Any) -> float:
-    """The p-value of equal means; 1 where fewer than two groups have a spread."""
-    samples = [own.to_numpy() for _, own in groups if np.ptp(own) > 0]
-    return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
-
-
-def _leaves(
-    tree: Any, fields: list[str], node: int = 0, box: Mapping[str, Range] | None = None
-) -> Iterator[tuple[int, Mapping[str, Range]]]:
-    """The leaves below a node, each with the range (low, high] of every field that is split."""
-    box = box or {}
-    left, right = tree.children_left[node], tree.children_right[node]
-    if left == right:  # there are none
-        yield node, box
-        return
-    field, split = fields[tree.feature[node]], float(tree.threshold[node])
-    low, high = box.get(field, (-np.inf, np.inf))
-    yield from _leaves(tree, fields, left, {**box, field: (low, split)})
-    yield from _leaves(tree, fields, right, {**box, field: (split, high)})
-
-
-def _rule(missions: pd.DataFrame, box: Mapping[str, Range]) -> str:
-    """A box in words, by the values that missions have in it."""
-    sides = []
-    for field in (field for field in PARAMETERS if field in box):
-        low, high = box[field]
-        values = missions[field].to_numpy()
-        inside = values[(values > low) & (values <= high)]
-        sides.append(f"{parameter(field).short} {_named(inside)}")
-    return ", ".join(sides) or "all missions"
-
-
-def _named(values: np.ndarray) -> str:
-    """The range of values: ``3``, ``70–72``, or ``11.7–12.1``, rounded."""
-    ends = [float(f"{end:.3g}") for end in (values.min(), values.max())]
-    return value_text(ends if ends[0] < ends[1] else ends[0])
+def _points(row: Any, mean: str = "mean") -> str:
+    return numbers.points(getattr(row, mean), row.low, row.high)
