@@ -42,6 +42,13 @@ def p_value(p: float) -> str:
     return f"{p:.3f}" if p >= 0.001 else "< 0.001"
 
 
+def seconds(time: float) -> str:
+    """A time [s] with three digits at most, as ``2.35 µs`` or ``1.1 ms``."""
+    units = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9))
+    unit, size = next((pair for pair in units if time >= pair[1]), units[-1])
+    return f"{float(f'{time / size:.3g}'):g} {unit}"
+
+
 def span(values: Iterable[float], form: str = "{:,}") -> str:
     """The least and the largest of some numbers: ``300``, or ``20 to 1,200``."""
     ordered = sorted(values)

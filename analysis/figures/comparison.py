@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 
+from analysis import numbers
 from analysis.execution.decision_time import Cost
 from analysis.figures.style import (
     INK,
@@ -23,10 +24,11 @@ from analysis.figures.style import (
     style,
 )
 from analysis.names import parameter
-from analysis.questions.head_to_head import AHEAD, BEHIND, INCONCLUSIVE, Pair
+from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
 from analysis.stats.intervals import LEVEL
+from analysis.stats.verdict import INCONCLUSIVE
 
-# Blue is ahead, orange behind, on all figures; a mean that cannot be told is hollow.
+# Blue is ahead, orange behind, on all figures; an inconclusive mean is hollow.
 COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: MUTED}
 EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
 
@@ -35,7 +37,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     """The mean difference along a parameter, a dot with its interval per bin.
 
     Args:
-        table: Rows of ``questions.head_to_head.along``: all of them, for the same axis everywhere.
+        table: Rows of ``questions.regions.along``: all of them, for the same axis everywhere.
         field: The parameter.
         overall: The mean difference of all missions, drawn as a dashed line.
     """
@@ -71,7 +73,7 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     """The mean difference over two parameters: blue where it is ahead, orange where behind.
 
     Args:
-        table: Rows of ``questions.head_to_head.across``. Means that cannot be told are in brackets.
+        table: Rows of ``questions.regions.across``. Inconclusive means are in brackets.
         first: The parameter of the rows.
         second: The parameter of the columns.
     """
@@ -176,7 +178,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         ends = [end for cost in costs for end in (cost.median, cost.slow, cost.batch)]
         ax.set_xscale("log")
         ax.set_xlim(min(ends) / 2, max(ends) * 2)
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: duration(x)))
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: numbers.seconds(x)))
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_yticks(range(len(costs)), [cost.policy for cost in costs])
         ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
@@ -184,14 +186,6 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         sns.despine(ax=ax, left=True)
         legend_below(figure, ax, 1)
     return figure
-
-
-def duration(seconds: float) -> str:
-    """A time with three digits at most, as ``2.35 µs`` or ``1.1 ms``."""
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= size:
-            return f"{float(f'{seconds / size:.3g}'):g} {unit}"
-    return f"{float(f'{seconds / 1e-9:.3g}'):g} ns"
 
 
 def _ends(table: pd.DataFrame) -> tuple[float, float]:

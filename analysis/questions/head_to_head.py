@@ -21,15 +21,14 @@ from analysis import numbers
 from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter
 from analysis.questions.summary import learners
 from analysis.results.tables import Results
-from analysis.stats.intervals import wilson
+from analysis.stats.intervals import LEVEL, wilson
 from analysis.stats.paired import compare
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
+from analysis.stats.verdict import INCONCLUSIVE
 from dess.errors import InputError
 
 AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be INCONCLUSIVE
 OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
 
-_VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 _ROUNDING = 1e-12  # the largest difference between equal results
 
 
@@ -141,7 +140,9 @@ def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
 
 def verdict(difference: float, p_adjusted: float) -> str:
     """Whether a policy is ``AHEAD`` or ``BEHIND``, or whether that is ``INCONCLUSIVE``."""
-    return _VERDICTS[position_by_test(difference, p_adjusted)]
+    if p_adjusted > 1 - LEVEL:
+        return INCONCLUSIVE
+    return AHEAD if difference > 0 else BEHIND
 
 
 def standing(name: str, comparison: pd.DataFrame) -> str:
