@@ -1,6 +1,6 @@
 """How numbers are written, on pages and in the terminal: shares in percent, with a proper minus."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import pandas as pd
 
@@ -58,6 +58,12 @@ def span(values: Iterable[float], form: str = "{:,}") -> str:
 def words(names: Sequence[str]) -> str:
     """``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def headed(lines: Iterable[Mapping[tuple[str, str], str]]) -> pd.DataFrame:
+    """A table of text under two rows of heads: a line maps (upper, lower head) to its text."""
+    rows = [*lines]
+    return pd.DataFrame(rows, columns=pd.MultiIndex.from_tuples(rows[0] if rows else [("", "")]))
 
 
 def wide(

@@ -8,22 +8,27 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis import numbers
-from analysis.execution.decision_time import Cost, Timing, unlike
+from analysis.execution.decision_time import ROUNDS, Cost, Timing, unlike
+from analysis.questions.head_to_head import Pair
 from analysis.results.tables import Results
 
 _SHORT = 12  # characters of a hash that are shown
 
 
 def timed(times: Timing, policies: Sequence[str]) -> list[Cost]:
-    """The costs of the policies, in their order; those of all that were timed if none of them was."""
+    """The costs of the policies that were timed, in this order; all costs, if none of them was."""
     costs = {cost.policy: cost for cost in times.costs}
     return [costs[policy] for policy in policies if policy in costs] or times.costs
 
 
-def listed(costs: Sequence[Cost]) -> pd.DataFrame:
-    """Costs as a table to print, a row per policy."""
-    one, many = "One mission, a call", "Many missions"
-    lines = [
+def listed(times: Timing, costs: Sequence[Cost]) -> pd.DataFrame:
+    """Costs of a timing as a table to print, a row per policy.
+
+    The last column is the speed of a UAV that crosses a cell in the time of a slow call.
+    """
+    one, many, fast = "One mission, a call", "Many missions", "Fast enough up to"
+    cell_size = times.space.cell_size
+    return numbers.headed(
         {
             ("", "Policy"): cost.policy,
             (one, "median"): numbers.seconds(cost.median),
@@ -32,38 +37,34 @@ def listed(costs: Sequence[Cost]) -> pd.DataFrame:
             (one, "calls"): f"{cost.calls:,}",
             (many, "per UAV"): numbers.seconds(cost.batch),
             (many, "UAVs"): f"{cost.batch_rows:,}",
+            (fast, "m/s"): f"{float(f'{cell_size / cost.slow:.2g}'):,.0f}",
         }
         for cost in costs
-    ]
-    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(lines[0]))
-
-
-def ratio(times: Timing, policy: str, baseline: str) -> str:
-    """How much longer a policy takes than another in one mission, in a sentence if both are timed."""
-    medians = {cost.policy: cost.median for cost in times.costs}
-    if not {policy, baseline} <= medians.keys():
-        return ""
-    factor = medians[policy] / medians[baseline]
-    return (
-        f"{policy} takes {factor:,.3g} times as long as {baseline} for one mission, by the medians."
     )
 
 
-def caveats(times: Timing, results: Results) -> str:
-    """Which policies of a study were not timed, or not with its code and weights, in sentences."""
-    names = {cost.policy for cost in times.costs}
-    missing = [policy for policy in results.policies if policy not in names]
+def remarks(times: Timing, results: Results, pair: Pair) -> str:
+    """On what decisions were timed, which were not, and how the policies of a pair compare."""
+    costs = {cost.policy: cost for cost in times.costs}
+    missing = [policy for policy in results.policies if policy not in costs]
     changed = unlike(times, results.store.manifest)
-    sentences = {
-        "Not timed": missing,
-        "Timed with other code or weights than those of the study": changed,
-    }
-    return " ".join(f"{text}: {numbers.words(of)}." for text, of in sentences.items() if of)
-
-
-def fastest_speed(cost: Cost, cell_size: float) -> float:
-    """The speed [m/s] at which a UAV crosses a cell [m] in the time of a slow decision."""
-    return float(f"{cell_size / cost.slow:.2g}")
+    sentences = [
+        f"{times.missions:,} missions of the scenario {times.scenario}, with cells of "
+        f"{times.space.cell_size:g} m, were timed on a processor {times.processor} (number of "
+        f"threads: {times.threads}); of {ROUNDS} rounds of the batch engine, the middle one counts."
+    ]
+    if pair.policy in costs and pair.baseline in costs:
+        ratio = costs[pair.policy].median / costs[pair.baseline].median
+        sentences.append(
+            f"{pair.policy} takes {ratio:,.3g} times as long as {pair.baseline} for one mission, "
+            "by the medians."
+        )
+    if missing:
+        sentences.append(f"Not timed: {numbers.words(missing)}.")
+    if changed:
+        text = "Timed with other code or weights than those of the study"
+        sentences.append(f"{text}: {numbers.words(changed)}.")
+    return " ".join(sentences)
 
 
 def origin(times: Timing) -> pd.DataFrame:
@@ -72,7 +73,8 @@ def origin(times: Timing) -> pd.DataFrame:
         "Scenario": times.scenario,
         "Missions": f"{times.missions:,}",
         "Seed": times.seed,
-        "Processor": f"{times.processor}, {times.cores:,} {'core' if times.cores == 1 else 'cores'}",
+        "Processor": times.processor,
+        "Cores": f"{times.cores:,}",
         "Threads": times.threads,
         "dess": times.version,
         "Code": times.code[:_SHORT],

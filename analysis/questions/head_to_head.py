@@ -14,21 +14,22 @@ from collections.abc import Iterable, Mapping
 from itertools import product
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from analysis import numbers
 from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter
-from analysis.questions.summary import learners
+from analysis.questions.summary import learned_against_heuristic, learners, ranked_policies
 from analysis.results.tables import Results
-from analysis.stats.intervals import LEVEL, wilson
+from analysis.stats.correction import for_choice
+from analysis.stats.intervals import wilson
 from analysis.stats.paired import compare
-from analysis.stats.verdict import INCONCLUSIVE
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 from dess.errors import InputError
 
 AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be INCONCLUSIVE
 OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
 
+_VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 _ROUNDING = 1e-12  # the largest difference between equal results
 
 
@@ -68,7 +69,7 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     trained, baselines = _ranked(results)
     firsts = [trainings[0] for trainings in trained]
     if not firsts or not baselines:
-        firsts = baselines = [*_means(results).index]
+        firsts = baselines = ranked_policies(results.missions)
     firsts = [learned] if learned else firsts
     baselines = [heuristic] if heuristic else baselines
     pairs = [pair for pair in product(firsts, baselines) if pair[0] != pair[1]]
@@ -78,6 +79,17 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
             "allowed: two or more, and not one for both"
         )
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
+
+
+def introduction(results: Results, pair: Pair, missions: pd.DataFrame) -> str:
+    """Which policies a pair is of, and in how many missions of ``duels`` it is compared."""
+    policy, baseline, candidates = pair
+    return (
+        f"**{policy}** is {role(results, policy)}, **{baseline}** {role(results, baseline)}; these "
+        f"data chose them from {candidates} {'pair' if candidates == 1 else 'pairs'}. They are "
+        f"compared in the same {len(missions):,} missions. Differences are {policy} minus "
+        f"{baseline}: above 0, {policy} is ahead."
+    )
 
 
 def role(results: Results, policy: str) -> str:
@@ -132,32 +144,54 @@ def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
         )
         for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE))
     ]
-    generator = np.random.default_rng(0)
-    # The intervals shown are Student's; those of the bootstrap may be rough.
-    table = compare(pd.concat(parts), pair.baseline, generator, [*METRICS], resamples=100)
-    return table.assign(p_adjusted=(table["p_adjusted"] * pair.candidates).clip(upper=1))
+    return for_choice(compare(pd.concat(parts), pair.baseline, [*METRICS]), pair.candidates)
+
+
+def learners_against_baseline(results: Results) -> pd.DataFrame:
+    """``summary.learned_against_heuristic``, with ``learner`` as ``ddqn (3 trainings)``."""
+    table = learned_against_heuristic(results)
+    names = [
+        row.learner if row.trainings == 1 else f"{row.learner} ({row.trainings} trainings)"
+        for row in table.itertuples()
+    ]
+    return table.assign(learner=names)
 
 
 def verdict(difference: float, p_adjusted: float) -> str:
     """Whether a policy is ``AHEAD`` or ``BEHIND``, or whether that is ``INCONCLUSIVE``."""
-    if p_adjusted > 1 - LEVEL:
-        return INCONCLUSIVE
-    return AHEAD if difference > 0 else BEHIND
+    return _VERDICTS[position_by_test(difference, p_adjusted)]
 
 
 def standing(name: str, comparison: pd.DataFrame) -> str:
     """How a policy or a learner compares with its baseline in every metric, in a sentence.
 
     Args:
-        name: What it is called.
+        name: The name of the policy or learner.
         comparison: A row per metric, as of ``stats.paired.compare``.
     """
     metrics: dict[str, list[str]] = {AHEAD: [], BEHIND: [], INCONCLUSIVE: []}
     for row in comparison.itertuples():
-        text = f"{METRICS[row.metric].lower()} ({_points(row, 'difference')} points)"
+        text = f"{METRICS[row.metric].lower()} ({_points(row)} points)"
         metrics[verdict(row.difference, row.p_adjusted)].append(text)
     parts = [f"{which} in {numbers.words(texts)}" for which, texts in metrics.items() if texts]
     return f"**{name}** against {comparison['baseline'].iloc[0]}: {'; '.join(parts)}."
+
+
+def standings(learners: pd.DataFrame) -> str:
+    """How every learner of ``learners_against_baseline`` compares, as a list in Markdown."""
+    groups = learners.groupby("learner", sort=False)
+    return "\n".join(f"- {standing(str(name), rows)}" for name, rows in groups)
+
+
+def standing_of_pair(missions: pd.DataFrame, pair: Pair) -> str:
+    """How a policy compares with its baseline, and what their common missions are worth."""
+    comparison = overall(missions, pair)
+    reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
+    factor = f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
+    return (
+        f"{standing(pair.policy, comparison)} With missions of its own for each policy, it would "
+        f"take {factor} for intervals as narrow."
+    )
 
 
 def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
@@ -167,45 +201,32 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
         comparisons: A row per policy and metric, as of ``stats.paired.compare``.
         name: The column that tells the rows apart.
     """
-    lines = []
-    for policy, rows in comparisons.groupby(name, sort=False):
+    lines: list[dict[tuple[str, str], str]] = []
+    for policy, rows in comparisons.groupby(name, sort=False) if len(comparisons) else ():
         line = {("", "Difference"): f"{policy} − {rows['baseline'].iloc[0]}"}
         for row in rows.itertuples():
-            line[METRICS[row.metric], "points"] = _points(row, "difference")
+            line[METRICS[row.metric], "points"] = _points(row)
             line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
         lines.append(line)
-    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(lines[0]))
+    return numbers.headed(lines)
 
 
-def outcomes(missions: pd.DataFrame) -> pd.DataFrame:
-    """In what share of the missions of ``duels`` the policy is ahead, level and behind.
-
-    Returns:
-        A row per outcome, its index: ``count``, ``share``, ``low``, ``high`` (Wilson), ``n``.
-    """
-    sign, n = np.sign(missions["difference"]), len(missions)
-    counts = {
-        name: int((sign == value).sum()) for name, value in ((AHEAD, 1), (EVEN, 0), (BEHIND, -1))
-    }
-    rows = [(count, *wilson(count, n), n) for count in counts.values()]
-    return pd.DataFrame(rows, index=[*counts], columns=["count", "share", "low", "high", "n"])
-
-
-def only_failures(missions: pd.DataFrame) -> tuple[int, int]:
-    """In how many missions of ``duels`` only the policy fails, and in how many only the baseline."""
+def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
+    """In how many missions of ``duels`` a policy is ahead or behind, or fails alone: to print."""
+    gap, n = missions["difference"], len(missions)
     more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
-    return int((more < 0).sum()), int((more > 0).sum())
-
-
-def pairing_factor(comparison: pd.DataFrame) -> float:
-    """How many times as many missions independent samples need for intervals as narrow.
-
-    Args:
-        comparison: A row per metric, as of ``stats.paired.compare``; collection ratio and
-            communication counts.
-    """
-    reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
-    return float(1 / (1 - reduction)) if reduction < 1 else np.inf
+    counts = {
+        f"{pair.policy} ahead": gap > 0,
+        "level": gap == 0,
+        f"{pair.policy} behind": gap < 0,
+        f"only {pair.policy} fails": more < 0,
+        f"only {pair.baseline} fails": more > 0,
+    }
+    rows = [
+        (outcome, f"{cases.sum():,}", numbers.interval(*wilson(int(cases.sum()), n)))
+        for outcome, cases in counts.items()
+    ]
+    return pd.DataFrame(rows, columns=["Outcome", "Missions", "Share"])
 
 
 def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
@@ -229,16 +250,15 @@ def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
 
 
 def listed(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
-    """Missions of ``duels`` as a table to print: their parameters, and the outcome of both policies."""
-    lines = [
+    """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies."""
+    return numbers.headed(
         {("", "Mission"): f"{row['replication']:.0f}"}
         | {("", parameter(field).short): f"{row[field]:.3g}" for field in PARAMETERS}
         | {("", "Points"): numbers.difference(row["difference"], 0)}
         | _outcome(row, results, pair.policy, "")
         | _outcome(row, results, pair.baseline, OF_BASELINE)
         for _, row in missions.iterrows()
-    ]
-    return pd.DataFrame(lines, columns=pd.MultiIndex.from_tuples(lines[0]))
+    )
 
 
 def _outcome(
@@ -258,19 +278,14 @@ def _uavs(results: Results, policy: str, replications: Iterable[int]) -> pd.Data
     return uavs[(uavs["policy"] == policy) & uavs["replication"].isin([*replications])]
 
 
-def _means(results: Results) -> pd.Series:
-    """The mean collection ratio and communication of every policy, the best first."""
-    means = results.missions.groupby("policy", sort=False)[PRODUCT].mean()
-    return means.sort_values(ascending=False, kind="stable")
-
-
 def _ranked(results: Results) -> tuple[list[list[str]], list[str]]:
     """The trainings of every learner, and the policies that have not learned; the best first."""
-    means, trained = _means(results), [*learners(results).values()]
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
     learned = {policy for trainings in trained for policy in trainings}
-    by_mean = sorted(trained, key=lambda trainings: -means[trainings].mean())
-    return by_mean, [policy for policy in means.index if policy not in learned]
+    ranked = ranked_policies(results.missions)
+    return trained, [policy for policy in ranked if policy not in learned]
 
 
-def _points(row: Any, mean: str = "mean") -> str:
-    return numbers.points(getattr(row, mean), row.low, row.high)
+def _points(row: Any) -> str:
+    return numbers.points(row.difference, row.low, row.high)

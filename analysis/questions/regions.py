@@ -4,8 +4,8 @@ The missions of one design point that draws its scenarios cover the space themse
 
     missions = duels(results, pair)           # of questions.head_to_head
     lead = along(missions, pair.candidates)   # mean differences along every parameter
-    tally(lead)                               # 'ahead in 15, behind in 0 and inconclusive in 3 of 18'
-    rules(missions, pair.candidates)          # regions of a regression tree, on missions of its own
+    tally(lead)    # 'ahead in 15, behind in 0 and inconclusive in 3 of 18'
+    rules(missions, pair.candidates)          # regions of a regression tree
 """
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -19,8 +19,9 @@ from sklearn.tree import DecisionTreeRegressor
 from analysis import numbers
 from analysis.names import PARAMETERS, PRODUCT, parameter, value_text
 from analysis.questions.head_to_head import AHEAD, BEHIND, OF_BASELINE, verdict
+from analysis.stats.correction import for_choice, with_adjusted
 from analysis.stats.intervals import wilson
-from analysis.stats.paired import adjust, paired
+from analysis.stats.paired import paired
 from analysis.stats.verdict import INCONCLUSIVE
 
 BINS = 5  # of a parameter, at most
@@ -110,8 +111,9 @@ def dependence(missions: pd.DataFrame) -> pd.DataFrame:
         between = float(groups.transform("mean").var(ddof=0))
         rows.append((field, between / total if total else 0.0, _equal_means(groups)))
     table = pd.DataFrame(rows, columns=["field", "explained", "p"])
-    table["p_adjusted"] = adjust(table["p"].to_numpy(float), "holm")
-    return table.sort_values("explained", ascending=False, kind="stable", ignore_index=True)
+    return with_adjusted(table, "holm").sort_values(
+        "explained", ascending=False, kind="stable", ignore_index=True
+    )
 
 
 def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -128,7 +130,8 @@ def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame
     chosen = dependence(chosen_on).head(2)
     if len(chosen) < 2 or judged_on.empty:
         return chosen[:0], judged_on[:0]
-    return chosen, across(judged_on, *chosen["field"], candidates=candidates)
+    first, second = chosen["field"]
+    return chosen, across(judged_on, first, second, candidates)
 
 
 def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
@@ -215,21 +218,18 @@ def _compared(
     candidates: int,
 ) -> pd.DataFrame:
     """A row per part of the missions of ``duels`` that has some: its labels and its comparison."""
-    generator = np.random.default_rng(0)
     rows = []
     for labels, missions in parts:
         if missions.empty:
             continue
         of_policy, of_baseline = missions[PRODUCT], missions[PRODUCT + OF_BASELINE]
-        # The intervals shown are Student's; those of the bootstrap may be rough.
-        pair = paired(of_policy.to_numpy(), of_baseline.to_numpy(), generator, resamples=100)
+        pair = paired(of_policy.to_numpy(), of_baseline.to_numpy())
         behind = wilson(int((missions["difference"] < 0).sum()), len(missions))
         rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(missions), *behind))
     names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]
     table = pd.DataFrame(rows, columns=[*columns, *names])
-    adjusted = np.minimum(adjust(table["p"].to_numpy(float), "holm") * candidates, 1)
-    verdicts = [*map(verdict, table["mean"], adjusted)]
-    return table.assign(p_adjusted=adjusted, verdict=verdicts)
+    table = for_choice(with_adjusted(table, "holm"), candidates)
+    return table.assign(verdict=[*map(verdict, table["mean"], table["p_adjusted"])])
 
 
 def _equal_means(groups: Any) -> float:

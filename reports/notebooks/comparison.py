@@ -22,7 +22,6 @@ heuristic = None  # the policy to set beside it; None for the best that has not 
 # %%
 from pathlib import Path
 
-import pandas as pd
 from IPython.display import display
 
 from analysis import load_results, numbers
@@ -46,21 +45,20 @@ html.say(head_to_head.introduction(study, pair, missions))
 
 # %% [markdown]
 # Unless another is named, the metric is collection ratio and communication, the product of success
-# and collection ratio. Every mission has parameters of its own (Table II), and both policies meet
-# the same realisation of initial data, arrivals and shadowing: they are compared mission by mission,
-# in percentage points. Verdicts are by p-values at the 5 % level, after Holm's correction for the
+# and collection ratio, in percentage points. Every mission has parameters of its own (Table II) and
+# the same realisation of initial data, arrivals and shadowing for both policies: they are compared
+# mission by mission. Verdicts are by p-values at the 5 % level, after Holm's correction for the
 # number of comparisons and Bonferroni's for the choice of the pair, or of the best policy, by these
 # data. The 95 % intervals are of one difference each.
 
 # %%
 learners = head_to_head.learners_against_baseline(study)
-standings = [head_to_head.standing(*group) for group in learners.groupby("learner", sort=False)]
-html.say("\n".join(f"- {standing}" for standing in standings))
+html.say(head_to_head.standings(learners))
 
 # %% [markdown]
 # Of several trainings, the claim is about the learner, trainings to come included. Of a single one,
 # it is about this checkpoint: another training of the same learner may turn out better or worse.
-# The rest of this page is about a single policy: of several trainings the first, whatever came of it.
+# The rest of this page is about one policy: of several trainings the first, whatever came of it.
 
 # %%
 html.say(head_to_head.standing_of_pair(missions, pair))
@@ -80,9 +78,7 @@ display(
 # that are lost. Up to 0.5 % of the missions lie beyond each end of the axis.
 
 # %%
-html.table(
-    head_to_head.outcomes(missions, pair), "Outcomes with 95 % intervals, and who alone fails"
-)
+html.table(head_to_head.outcomes(missions, pair), "Outcomes, with 95 % intervals of their shares")
 
 # %%
 lowest, highest = (numbers.difference(end, 0) for end in missions["difference"].agg(["min", "max"]))
@@ -98,8 +94,7 @@ html.figure(
 #
 # Every parameter is cut into at most five bins with about as many missions; the initial data are
 # the mean of a mission's nodes. In the figures, blue is ahead, orange behind; what is inconclusive
-# (after Holm's correction for all bins) is hollow and grey. Bars are 95 % intervals; dashed is the
-# mean of all missions.
+# (after Holm's correction for all bins) is hollow and grey; dashed is the mean of all missions.
 
 # %%
 lead = regions.along(missions, pair.candidates)
@@ -116,7 +111,7 @@ html.gallery(
         (
             figures.lead(lead, field, missions["difference"].mean()),
             f"Mean difference {title} against {field}",
-            f"{title}, n = {numbers.span(bins['n'])} missions per dot.",
+            f"{title}, n = {numbers.span(bins['n'])} missions per dot. Bars are 95 % intervals.",
         )
         for field, bins in lead.groupby("field", sort=False)
     ]
@@ -131,9 +126,10 @@ html.gallery(
 chosen, cells = regions.strongest(missions, pair.candidates)
 if len(cells):
     alt = f"Mean difference {title} over {numbers.words([*chosen['field']])}"
+    shares = numbers.words([*map(numbers.percent, chosen["explained"])])
     caption = (
         f"{policy} is {regions.tally(cells)} cells, n = {numbers.span(cells['n'])} missions each. "
-        f"In the other half, the two explain {regions.explained(chosen)} of the variance."
+        f"In the other half, these explain {shares} of the variance."
     )
     display(html.figure(figures.heat(cells, *chosen["field"]), alt, caption))
 
@@ -142,14 +138,12 @@ if len(cells):
 #
 # A regression tree cuts the space into regions in which the difference differs most. It is grown on
 # one half of the missions, those of even replications, and judged on the other half, which had no
-# part in it: else the regions that chance favours would look real.
+# part in it: else the regions that chance favours would look real. Parameters that are not named may
+# have any value. The intervals are at 95 %.
 
 # %%
 leaves = regions.rules(missions, pair.candidates)
-html.table(
-    regions.listed(leaves, policy),
-    f"{policy} is {regions.tally(leaves)} regions. A parameter that is not named may have any value",
-)
+html.table(regions.listed(leaves, policy), f"{policy} is {regions.tally(leaves)} regions")
 
 # %% [markdown]
 # ## The worst missions
@@ -169,7 +163,7 @@ display(
 )
 
 # %%
-shown = pd.concat([worst, lost])["replication"]
+shown = [*worst["replication"], *lost["replication"]]
 lines = [f"{study.replay(policy, 0, n)} --figure mission-{n}.png" for n in shown]
 html.say("{commands}", commands=html.commands(lines))
 
@@ -179,11 +173,9 @@ html.say("{commands}", commands=html.commands(lines))
 # A policy is asked once in a mission slot for all UAVs of a mission that must act. Timed is this
 # call alone, with all that the policy works out from what it sees, in one mission at a time; and in
 # the same missions all at once in the batch engine, where a call decides for many. Times are of one
-# machine and will differ on another.
-#
-# Is that fast enough? A decision must be ready within a mission slot. The model gives a slot no
-# length in seconds; but in one, a UAV flies a cell: it has its decision in time up to the speed at
-# which it crosses a cell within the time that 95 % of the calls keep below.
+# machine and will differ on another. Is that fast enough? A decision must be ready within a mission
+# slot. The model gives a slot no length in seconds; but in one, a UAV flies a cell: the last column
+# is the speed at which it crosses a cell in the time that 95 % of the calls keep below.
 
 # %%
 costs = decision_costs.timed(times, study.policies)
@@ -193,15 +185,12 @@ html.say(decision_costs.remarks(times, study, pair))
 html.figure(
     figures.decision_time(costs, study.policies),
     "Time of a decision of every policy, for one mission and in the batch",
-    f"n = {min(cost.calls for cost in costs):,} calls or more per policy. A line goes from the median "
-    "to what 95 % of the calls keep below: the spread of the calls, not an interval of their mean.",
+    f"n = {min(cost.calls for cost in costs):,} calls or more per policy. A line goes from the "
+    "median to what 95 % of the calls keep below: the spread of the calls, no interval of a mean.",
 )
 
 # %%
-html.table(
-    decision_costs.listed(costs, times.space.cell_size),
-    f"Times of decisions; in the batch the middle one of {decision_time.ROUNDS} rounds",
-)
+html.table(decision_costs.listed(times, costs), "Times of decisions, and the speed they allow")
 
 # %% [markdown]
 # ## Where the figures come from
