@@ -138,8 +138,8 @@ if len(cells):
 #
 # A regression tree cuts the space into regions in which the difference differs most. It is grown on
 # one half of the missions, those of even replications, and judged on the other half, which had no
-# part in it: else the regions that chance favours would look real. Parameters that are not named may
-# have any value. The intervals are at 95 %.
+# part in it: else the regions that chance favours would look real. Parameters that are not named
+# may have any value. The intervals are at 95 %.
 
 # %%
 leaves = regions.rules(missions, pair.candidates)

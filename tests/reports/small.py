@@ -98,7 +98,7 @@ def shown_by(name: str, cells: int | None = None, **parameters: Any) -> str:
     report, shown, scope = read(name), [], {}
     report.set(parameters)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(IPython.display, "display", shown.append)
+        patch.setattr(IPython.display, "display", lambda *pieces: shown.extend(pieces))
         patch.setattr(html, "svg", lambda drawing: b"")
         for cell in report.cells[:cells]:
             tree = ast.parse(cell.source)

@@ -7,11 +7,13 @@ from matplotlib.colors import to_hex
 
 from analysis.execution.decision_time import Cost
 from analysis.figures import comparison as drawings
-from analysis.figures.comparison import COLOURS, duration
-from analysis.questions import head_to_head
-from analysis.questions.head_to_head import AHEAD, BEHIND, INCONCLUSIVE, Pair
+from analysis.figures.comparison import COLOURS
+from analysis.names import PARAMETERS
+from analysis.questions import regions
+from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
 from analysis.results.manifest import Member
-from tests.analysis.questions.test_head_to_head import missions_of
+from analysis.stats.verdict import INCONCLUSIVE
+from tests.analysis.questions.test_regions import missions_of
 
 PAIR = Pair("ours", "theirs", 1)
 
@@ -24,7 +26,7 @@ def missions():
 
 @pytest.fixture(scope="module")
 def table(missions):
-    return head_to_head.along(missions)
+    return regions.along(missions)
 
 
 @pytest.fixture(scope="module")
@@ -54,25 +56,25 @@ def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
 
 
 def test_all_parameters_have_the_same_axis_and_all_intervals_on_it(table):
-    axes = [drawings.lead(table, field, 0.0).axes[0] for field in head_to_head.PARAMETERS]
+    axes = [drawings.lead(table, field, 0.0).axes[0] for field in PARAMETERS]
     ((low, high),) = {ax.get_ylim() for ax in axes}
     assert low < table["low"].min() < table["high"].max() < high
-    assert axes[1].get_title(loc="left") == "Flying time [mission slots]"
+    assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
 
 
 def test_the_axis_holds_0_however_far_ahead(missions):
-    ahead = head_to_head.along(missions_of(lambda t: 0.3))
+    ahead = regions.along(missions_of(lambda t: 0.3))
     low, high = drawings.lead(ahead, "uavs", 0.3).axes[0].get_ylim()
     assert low < 0 < high
 
 
 def test_a_cell_says_its_mean_and_shows_its_sign(missions):
-    cells = head_to_head.across(missions, "uavs", "charge_start")
+    cells = regions.across(missions, "uavs", "charge_start")
     (ax,) = drawings.heat(cells, "uavs", "charge_start").axes
     said = {(n.xy[1] - 0.5, n.xy[0] - 0.5): n.get_text() for n in ax.texts}
     assert len(said) == len(cells)
     mesh = ax.collections[0]
-    faces = mesh.to_rgba(mesh.get_array()).reshape(3, head_to_head.BINS, 4)
+    faces = mesh.to_rgba(mesh.get_array()).reshape(3, regions.BINS, 4)
     for row in cells.itertuples():
         text = said[row.position, row.position_2]
         assert float(text.strip("()").replace("−", "-")) == pytest.approx(100 * row.mean, abs=0.05)
@@ -87,12 +89,10 @@ def test_a_cell_says_its_mean_and_shows_its_sign(missions):
 
 def test_a_cell_without_missions_is_left_empty(missions):
     some = missions[(missions["uavs"] < 3) | (missions["flying_time"] < 75)]
-    cells = head_to_head.across(some, "uavs", "flying_time")
-    assert len(cells) < 3 * head_to_head.BINS
+    cells = regions.across(some, "uavs", "flying_time")
+    assert len(cells) < 3 * regions.BINS
     (ax,) = drawings.heat(cells, "uavs", "flying_time").axes
-    assert np.ma.getmaskarray(ax.collections[0].get_array()).sum() == 3 * head_to_head.BINS - len(
-        cells
-    )
+    assert np.ma.getmaskarray(ax.collections[0].get_array()).sum() == 3 * regions.BINS - len(cells)
 
 
 def test_the_curve_is_the_share_of_missions_up_to_a_difference(missions):
@@ -152,18 +152,10 @@ def test_a_policy_keeps_its_colour_whoever_else_was_timed(costs):
     assert to_hex(both.lines[-1].get_color()) == to_hex(alone.lines[-1].get_color())
 
 
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(2.0, "2 s"), (0.0123456, "12.3 ms"), (3.1e-6, "3.1 µs"), (4.78e-7, "478 ns"), (1e-3, "1 ms")],
-)
-def test_durations(seconds, text):
-    assert duration(seconds) == text
-
-
 def test_figures_leave_no_state_behind(missions, table, costs):
     before = dict(mpl.rcParams)
     drawings.lead(table, "uavs", 0.0)
-    drawings.heat(head_to_head.across(missions, "uavs", "flying_time"), "uavs", "flying_time")
+    drawings.heat(regions.across(missions, "uavs", "flying_time"), "uavs", "flying_time")
     drawings.distribution(missions, PAIR)
     drawings.decision_time(costs, [])
     assert dict(mpl.rcParams) == before
