@@ -40,3 +40,18 @@ def test_a_wide_table_keeps_the_order_of_appearance() -> None:
     assert wide.columns.tolist() == ["z", "a"]
     assert wide["z"].tolist() == ["0.2", "0.4"]
     assert wide.columns.name is None
+
+
+@pytest.mark.parametrize(
+    ("time", "text"),
+    [(2.0, "2 s"), (0.0123456, "12.3 ms"), (3.1e-6, "3.1 µs"), (4.78e-7, "478 ns"), (1e-3, "1 ms")],
+)
+def test_a_time_has_three_digits_in_its_unit(time: float, text: str) -> None:
+    assert numbers.seconds(time) == text
+
+
+def test_a_table_may_have_two_rows_of_heads() -> None:
+    table = numbers.headed([{("", "Policy"): "a", ("Calls", "n"): "3"}])
+    assert table.columns.tolist() == [("", "Policy"), ("Calls", "n")]
+    assert table.to_numpy().tolist() == [["a", "3"]]
+    assert numbers.headed([]).empty
