@@ -1,4 +1,8 @@
-"""Runs notebooks in kernels of their own, some at once."""
+"""Runs notebooks in Jupyter kernels, two at a time.
+
+A kernel imports what this process imports, computes in one thread and writes nothing to the user's
+home. A kernel that dies before its first cell is started once more.
+"""
 
 import atexit
 import os
@@ -21,10 +25,11 @@ from nbformat import NotebookNode
 from dess.errors import InputError
 from reports.pages.notebook import Report
 
-# Called with the cells done and the cells in all, of all reports, and the name of this one.
+# Called after a cell with the cells run and the cells in all, of all reports, and the report.
 Progress = Callable[[int, int, str], None]
 
 AT_ONCE = 2
+LONGEST_SOCKET_PATH = 90  # characters; systems allow about 100
 
 
 class Kernels:
@@ -36,34 +41,58 @@ class Kernels:
         self._lock, self._stopped = Lock(), False
 
     def run(self, reports: Sequence[Report]) -> None:
-        """Run reports; one that fails notes it, the others go on.
+        """Run reports; the failure of one is noted in it, and the others are still run.
 
         Raises:
-            InputError: If a notebook refuses what it was given.
+            InputError: If a notebook refuses its parameters or results.
         """
-        # In threads: in this one, nbclient would take Ctrl-C for itself.
+        # In threads: in the main thread, nbclient would handle Ctrl-C itself.
         with ThreadPoolExecutor(AT_ONCE) as pool:
-            running = [pool.submit(self._execute, report, reports) for report in reports]
+            futures = [pool.submit(self._execute, report, reports) for report in reports]
             try:
-                for future in running:
+                for future in futures:
                     future.result()
             except BaseException:
-                self._stop(running)
+                self._stop(futures)
                 raise
 
-    def _stop(self, running: Sequence[Future]) -> None:
+    def _stop(self, futures: Sequence[Future]) -> None:
+        """Kill the kernels until no report is running."""
         self._stopped = True
-        for future in running:
+        for future in futures:
             future.cancel()
-        while any(not future.done() for future in running):
+        while any(not future.done() for future in futures):
             for client in self._clients:
                 kernel: Any = client.km
                 if kernel.has_kernel:
                     kernel.provisioner.process.kill()
-            wait(running, timeout=0.2)
+            wait(futures, timeout=0.2)
 
     def _execute(self, report: Report, reports: Sequence[Report]) -> None:
-        """Run a report; once more if its kernel dies before the first cell."""
+        """Run a report, in a second kernel if the first dies before the first cell."""
+        for is_last in (False, True):
+            try:
+                with TemporaryDirectory() as home:
+                    folder = self.results if "results" in report.parameters else Path(home)
+                    client = self._client(report, reports, folder, Path(home))
+                    self._clients.append(client)
+                    _run(client, _environment(Path(home)))
+                return
+            except CellExecutionError as error:
+                if error.ename == InputError.__name__:
+                    raise InputError(f"report {report.name}: {error.evalue}") from error
+                report.failure = f"{_cell(report)}: {error.ename}: {error.evalue}"
+                report.traceback = strip_ansi(error.traceback)
+                return
+            except RuntimeError as error:  # the kernel did not start, or died
+                if report.done or is_last or self._stopped:
+                    report.failure = f"{_cell(report)}: {error}"
+                    return
+
+    def _client(
+        self, report: Report, reports: Sequence[Report], folder: Path, home: Path
+    ) -> NotebookClient:
+        """A client that runs a report in a folder, and notes in the report how far it is."""
 
         def begin(cell: NotebookNode, **_: Any) -> None:
             report.begun = cell.id
@@ -75,31 +104,23 @@ class Kernels:
                     done, total = sum(r.done for r in reports), sum(len(r.cells) for r in reports)
                     self.progress(done, total, report.name)
 
-        for attempt in (1, 2):
-            try:
-                with TemporaryDirectory() as home:
-                    folder = self.results if "results" in report.parameters else Path(home)
-                    client = _client(report.notebook, folder, Path(home), begin, count)
-                    self._clients.append(client)
-                    _run(client, _environment(Path(home)))
-                return
-            except CellExecutionError as error:
-                if error.ename == InputError.__name__:
-                    raise InputError(f"report {report.name}: {error.evalue}") from error
-                report.failure = f"{_cell(report)}: {error.ename}: {error.evalue}"
-                report.traceback = strip_ansi(error.traceback)
-                return
-            except RuntimeError as error:  # the kernel did not start, or died
-                if report.done or attempt == 2 or self._stopped:
-                    report.failure = f"{_cell(report)}: {error}"
-                    return
+        return NotebookClient(
+            report.notebook,
+            km=_manager(home),
+            resources={"metadata": {"path": str(folder)}},
+            on_cell_execute=begin,
+            on_cell_complete=count,
+            timeout=None,
+            record_timing=False,
+            coalesce_streams=True,
+        )
 
 
 def _cell(report: Report) -> str:
-    """The cell that failed, the last that was begun, by its number among those that are run."""
+    """The cell that was begun last, by its number among the cells with code, and its first line."""
     number = [cell.id for cell in report.cells].index(report.begun) if report.begun else 0
-    first = report.cells[number].source.strip().partition("\n")[0]
-    return f"report {report.name}: cell {number + 1} of {len(report.cells)} ({first})"
+    first_line = report.cells[number].source.strip().partition("\n")[0]
+    return f"report {report.name}: cell {number + 1} of {len(report.cells)} ({first_line})"
 
 
 def _run(client: NotebookClient, environment: dict[str, str]) -> None:
@@ -109,40 +130,26 @@ def _run(client: NotebookClient, environment: dict[str, str]) -> None:
         atexit.unregister(client._cleanup_kernel)
 
 
-def _client(
-    notebook: NotebookNode, folder: Path, home: Path, begin: Any, count: Any
-) -> NotebookClient:
-    # No kernel specs but the built-in one: an installed "python3" may be another interpreter's.
-    kernel = AsyncKernelManager(
+def _manager(home: Path) -> AsyncKernelManager:
+    """Starts a kernel of this interpreter; an installed "python3" may be another one's."""
+    manager = AsyncKernelManager(
         kernel_name=NATIVE_KERNEL_NAME,
         kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),
         connection_file=str(home / "kernel.json"),
     )
-    sockets = home / "kernel"
-    if os.name == "posix" and len(str(sockets)) < 90:  # no ports to clash on; paths must be short
-        kernel.transport, kernel.ip = "ipc", str(sockets)
-    return NotebookClient(
-        notebook,
-        km=kernel,
-        resources={"metadata": {"path": str(folder)}},
-        on_cell_execute=begin,
-        on_cell_complete=count,
-        timeout=None,
-        record_timing=False,
-        coalesce_streams=True,
-    )
+    sockets = str(home / "kernel")
+    if os.name == "posix" and len(sockets) < LONGEST_SOCKET_PATH:  # sockets need no free ports
+        manager.transport, manager.ip = "ipc", sockets
+    return manager
 
 
 def _environment(home: Path) -> dict[str, str]:
-    """The kernel imports what this process imports and leaves nothing in the user's home.
-
-    It computes in one thread: those of two kernels would be in each other's way.
-    """
-    own = {name: str(home) for name in ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR")}
+    """The environment of a kernel that writes to ``home`` only."""
+    folders = ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR")
     path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
     return {
         **os.environ,
-        **own,
+        **dict.fromkeys(folders, str(home)),
         "PYTHONPATH": path,
         "OMP_NUM_THREADS": "1",
         "MPLBACKEND": "agg",

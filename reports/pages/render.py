@@ -1,16 +1,17 @@
-"""Reports: notebooks run on results, each rendered to one self-contained page, and an index."""
+"""Renders reports: runs notebooks on results and writes a self-contained page for each.
+
+Same results, same bytes: pages hold no time and no path of this machine.
+"""
 
 import logging
 import os
 import re
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
@@ -18,36 +19,22 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
-import dess
-from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess.errors import InputError
-from reports.pages import html
+from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
-from reports.pages.notebook import GIVEN, NAMES, SCORECARD, Report, check_parameters, read
-from reports.pages.verify import is_sealed, sealed
+from reports.pages.notebook import SHIPPED, VALUES, Report, check_parameters, names_in, read
+from reports.pages.template import fill
 
 log = logging.getLogger(__name__)
 
-INDEX = "index.html"
+# ``C_S`` in the text of a page, or a piece of it that is no text.
 _INDEX_OR_NO_TEXT = re.compile(r"<(code|pre|script|style)\b.*?</\1>|<[^>]*>|\bC_([SC])\b", re.S)
-_IMAGE = re.compile(r"<img [^>]+>")
-_SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
 
 
 class ReportError(RuntimeError):
-    """Notebooks failed: for each its cell, what that raised, and where the partial page is."""
-
-
-@dataclass(frozen=True)
-class Card:
-    """What the index shows of a page."""
-
-    page: str
-    title: str
-    description: str
-    thumbnail: Markup
+    """Notebooks failed: the cell of each, its error, and the path of the partial page."""
 
 
 def render(
@@ -56,30 +43,31 @@ def render(
     out: str | Path,
     progress: Progress | None = None,
     parameters: Mapping[str, Any] | None = None,
+    notebooks: Path = SHIPPED,
 ) -> Path:
     """Run reports on the results of studies and write their pages, their notebooks and an index.
 
-    The index shows all pages that are there then, those of earlier calls as well. The same results
-    give the same bytes.
+    The index shows all pages in the folder, also those of earlier calls.
 
     Args:
-        names: The reports; all shipped ones if empty.
+        names: The reports; all if empty.
         results: The folder that holds a results folder per study.
         out: The folder to write to.
         progress: Called after every cell.
         parameters: Values for the parameters of the notebooks, beside ``results``.
+        notebooks: The folder of the notebooks.
 
     Returns:
         The path of ``index.html``.
 
     Raises:
         InputError: If a report or a parameter is unknown, results are missing, a notebook refuses
-            what it was given or ``out`` cannot be written. Nothing is written then.
-        ReportError: If a notebook fails; after all others. Its page is left under a name of its
-            own, as far as it went.
+            its input or ``out`` cannot be written. Nothing is written then.
+        ReportError: If a notebook fails; after all others. Its page is written under another name,
+            up to the cell that failed.
     """
     results, out, values = Path(results), Path(out), parameters or {}
-    reports = [read(name) for name in dict.fromkeys(names) or NAMES]
+    reports = [read(name, notebooks) for name in dict.fromkeys(names) or names_in(notebooks)]
     check_parameters(reports, values)
     for study in dict.fromkeys(study for report in reports for study in report.studies):
         _check_results(results / study)
@@ -88,27 +76,27 @@ def render(
     needed = [out] + [results for report in reports if "results" in report.parameters]
     with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
         Kernels(results, progress).run(reports)
-        files = {report.page: sealed(_page("report.html", **_parts(report))) for report in reports}
-        whole = [report for report in reports if not report.failure]
-        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in whole}
-        files[INDEX] = _index(_pages(out, but=files) | files)
+        files = {report.page: _page(report) for report in reports}
+        complete = [report for report in reports if not report.failure]
+        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
+        shown = [read(name, notebooks) for name in names_in(notebooks)]
+        files[INDEX] = index_of(pages_in(out, but=files) | files, shown)
         with _writing(out):
             for name, text in files.items():
                 Path(folder, name).write_bytes(text.encode())
             for name in files:
                 os.replace(Path(folder, name), out / name)
-            for report in whole:
+            for report in complete:
                 (out / f"{report.name}.partial.html").unlink(missing_ok=True)
     if failed := [report for report in reports if report.failure]:
-        raise ReportError(
-            "; ".join(f"{r.failure}; as far as it went: {out / r.page}" for r in failed)
-        )
+        lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
+        raise ReportError("; ".join(lines))
     return out / INDEX
 
 
 @contextmanager
 def _folders(folders: Iterable[Path]) -> Iterator[None]:
-    """Make folders; if what comes then fails and has left nothing in them, they go again."""
+    """Make folders; remove those that are still empty if the body fails."""
     made: list[Path] = []
     try:
         for folder in folders:
@@ -119,7 +107,7 @@ def _folders(folders: Iterable[Path]) -> Iterator[None]:
         yield
     except BaseException:
         for path in made:
-            with suppress(OSError):  # it holds something
+            with suppress(OSError):  # not empty
                 path.rmdir()
         raise
 
@@ -139,23 +127,24 @@ def _check_results(folder: Path) -> None:
             f"they are made by: dess study run {folder.name} --out {folder}"
         )
     manifest = Manifest.read(folder / MANIFEST)
-    held = manifest.study["name"]
-    if held != folder.name:
-        raise InputError(f"results: {folder} holds study {held}; allowed: {folder.name}")
+    study = manifest.study["name"]
+    if study != folder.name:
+        raise InputError(f"results: {folder} holds study {study}; allowed: {folder.name}")
     if not manifest.complete:
         raise InputError(f"results: {folder}: incomplete; allowed: run the study again")
 
 
-def _parts(report: Report) -> dict[str, Any]:
-    """What the template of a page shows."""
-    # Without what was given: it may be a path of this machine. The notebook beside has it.
-    cells = [cell.source for cell in report.cells if cell.id != GIVEN]
-    code = highlight("\n\n\n".join(cells), PythonLexer(), HtmlFormatter())
-    return {"report": report, "body": _body(report.notebook), "code": Markup(code)}
+def _page(report: Report) -> str:
+    """The page of a report that has been run."""
+    # Without the values of parameters, which may be paths of this machine: the notebook has them.
+    sources = [cell.source for cell in report.cells if cell.id != VALUES]
+    code = highlight("\n\n\n".join(sources), PythonLexer(), HtmlFormatter())
+    body = html_of(report.notebook)
+    return fill("report.html", report=report, body=body, code=Markup(code))
 
 
-def _body(notebook: NotebookNode) -> str:
-    """The cells as HTML; what they wrote to stderr goes to the log instead."""
+def html_of(notebook: NotebookNode) -> str:
+    """The outputs and the text of a notebook as HTML; its stderr goes to the log instead."""
     for cell in notebook.cells:
         for output in [*cell.get("outputs", [])]:
             if output.get("name") == "stderr":
@@ -168,65 +157,9 @@ def _body(notebook: NotebookNode) -> str:
         exclude_output_prompt=True,
         exclude_anchor_links=True,
     )
-    return _with_indices(exporter.from_notebook_node(notebook)[0])
+    return with_indices(exporter.from_notebook_node(notebook)[0])
 
 
-def _with_indices(content: str) -> str:
-    """Text with ``C_S`` as a C with an index; code and attributes stay."""
+def with_indices(content: str) -> str:
+    """HTML with ``C_S`` in its text as a C with an index; code and attributes stay."""
     return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], content)
-
-
-def _pages(out: Path, but: Container[str] = ()) -> dict[str, str]:
-    """The pages of earlier calls that stay; the index leaves out what is not as it was written."""
-    pages = {}
-    for path in (out / f"{name}.html" for name in NAMES if f"{name}.html" not in but):
-        try:
-            content = path.read_bytes().decode()
-            if not is_sealed(content):
-                raise InputError("altered")
-            _evidence([content])
-        except FileNotFoundError:
-            continue
-        except (OSError, UnicodeDecodeError, InputError):
-            log.warning("%s: altered, or of another version; the index leaves it out", path)
-        else:
-            pages[path.name] = content
-    return pages
-
-
-def _evidence(pages: Iterable[str]) -> list[Evidence]:
-    """What pages carry of their studies, each once."""
-    texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
-    return [Evidence.parse(text, "page") for text in dict.fromkeys(texts)]
-
-
-def _index(pages: Mapping[str, str]) -> str:
-    """The page that shows all others, and what their results were made with."""
-    there = [report for report in map(read, NAMES) if report.page in pages]
-    cards = [
-        Card(r.page, r.title, r.description, _thumbnail(pages[r.page]))
-        for r in there
-        if r.name != SCORECARD
-    ]
-    scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
-    shown = [pages[report.page] for report in there]
-    files = dict.fromkeys(text for content in shown for text in html.embedded(html.FILES, content))
-    origins = html.carrying(_evidence(shown), files)
-    parts = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
-    return sealed(_page(INDEX, cards=cards, **parts))
-
-
-def _thumbnail(content: str) -> Markup:
-    """The last image of a page, the fullest one."""
-    images = _IMAGE.findall(content)
-    return Markup(images[-1] if images else "")
-
-
-def _page(template: str, **values: Any) -> str:
-    environment = Environment(
-        loader=PackageLoader("reports", "templates"), autoescape=True, trim_blocks=True
-    )
-    style = HtmlFormatter().get_style_defs(".highlight")
-    return environment.get_template(template).render(
-        code_style=Markup(style), version=dess.__version__, **values
-    )

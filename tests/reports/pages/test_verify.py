@@ -17,7 +17,9 @@ from policies.registry import TRAINED
 from reports.cli import main
 from reports.pages import html
 from reports.pages.html import STUDY, embedded
-from reports.pages.render import _index, _pages, render
+from reports.pages.index import index_of, pages_in
+from reports.pages.notebook import NAMES, read
+from reports.pages.render import render
 from reports.pages.verify import sealed, verify_page, verify_results
 
 ALL = 10**6
@@ -171,17 +173,17 @@ def test_an_altered_page_does_not_get_into_the_index(
     page: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = shutil.copytree(page.parent, tmp_path / "out")
-    assert {*_pages(folder)} == {"performance.html"}
+    assert {*pages_in(folder)} == {"performance.html"}
     altered(page, "Performance", "Perfection", folder / "performance.html")
     (folder / "comparison.html").write_bytes(b"\xff")
     old = page.read_text("utf-8").replace(embedded(STUDY, page.read_text("utf-8"))[0], "{}")
     (folder / "mission.html").write_text(sealed(old), "utf-8")
-    assert not _pages(folder)
+    assert not pages_in(folder)
     told = {record.args[0].name for record in caplog.records}
     assert told == {"comparison.html", "performance.html", "mission.html"}
     caplog.clear()
-    assert not _pages(folder, but=told) and not caplog.records  # what is made anew is not missed
-    assert "performance.html" not in _index(_pages(folder))
+    assert not pages_in(folder, but=told) and not caplog.records  # what is made anew is not missed
+    assert "performance.html" not in index_of(pages_in(folder), [*map(read, NAMES)])
 
 
 def test_an_incomplete_folder_hides_no_other(results: Path, tmp_path: Path) -> None:

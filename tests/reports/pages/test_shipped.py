@@ -1,0 +1,184 @@
+"""The shipped reports rendered in full: complete, self-contained, the same bytes everywhere."""
+
+import json
+import re
+import shutil
+from base64 import b64decode
+from collections.abc import Callable
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+import reports
+from analysis import load_results
+from policies.registry import trained_names
+from reports.pages.html import STUDY, embedded
+from reports.pages.notebook import NAMES, read
+from reports.pages.render import html_of, render
+from reports.player import library
+from tests.reports.browser import Visit
+from tests.reports.pages.test_render import another_environment
+from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
+
+pytestmark = pytest.mark.slow
+
+# Parameters of what would take long: missions of what-if, missions simulated again on verification.
+QUICK = {"missions": 40, "again": 4}
+# The width of the text on A4 [px], and the elements that reach beyond a width.
+A4 = 688
+BEYOND = """[...document.querySelectorAll("main *")].filter(
+    e => e.getBoundingClientRect().right > {} + 1).map(e => e.outerHTML.slice(0, 80))"""
+# The drawings of every page of the small results.
+FIGURES = {
+    "mission": 4,
+    "performance": 8,
+    "learning": 7 + len(trained_names()),
+    "parameters": 9,
+    "comparison": 12,
+    "what-if": 9,
+    "verification": 13,
+    "scorecard": 0,
+}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small results of all studies that the reports read."""
+    return run_small_studies(tmp_path_factory.mktemp("results"))
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("out") / "deep" / "reports"
+
+
+@pytest.fixture(scope="module")
+def files(results: Path, out: Path) -> dict[str, str]:
+    """All files of the reports, rendered once, by name."""
+    render([], results, out, parameters=QUICK)
+    return {path.name: path.read_text("utf-8") for path in out.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def pages(files: dict[str, str]) -> dict[str, str]:
+    return {name: text for name, text in files.items() if name.endswith(".html")}
+
+
+def test_pages_load_nothing(pages: dict[str, str], files: dict[str, str]) -> None:
+    for name, html in pages.items():
+        links = Links(html)
+        assert not {"link", "iframe", "object"} & links.tags
+        for target in links.found:
+            page, _, section = target.partition("#")
+            if not target.startswith("data:image/svg+xml;base64,"):
+                assert page in {"", *files}
+                assert not section or f'id="{section}"' in files[page or name]
+        for drawing in map(b64decode, EMBEDDED.findall(html)):
+            assert set(re.findall(rb'href="(.)', drawing)) == {b"#"}
+        assert not re.search(r"//[a-z]|url\(|@import", links.outside_scripts)
+
+
+def test_pages_show_no_paths_and_no_times(files: dict[str, str], results: Path) -> None:
+    for html in files.values():
+        html = html.replace(library().data, "")
+        assert str(results) not in html
+        assert str(Path(reports.__file__).parent) not in html
+        assert not re.search(r"\b\d\d:\d\d:\d\d\b|\b20\d\d-\d\d-\d\d\b", html)
+
+
+def test_pages_show_results_and_no_errors(pages: dict[str, str]) -> None:
+    assert pages["index.html"].count('<a class="card"') == len(NAMES) - 1
+    (scorecard,) = re.findall('<section id="scorecard">.*?</section>', pages["index.html"], re.S)
+    assert scorecard in pages["scorecard.html"]
+    assert scorecard.count('<tr class="claim">') >= 15
+    for name in NAMES:
+        assert pages[f"{name}.html"].count("<img ") == FIGURES[name]
+        text = words_of(pages[f"{name}.html"])
+        assert not re.search(r"Traceback|Warning|stderr|<Figure|Figure\(|NaN|\bnan\b|None", text)
+
+
+def test_every_figure_has_a_caption_with_its_number(pages: dict[str, str]) -> None:
+    for name in NAMES:
+        html = pages[f"{name}.html"]
+        captions = re.findall(r"<figcaption>(.*?)</figcaption>", html, re.S)
+        assert len(captions) == len(re.findall("<figure", html))
+        assert all(re.search(r"\bn\b", caption) for caption in captions), name
+
+
+def test_every_page_carries_the_evidence_of_its_studies(
+    pages: dict[str, str], results: Path
+) -> None:
+    for name in NAMES:
+        evidence_of_page = [json.loads(text) for text in embedded(STUDY, pages[f"{name}.html"])]
+        studies = read(name).studies
+        assert [e["study"] for e in evidence_of_page][: len(studies)] == studies
+        for evidence in evidence_of_page[: len(studies)]:
+            manifest = load_results(results / evidence["study"]).store.manifest
+            assert evidence["key"] == manifest.key
+            for field in ("commit", "version", "libraries", "seed", "scenario"):
+                assert evidence[field] == manifest.data[field]
+            assert evidence["policies"] == manifest.data["policies"]
+            assert manifest.key in words_of(pages[f"{name}.html"])
+
+
+def test_pages_are_the_same_bytes_elsewhere(
+    pages: dict[str, str],
+    results: Path,
+    out: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    another_environment(results, out, tmp_path, monkeypatch)
+    shutil.rmtree(tmp_path / results.name / "what-if")  # its missions are simulated anew
+    render([], tmp_path / results.name, tmp_path / "new", parameters=QUICK)
+    for name, html in pages.items():
+        assert (tmp_path / "new" / name).read_text("utf-8") == html
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.usefixtures("files")
+def test_notebooks_run_in_jupyter_and_show_what_the_pages_show(
+    results: Path, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    folder = another_environment(results, out, tmp_path, monkeypatch)
+    notebook = nbformat.read(folder / f"{name}.ipynb", as_version=4)
+    nbformat.validate(notebook)
+    assert notebook.cells.pop(0).source.startswith("# ")
+    NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
+    assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
+    assert html_of(notebook) in (folder / f"{name}.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_pages_fit_the_window_and_request_nothing(
+    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path, width: int
+) -> None:
+    for name in pages:
+        opened = visit(out / name, width)
+        assert opened.page.evaluate("document.documentElement.scrollWidth") <= width
+        assert opened.requests == [(out / name).as_uri()]
+        assert opened.complaints == []
+
+
+def test_pages_fit_the_paper(
+    visit: Callable[[Path, int], Visit], pages: dict[str, str], out: Path
+) -> None:
+    for name in pages:
+        page = visit(out / name, A4).page
+        page.emulate_media(media="print")
+        assert page.evaluate(BEYOND.format(A4)) == [], name
+
+
+@pytest.mark.usefixtures("files")
+def test_a_mission_is_played_in_its_page(visit: Callable[[Path, int], Visit], out: Path) -> None:
+    opened = visit(out / "mission.html", 1280)
+    label = "document.querySelector('#player-3 .slider-label').textContent"
+    play = opened.page.locator("#player-3 .updatemenu-button").filter(has_text="Play")
+    play.wait_for()
+    assert opened.page.evaluate(label) == "slot 0"
+    play.click()
+    opened.page.wait_for_function(f"Number({label}.split(' ')[1]) >= 3")
+    assert opened.requests == [(out / "mission.html").as_uri()]
+    assert opened.complaints == []
