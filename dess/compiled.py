@@ -2,11 +2,10 @@
 
 Numba keeps a compiled function as long as the file that defines it stays the same. Our functions
 inline one another across files, so a cached engine would outlive a change of the rules. Here a
-cached function is valid only while all sources of its package, of the packages around that and of
-``dess`` are unchanged.
+cached function is valid while the code of its module, and of all that this imports, is unchanged
+(``dess.sources``): comments and line numbers make no difference.
 """
 
-import hashlib
 import inspect
 from collections.abc import Callable
 from functools import lru_cache
@@ -14,31 +13,42 @@ from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.caching import IndexDataCacheFile
+
+from dess.sources import code_of, combined
+
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 
 def kernel(function: Callable, **options: Any) -> Any:
     """Compile a function with numba, without Python and its lock, cached on disk.
 
-    Where no folder for the cache can be written, it is compiled anew in every process.
+    Where its module has no source, or no folder for the cache can be written, it is compiled anew
+    in every process.
     """
+    options = _OPTIONS | options
+    stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:
-        compiled = njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+        compiled = njit(cache=bool(stamp), **options)(function)
     except RuntimeError:  # numba: no locator available
-        return njit(nogil=True, error_model="numpy", **options)(function)
-    folders = [Path(__file__).parent, *_packages(Path(inspect.getfile(function)))]
-    _keep_fresh(compiled._cache._cache_file, "".join(map(_digest, folders)))
+        return njit(**options)(function)
+    if stamp:
+        compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
     return compiled
 
 
-def _keep_fresh(cache: Any, stamp: str) -> None:
-    """Make a disk cache valid for one state of the sources, and empty one of another state.
+def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
+    """The disk cache of a function for one state of the code; one of another state is emptied.
 
-    Numba reads an old index before it looks at its stamp, and fails where a type has moved since.
+    Numba names its files after the line of the function, which a comment above it moves. It also
+    reads an old index before it looks at its stamp, and fails where a type has moved since.
     """
-    cache._source_stamp = stamp
-    index = Path(cache._index_path)
+    name = cache._impl.filename_base.replace(f"-{cache._impl._lineno}.", ".")
+    file = IndexDataCacheFile(cache.cache_path, name, stamp)
+    index = Path(file._index_path)
     if index.exists() and stamp.encode() not in index.read_bytes():
-        cache.flush()
+        file.flush()
+    return file
 
 
 def inlined(function: Callable) -> Any:
@@ -50,18 +60,8 @@ def inlined(function: Callable) -> Any:
     return kernel(function, forceinline=True)
 
 
-def _packages(path: Path) -> list[Path]:
-    """The folder of a source file and those of the packages around it."""
-    folders = [path.parent]
-    while (folders[-1].parent / "__init__.py").exists():
-        folders.append(folders[-1].parent)
-    return folders
-
-
 @lru_cache
-def _digest(folder: Path) -> str:
-    """A hash of the Python sources directly in a folder."""
-    sources = hashlib.sha256()
-    for path in sorted(folder.glob("*.py")):
-        sources.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return sources.hexdigest()
+def _code_behind(module: str, path: str) -> str:
+    """A hash of the code that the functions of a module may call; empty if it has no source."""
+    code = code_of(Path(path).stem if module == "__main__" else module)
+    return combined(code) if code else ""

@@ -13,18 +13,18 @@ from time import perf_counter
 from typing import Any, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 from threadpoolctl import threadpool_limits
 
 import dess
-from analysis.results.manifest import (
-    Manifest,
+from analysis.results.documents import Document, read_json
+from analysis.results.manifest import Manifest
+from analysis.results.provenance import (
     Member,
     commit_of_source,
-    fingerprint,
+    engine_code,
     library_versions,
     members_of,
-    read_json,
 )
 from dess import load_scenario, simulate, simulate_batch
 from dess.errors import InputError
@@ -45,11 +45,7 @@ Clock = Callable[[], float]
 Progress = Callable[[int, int], None]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Cost(_Part):
+class Cost(Document):
     """What the decisions of a policy cost [s].
 
     A call of ``Policy.act`` decides for all UAVs of a mission that must act, with all that the
@@ -76,7 +72,7 @@ class Cost(_Part):
     batch: float = Field(gt=0)
 
 
-class Timing(_Part):
+class Timing(Document):
     """What decisions cost, and on what they were measured.
 
     Attributes:
@@ -163,7 +159,7 @@ def measure(
     return Timing(
         schema_version=SCHEMA_VERSION,
         version=dess.__version__,
-        code=fingerprint("dess"),
+        code=engine_code(),
         commit=commit_of_source(),
         libraries=library_versions(),
         processor=_processor(),
@@ -233,14 +229,14 @@ def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bo
         return False
     timed = {cost.policy: cost.members for cost in kept.costs}
     wanted = {policy: members_of(policy) for policy in policies}
-    here = (fingerprint("dess"), _processor(), library_versions(), missions)
+    here = (engine_code(), _processor(), library_versions(), missions)
     return timed == wanted and (kept.code, kept.processor, kept.libraries, kept.missions) == here
 
 
 def unlike(timing: Timing, manifest: Manifest) -> list[str]:
     """The policies of a study that were not timed as they flew it: with other code or weights."""
     timed = {cost.policy: cost.members for cost in timing.costs}
-    if timing.code != manifest.code:
+    if timing.code != manifest.engine_code:
         return [team.policy for team in manifest.policies if team.policy in timed]
     return [t.policy for t in manifest.policies if timed.get(t.policy, t.members) != t.members]
 

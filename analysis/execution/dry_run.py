@@ -62,6 +62,7 @@ def plan_study(
     out: str | Path,
     workers: int = 1,
     clock: Callable[[], float] = time.perf_counter,
+    accept_code: bool = False,
 ) -> Plan:
     """Plan a run; nothing is written.
 
@@ -70,12 +71,13 @@ def plan_study(
         out: The results folder, which need not exist.
         workers: Processes.
         clock: Tells the time [s].
+        accept_code: Whether missions count that other code has simulated.
 
     Raises:
         InputError: If the folder holds something else, or there is no worker.
     """
     check_workers(workers)
-    store = Store.peek(study, out)
+    store = Store.peek(study, out, accept_code)
     rows = []
     for team in range(len(study.policies)):
         missing, total = _missing(study, store, team)

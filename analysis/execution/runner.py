@@ -68,6 +68,7 @@ def run_study(
     scheduler: str | None = None,
     progress: Progress | None = None,
     announce: Callable[[Round], object] | None = None,
+    accept_code: bool = False,
 ) -> Results:
     """Run a study into a results folder; what is there already is kept.
 
@@ -81,6 +82,8 @@ def run_study(
         progress: Called with the number of missions done since its last call, first in every round
             with those that are there already.
         announce: Called before each round.
+        accept_code: Whether to go on with missions that other code has simulated. What is accepted
+            is written into the manifest.
 
     Raises:
         InputError: If the study is not valid, the folder cannot be written, is in use or holds
@@ -89,7 +92,7 @@ def run_study(
     """
     if not isinstance(study, Study):
         study = load_study(study)
-    with pool_of(workers, scheduler) as pool, Store.open(study, out) as store:
+    with pool_of(workers, scheduler) as pool, Store.open(study, out, accept_code) as store:
         _Run(study, store, pool, progress, announce).complete()
         return results_of(store)
 
@@ -230,11 +233,11 @@ class _Run:
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """What is told of a job that failed; without a culprit, the same study does it again."""
-        replay = shlex.join([*self.study.command, "--out", str(self.store.folder)])
+        command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if mission := problem.mission:
-            replay = self.store.manifest.replay(mission.cell, mission.replications[0])
+            command = self.store.manifest.command(mission.cell, mission.replications[0])
         policy = self.study.policies[job.chunk.team]
-        return Failure(policy, job.missions, problem.error, replay, problem.traceback)
+        return Failure(policy, job.missions, problem.error, command, problem.traceback)
 
 
 def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:

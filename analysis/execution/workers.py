@@ -15,7 +15,7 @@ from typing import Any, Protocol, Self
 
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.results.chunks import Part
-from analysis.results.manifest import Member, fingerprint, members_of
+from analysis.results.provenance import Member, engine_code, members_of
 from dess.errors import InputError
 
 DEATHS = 2  # of workers that a job was alone with, after which it is given up
@@ -184,7 +184,7 @@ class Cluster:
         """Do the jobs; their numbers and results as they come in."""
         from distributed import as_completed
 
-        code = fingerprint("dess")
+        code = engine_code()
         teams = {policy: members_of(policy) for policy in {job.policy for job in jobs}}
         futures = [
             self.client.submit(_checked, job, code, teams[job.policy], pure=False) for job in jobs
@@ -205,7 +205,7 @@ class Cluster:
 
 
 def _checked(job: Job, code: str, members: list[Member]) -> Any:
-    other = "code of dess" if fingerprint("dess") != code else ""
+    other = "code of dess" if engine_code() != code else ""
     if members_of(job.policy) != members:
         other = f"code or weights of {job.policy}"
     if other:

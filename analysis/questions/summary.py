@@ -97,7 +97,7 @@ def worst(results: Results, policy: str, missions: int = 5) -> pd.DataFrame:
     ordered = policy_missions.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)
     table = ordered.loc[: missions - 1, ["policy", "point", "replication", *SHARES, *MEANS]]
     keys = zip(table["point"], table["replication"], strict=True)
-    return table.assign(command=[results.replay(policy, *key) for key in keys])
+    return table.assign(command=[results.command(policy, *key) for key in keys])
 
 
 def comparisons(results: Results) -> pd.DataFrame:

@@ -13,22 +13,18 @@ from typing import Any, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 import dess
-from analysis.results.manifest import (
+from analysis.results.documents import Document
+from analysis.results.manifest import simulate_command
+from analysis.results.provenance import (
+    Acceptance,
     Team,
-    fingerprint,
+    code_behind,
+    differing,
     library_versions,
-    members_of,
-    replay_command,
+    team_of,
 )
 from analysis.results.resimulate import difference, kept
 from analysis.results.store import Store
@@ -44,11 +40,7 @@ from policies.registry import TRAINED
 SAMPLE = 32  # missions of a study that a page carries
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Mission(_Part):
+class Mission(Document):
     """A mission of a study: who flew it, what its design point sets, and its record.
 
     The record has the fields of ``MISSION_RECORD``, and those of the UAVs as ``uav 1 quota``.
@@ -67,7 +59,7 @@ class Mission(_Part):
         return record
 
 
-class Evidence(_Part):
+class Evidence(Document):
     """What the results of a study were made with, and some of their missions.
 
     Attributes:
@@ -80,7 +72,9 @@ class Evidence(_Part):
     study: str
     key: str
     version: str
-    code: str
+    code: dict[str, str]
+    engine_code: str
+    accepted: list[Acceptance]
     commit: str | None
     libraries: dict[str, str]
     seed: int
@@ -118,6 +112,8 @@ class Evidence(_Part):
             key=manifest.key,
             version=manifest.version,
             code=manifest.code,
+            engine_code=manifest.engine_code,
+            accepted=manifest.accepted,
             commit=manifest.commit,
             libraries=manifest.libraries,
             seed=manifest.seed,
@@ -149,9 +145,9 @@ class Evidence(_Part):
         """The evidence as JSON."""
         return json.dumps(self.model_dump(mode="json", by_alias=True))
 
-    def replay(self, mission: Mission) -> str:
+    def command(self, mission: Mission) -> str:
         """The command that simulates a mission of the sample again."""
-        return replay_command(
+        return simulate_command(
             self.scenario_name,
             self.settings | mission.values,
             self.space(mission),
@@ -206,7 +202,7 @@ def verify(evidence: Evidence, missions: int, seed: int) -> Verdict:
         team = load_team(mission.policy)
         record = simulate(evidence.space(mission), team, evidence.seed, mission.replication)
         if changed := difference(record, mission.record):
-            differing.append(f"{changed}; replay: {evidence.replay(mission)}")
+            differing.append(f"{changed}; replay: {evidence.command(mission)}")
     return Verdict(evidence.study, len(chosen), differing, notes)
 
 
@@ -228,7 +224,7 @@ def verify_logs(store: Store, missions: int, seed: int) -> Verdict:
         assert log is not None and held is not None
         if not held.to_pandas().equals(pd.DataFrame(log.columns())):
             line = "the event log is another one when flown again"
-            differing.append(f"{line}; replay: {manifest.replay(cell, replication)}")
+            differing.append(f"{line}; replay: {manifest.command(cell, replication)}")
     name = f"{manifest.study['name']}, event logs"
     return Verdict(name, min(len(logged), missions), differing, [])
 
@@ -247,11 +243,13 @@ def _notes(evidence: Evidence) -> list[str]:
     notes = []
     if evidence.version != dess.__version__:
         notes.append(f"made by dess {evidence.version}, not {dess.__version__}")
-    elif evidence.code != fingerprint("dess"):
-        notes.append("made by other code of dess")
-    changed = [team.policy for team in evidence.policies if team.members != members_of(team.policy)]
+    elif changes := differing(
+        evidence.code, code_behind(team.policy for team in evidence.policies)
+    ):
+        notes.append(f"made by other code of {', '.join(changes)}")
+    changed = [t.policy for t in evidence.policies if t.weights != team_of(t.policy).weights]
     if changed:
-        notes.append(f"made by other code or weights of {', '.join(changed)}")
+        notes.append(f"made by other weights of {', '.join(changed)}")
     ours = library_versions()
     others = [name for name in ours if evidence.libraries.get(name) != ours[name]]
     if others:

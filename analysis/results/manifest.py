@@ -1,36 +1,34 @@
 """What a results folder is about: the study, what it was run with, and what its cells depend on."""
 
-import inspect
 import json
 import shlex
-import subprocess
-from functools import cached_property, lru_cache
+from functools import cached_property
 from hashlib import sha256
-from importlib import import_module, metadata
 from pathlib import Path, PurePath
-from platform import python_version
 from typing import Any, NamedTuple, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    TypeAdapter,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import TypeAdapter, ValidationError, field_validator, model_validator
 
 import dess
+from analysis.results.documents import Document, read_json
+from analysis.results.provenance import (
+    Acceptance,
+    Team,
+    code_behind,
+    commit_of_source,
+    differing,
+    engine_code,
+    library_versions,
+    team_of,
+)
 from analysis.study.design import Design
 from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
-from policies import load_team
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 # The parts of a study that are read back from its data.
 _PARTS: dict[str, TypeAdapter] = {
@@ -39,7 +37,6 @@ _PARTS: dict[str, TypeAdapter] = {
     "precision": TypeAdapter(Precision | None),
     "selection": TypeAdapter(Selection | None),
 }
-LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 
 
 class Cell(NamedTuple):
@@ -55,41 +52,21 @@ class Cell(NamedTuple):
     first: int
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Member(_Part):
-    """The identity of a policy: its name, its class, and hashes of the code and weights it has.
-
-    ``learner`` is the same for trained policies that differ in the seed of their training alone.
-    """
-
-    name: str
-    class_: str = Field(alias="class")
-    code: str
-    weights: str = ""
-    learner: str = ""
-
-
-class Team(_Part):
-    """A team of a study, as the study names it."""
-
-    policy: str
-    members: list[Member]
-
-
-class DesignPoint(_Part):
+class DesignPoint(Document):
     """A design point: what it sets of the scenario, and its first replication."""
 
     values: dict[str, Any]
     replication: int = 0
 
 
-class Manifest(_Part):
+class Manifest(Document):
     """What a results folder is about. No clock and no path: equal runs have equal manifests.
 
     Attributes:
+        code: A hash of every module that the records depend on, as of the last run.
+        engine_code: A hash of the code of the engines, as of the first run; it is part of the keys
+            of the cells, like the code of the policies.
+        accepted: The changes of code between the runs, in their order.
         scenario: The whole scenario that the design points change.
         missions: Wanted of every team and design point; grows where a rule decides it.
         selected: The design point that was selected for every team, if the study selects.
@@ -98,7 +75,9 @@ class Manifest(_Part):
 
     schema_version: int
     version: str
-    code: str
+    code: dict[str, str]
+    engine_code: str
+    accepted: list[Acceptance]
     commit: str | None
     libraries: dict[str, str]
     seed: int
@@ -150,13 +129,15 @@ class Manifest(_Part):
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
-            code=fingerprint("dess"),
+            code=code_behind(study.policies),
+            engine_code=engine_code(),
+            accepted=[],
             commit=commit_of_source(),
             libraries=library_versions(),
             seed=study.seed,
             study=data,
             scenario=base.model_dump(mode="json"),
-            policies=[Team(policy=team, members=members_of(team)) for team in study.policies],
+            policies=[team_of(policy) for policy in study.policies],
             points=points,
             missions=[[study.first] * len(points)] * len(study.policies),
             selected=[None] * len(study.policies),
@@ -177,40 +158,61 @@ class Manifest(_Part):
         except ValidationError as error:
             raise InputError(f"{validation_line(error, str(path))}; {_ALLOWED}") from None
 
-    def check_extended_by(self, new: "Manifest", path: Path) -> None:
-        """Refuse to mix results: ``new`` must be the same study, or more of it.
+    def extended_to(self, new: "Manifest", path: Path, accepting: int | None) -> "Manifest":
+        """The manifest of a folder that holds these results and is to hold a new run's as well.
+
+        It must be the same study, or more of it. Cells keep the keys that they have, so that their
+        missions are found whatever code is accepted.
+
+        Args:
+            new: The manifest of the run.
+            path: Where this manifest lies, for messages.
+            accepting: Missions in the folder, if they may have been simulated with other code.
 
         Raises:
-            InputError: If it is not; ``path`` says where this manifest lies.
+            InputError: If the results would not fit together.
         """
+        self._check_extended_by(new, path)
+        changes = differing(self.code, new.code)
+        if changes and accepting is None:
+            modules = ", ".join(changes)
+            raise InputError(
+                f"{path}: made by other code of {modules}; {_ALLOWED}, or --accept-code"
+            )
+        accepted = [Acceptance(modules=changes, missions=accepting or 0)] if changes else []
+        held = {team.policy: team for team in self.policies}
+        update: dict[str, Any] = {
+            "engine_code": self.engine_code,
+            "policies": [held.get(team.policy, team) for team in new.policies],
+            "accepted": self.accepted + accepted,
+        }
+        if self.study == new.study and self.points == new.points:
+            progress = ("missions", "selected", "complete")
+            update |= {name: getattr(self, name) for name in progress}
+        # Not a copy: what is cached of the new manifest does not hold with other keys.
+        fields = {name: getattr(new, name) for name in Manifest.model_fields}
+        return Manifest(**fields | update)
+
+    def _check_extended_by(self, new: "Manifest", path: Path) -> None:
         name, held = new.study["name"], self.study["name"]
-        teams = {team.policy: team for team in new.policies}
+        teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
-        changed = [team.policy for team in self.policies if teams.get(team.policy, team) != team]
+        changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]
         foreign = not set(self._point_keys) <= set(new._point_keys)
         complaints = {
             f"holds study {held}, not {name}": held != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
             f"holds other scenarios than those of study {name}": foreign,
             f"holds policy {' '.join(dropped)}, which study {name} has not": bool(dropped),
-            "made by other code of the same version": self.code != new.code,
-            f"made by other code of policy {' '.join(changed)}": bool(changed),
+            f"made by other weights of policy {' '.join(changed)}": bool(changed),
         }
         for complaint, holds in complaints.items():
             if holds:
                 raise InputError(f"{path}: {complaint}; {_ALLOWED}")
 
-    def carried_on_from(self, held: "Manifest") -> "Manifest":
-        """This manifest, as far as an earlier run of the same study got."""
-        data = ("study", "policies", "points")
-        if any(getattr(self, name) != getattr(held, name) for name in data):
-            return self
-        progress = {name: getattr(held, name) for name in ("missions", "selected", "complete")}
-        return self.model_copy(update=progress)
-
-    def replay(self, cell: Cell, replication: int) -> str:
+    def command(self, cell: Cell, replication: int) -> str:
         """The command that simulates a mission of a cell again."""
-        return replay_command(
+        return simulate_command(
             self.study["scenario"],
             self.study["set"] | self.points[cell.point].values,
             self.scenarios[cell.point],
@@ -223,7 +225,9 @@ class Manifest(_Part):
     def key(self) -> str:
         """A hash of what all records depend on, and of how many there are."""
         keys = [cell.key for cells in self.cells for cell in cells]
-        return sha256(_canonical([keys, self.missions, self.selected]).encode()).hexdigest()[:16]
+        accepted = [change.data for change in self.accepted]
+        content = _canonical([keys, self.missions, self.selected, accepted])
+        return sha256(content.encode()).hexdigest()[:16]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:
@@ -238,7 +242,7 @@ class Manifest(_Part):
     @cached_property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """The cells of every team, in the order of the design points."""
-        run = {"version": self.version, "code": self.code, "seed": self.seed}
+        run = {"version": self.version, "code": self.engine_code, "seed": self.seed}
         scenarios = [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
         teams = []
         for number, team in enumerate(self.policies):
@@ -251,18 +255,12 @@ class Manifest(_Part):
         return tuple(teams)
 
     @property
-    def data(self) -> dict[str, Any]:
-        """The manifest as plain data."""
-        return self.model_dump(mode="json", by_alias=True)
-
-    @property
     def text(self) -> str:
         """The manifest as JSON, a line for each of its parts."""
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-_VERSIONS = ("version", "schema_version")
 _ALLOWED = "allowed: another --out, or remove the folder"
 
 
@@ -270,34 +268,7 @@ def _canonical(data: Any) -> str:
     return json.dumps(data, sort_keys=True)
 
 
-def read_json(path: Path, schema: int, absent: str, allowed: str) -> Any:
-    """The data of a JSON file that tells its ``version`` and ``schema_version``.
-
-    Args:
-        path: The file.
-        schema: The schema that it must be of.
-        absent: What is allowed, if it is not there.
-        allowed: What is allowed otherwise.
-
-    Raises:
-        InputError: If there is none, or it is no JSON or of another version.
-    """
-    try:
-        data = json.loads(path.read_text("utf-8"))
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; {absent}") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read: {error}; {allowed}") from None
-    made_by = [data.get(key) for key in _VERSIONS] if isinstance(data, dict) else [None]
-    if None not in made_by and made_by != [dess.__version__, schema]:
-        raise InputError(
-            f"{path}: made by dess {made_by[0]} (schema {made_by[1]}), "
-            f"not {dess.__version__} (schema {schema}); {allowed}"
-        )
-    return data
-
-
-def replay_command(
+def simulate_command(
     name: str,
     values: dict[str, Any],
     scenario: ScenarioSpace,
@@ -322,50 +293,3 @@ def replay_command(
     settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
     which = ["--policy", policy, "--seed", str(seed), "--replication", str(replication)]
     return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
-
-
-@lru_cache
-def fingerprint(module: str) -> str:
-    """A hash of the Python sources of a module: all those in its packages, or its own alone."""
-    imported = import_module(module)
-    source = Path(inspect.getfile(imported))
-    depth = len(imported.__package__.split(".")) if imported.__package__ else 0
-    folders = [source.parents[level] for level in range(depth)]
-    sources = [path for folder in folders for path in sorted(folder.glob("*.py"))]
-    digest = sha256()
-    for path in sources or [source]:
-        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
-def members_of(team: str) -> list[Member]:
-    """The identities of a team's policies, as this process has them."""
-    identities = []
-    for policy in load_team(team):
-        kind = type(policy)
-        identity = {
-            "name": policy.name,
-            "class": f"{kind.__module__}:{kind.__qualname__}",
-            "code": fingerprint(kind.__module__),
-            "weights": getattr(policy, "weights", ""),
-            "learner": getattr(policy, "learner", ""),
-        }
-        identities.append(Member.model_validate(identity))
-    return identities
-
-
-def library_versions() -> dict[str, str]:
-    """What records may depend on besides the code: Python, and the libraries that compute."""
-    return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
-
-
-def commit_of_source() -> str | None:
-    """The git commit of the source tree; nothing outside one."""
-    root = Path(inspect.getfile(dess)).parents[1]
-    if not (root / ".git").exists():
-        return None
-    command = ["git", "-C", str(root), "rev-parse", "HEAD"]
-    try:
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return None

@@ -12,6 +12,7 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -61,14 +62,14 @@ class Failure:
         policy: The team.
         missions: How many missions are missing for it.
         error: What went wrong, in a line.
-        replay: A command that does it again.
+        command: A command that does it again.
         traceback: Where it went wrong.
     """
 
     policy: str
     missions: int
     error: str
-    replay: str
+    command: str
     traceback: str
 
 
@@ -91,20 +92,27 @@ class Store:
         self._damaged: list[Path] = []
 
     @classmethod
-    def open(cls, study: Study, out: str | Path) -> Self:
+    def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
         """Open a results folder for a study: a new one, or one that the study completes or extends.
 
         It stays locked until it is closed, at the end of a ``with`` block.
+
+        Args:
+            study: The study.
+            out: The folder.
+            accept_code: Whether to go on with missions that other code has simulated.
 
         Raises:
             InputError: If the folder cannot be written, holds something else, or is in use.
         """
         folder = Path(out)
-        store = cls(folder, _extended(folder, Manifest.of(study)))
+        manifest = Manifest.of(study)
+        store = cls(folder, _extended(folder, manifest, accept_code))
         with writable(folder):
             folder.mkdir(parents=True, exist_ok=True)
         store._acquire()
         try:
+            store.manifest = _extended(folder, manifest, accept_code)  # a run may have ended here
             store._prepare()
         except BaseException:
             store._lock.release()
@@ -123,13 +131,13 @@ class Store:
         return store
 
     @classmethod
-    def peek(cls, study: Study, out: str | Path) -> Self:
+    def peek(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
         """What ``open`` would find, to count what is missing; nothing is written or locked.
 
         Raises:
             InputError: If the folder holds something else.
         """
-        store = cls(Path(out), _extended(Path(out), Manifest.of(study)))
+        store = cls(Path(out), _extended(Path(out), Manifest.of(study), accept_code))
         store._scan()
         return store
 
@@ -150,8 +158,7 @@ class Store:
                 ) from None
 
     def _prepare(self) -> None:
-        """Write the manifest, sweep up what a killed run has left, and see what is there."""
-        self.manifest = _extended(self.folder, self.manifest)  # another run may have ended here
+        """Write the manifest, remove what a killed run has left, and scan the folder."""
         self._write_manifest()
         for name in FOLDERS:
             with writable(self.folder / name):
@@ -397,7 +404,7 @@ def _taken(table: pd.DataFrame, wanted: pd.DataFrame) -> pd.DataFrame:
     return rows[["point", *table.columns.drop("cell")]]
 
 
-def _extended(folder: Path, manifest: Manifest) -> Manifest:
+def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     """The manifest of a folder that is to hold this study.
 
     Raises:
@@ -414,8 +421,16 @@ def _extended(folder: Path, manifest: Manifest) -> Manifest:
                 )
             return manifest
     held = Manifest.read(path)
-    held.check_extended_by(manifest, path)
-    return manifest.carried_on_from(held)
+    return held.extended_to(manifest, path, _missions_in(folder) if accept_code else None)
+
+
+def _missions_in(folder: Path) -> int:
+    """The number of missions in a folder, those of damaged files aside."""
+    count = 0
+    for path in folder.glob("missions/policy=*/*.parquet"):
+        with suppress(OSError, pa.ArrowException):
+            count += pq.read_metadata(path).num_rows
+    return count
 
 
 def _is_ours(path: Path) -> bool:

@@ -69,9 +69,11 @@ class Results:
             )
         return log.to_pandas()
 
-    def replay(self, policy: str, point: int, replication: int) -> str:
+    def command(self, policy: str, point: int, replication: int) -> str:
         """The command that simulates a mission of the study again."""
-        return self.store.manifest.replay(self._cell(policy, point), replication)
+        return self.store.manifest.command(self._cell(policy, point), replication)
+
+    replay = command
 
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected for a policy, and what is known of it."""

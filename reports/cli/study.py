@@ -40,6 +40,10 @@ def run(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the plan and the estimated time, run nothing.")
     ] = False,
+    accept_code: Annotated[
+        bool,
+        typer.Option("--accept-code", help="Keep missions simulated by other code, and note it."),
+    ] = False,
 ) -> None:
     """Run a study into a results folder; run again to resume or to top up."""
     from analysis.execution.runner import ChunkError, run_study
@@ -52,17 +56,18 @@ def run(
         from analysis.execution.dry_run import plan_study
 
         with console.compile_notice():
-            study_tables.print_plan(plan_study(study, out, workers), study, out, workers)
+            plan = plan_study(study, out, workers, accept_code=accept_code)
+            study_tables.print_plan(plan, study, out, workers)
         return
     try:
         with console.compile_notice(), _bar() as (progress, announce):
-            results = run_study(study, out, workers, scheduler, progress, announce)
+            results = run_study(study, out, workers, scheduler, progress, announce, accept_code)
     except KeyboardInterrupt:
         line = "interrupted: run the same command again to complete it"
         raise typer.Exit(console.fail(line, 1)) from None
     except ChunkError as error:
         for path, failure in error.failures.items():
-            console.fail(f"failed: {failure.error} ({path}); replay: {failure.replay}", 1)
+            console.fail(f"failed: {failure.error} ({path}); replay: {failure.command}", 1)
         count = len(error.failures)
         line = f"dess: error: {count} of the chunks of study {study.name} failed, the rest is done"
         raise typer.Exit(console.fail(line, 1)) from None
@@ -121,7 +126,11 @@ def show(
     }
     if as_json:
         rows = {name: json.loads(t.to_json(orient="records")) for name, t in tables.items()}
-        print(json.dumps({"study": results.manifest["study"]["name"]} | rows, indent=2))
+        about = {
+            "study": results.manifest["study"]["name"],
+            "accepted": results.manifest["accepted"],
+        }
+        print(json.dumps(about | rows, indent=2))
         return
     study_tables.print_summary(results, folder, short=False)
     study_tables.print_details(results, tables)

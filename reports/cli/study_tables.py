@@ -43,6 +43,8 @@ def print_summary(results: "Results", folder: Path, short: bool) -> None:
 
     study = results.manifest["study"]
     print(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
+    for change in results.store.manifest.accepted:
+        print(f" accepted: {change.text}")
     printed = paper.PRINTED.get(study["name"], {})
     if study["selection"]:
         _print_selections(summary.selections(results))

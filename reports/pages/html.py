@@ -63,13 +63,17 @@ def _origins(evidence: Sequence[Evidence]) -> HTML:
             "Engine": e.engine,
             "Study key": e.key,
             "dess": e.version,
-            "Code": e.code[:SHORT],
+            "Code": e.engine_code[:SHORT],
+            "Accepted": "; ".join(change.text for change in e.accepted),
             "Commit": (e.commit or "unknown")[:SHORT],
             "Libraries": ", ".join(f"{name} {version}" for name, version in e.libraries.items()),
         }
         for e in evidence
     }
-    return table(pd.DataFrame(columns).rename_axis("Study").reset_index(), wrap=True)
+    frame = pd.DataFrame(columns).rename_axis("Study")
+    if not any(e.accepted for e in evidence):
+        frame = frame.drop("Accepted")
+    return table(frame.reset_index(), wrap=True)
 
 
 def weights(folder: Path) -> HTML:

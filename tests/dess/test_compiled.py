@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 CALLER = """
 from dess.compiled import kernel
 from callee import inner
@@ -32,13 +34,32 @@ def _run(folder: Path) -> str:
     return done.stdout.strip()
 
 
-def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
-    tmp_path: Path, monkeypatch
-) -> None:
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
     (tmp_path / "caller.py").write_text(CALLER)
     (tmp_path / "callee.py").write_text(CALLEE.format(1))
     assert _run(tmp_path) == "2 compiled"
-    assert _run(tmp_path) == "2 cached"
-    (tmp_path / "callee.py").write_text(CALLEE.format(10))
-    assert _run(tmp_path) == "11 compiled"
+    return tmp_path
+
+
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(folder: Path) -> None:
+    assert _run(folder) == "2 cached"
+    (folder / "callee.py").write_text(CALLEE.format(10))
+    assert _run(folder) == "11 compiled"
+
+
+def test_a_comment_compiles_nothing_anew(folder: Path) -> None:
+    for name in ("caller.py", "callee.py"):
+        path = folder / name
+        path.write_text(f'"""A docstring."""\n\n# A comment.\n\n{path.read_text()}')
+    assert _run(folder) == "2 cached"
+
+
+def test_a_module_beside_the_script_counts_however_it_is_reached(folder: Path) -> None:
+    (folder / "constant.py").write_text("ONE = 1\n")
+    callee = "from constant import ONE\n" + CALLEE.format("ONE")
+    (folder / "callee.py").write_text(callee)
+    assert _run(folder) == "2 compiled"
+    (folder / "constant.py").write_text("ONE = 3\n")
+    assert _run(folder) == "4 compiled"

@@ -225,7 +225,7 @@ def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatc
         "failed: ZeroDivisionError: nothing to divide by (results/trial/failures/"
     )
     assert last == "dess: error: 1 of the chunks of study trial failed, the rest is done"
-    command = shlex.split(first.partition("replay: ")[2])
+    command = shlex.split(first.partition("command: ")[2])
     assert command[:2] == ["dess", "simulate"]
     with pytest.raises(ZeroDivisionError):
         dess(*command[1:])

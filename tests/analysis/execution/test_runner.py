@@ -311,10 +311,10 @@ def test_a_saltelli_design_runs_every_point_at_its_own_replication(tmp_path):
     assert np.isfinite(indices["total"]).all()
 
 
-def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
+def test_every_row_has_a_command_that_simulates_it_again(tmp_path, monkeypatch):
     study = small_study(tmp_path, design=grid(initial_data=[5, [5, 9.5]]), set={"max_slots": 99})
     results = run_study(study, tmp_path / "out")
-    program, command, *options = shlex.split(results.replay("random", 1, 3))
+    program, command, *options = shlex.split(results.command("random", 1, 3))
     assert (program, command) == ("dess", "simulate")
     monkeypatch.chdir(tmp_path)
     assert options[:2] == ["--scenario", "paper"]  # whose file needs not be there
@@ -324,7 +324,7 @@ def test_every_row_has_a_command_that_replays_it(tmp_path, monkeypatch):
     assert ours.max_slots == 99
     assert options[-6:] == ["--policy", "random", "--seed", "7", "--replication", "3"]
     shipped = load_study("fig4", policies=["greedy"], missions=1, logged=0)
-    command = run_study(shipped, tmp_path / "fig4").replay("greedy", 1, 0)
+    command = run_study(shipped, tmp_path / "fig4").command("greedy", 1, 0)
     assert command == (
         "dess simulate --scenario fig4 --set uavs=2 --policy greedy --seed 2022 --replication 0"
     )

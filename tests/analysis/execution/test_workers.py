@@ -8,7 +8,8 @@ from analysis.execution.jobs import MissionsJob
 from analysis.execution.runner import ChunkError
 from analysis.execution.workers import _checked
 from analysis.results.chunks import Chunk, Part
-from analysis.results.manifest import Manifest, fingerprint, members_of
+from analysis.results.manifest import Manifest
+from analysis.results.provenance import engine_code, members_of
 from analysis.results.store import Store
 from dess import InputError
 from tests.analysis import troublesome
@@ -59,7 +60,7 @@ def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(workers, plugin, t
     assert failure.missions == 4
     assert failure.error == "ZeroDivisionError: nothing to divide by"
     assert "in trouble" in failure.traceback
-    assert shlex.split(failure.replay)[-4:] == ["--seed", "7", "--replication", "5"]
+    assert shlex.split(failure.command)[-4:] == ["--seed", "7", "--replication", "5"]
     check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
 
 
@@ -108,7 +109,7 @@ def test_a_chunk_that_kills_every_worker_is_given_up(plugin, tmp_path):
     assert failure.policy == "killed-always"
     assert failure.missions == 4
     assert "worker died" in failure.error
-    assert shlex.split(failure.replay)[-4:] == ["--seed", "7", "--replication", "5"]
+    assert shlex.split(failure.command)[-4:] == ["--seed", "7", "--replication", "5"]
 
 
 def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
@@ -124,7 +125,7 @@ def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     cell = Manifest.of(study).cells[0][0]
     chunk = Chunk(0, (Part(cell, range(1)),))
     job = MissionsJob(chunk, (study.points[0].scenario,), "greedy", 7, "batch")
-    code, members = fingerprint("dess"), members_of("greedy")
+    code, members = engine_code(), members_of("greedy")
     assert len(_checked(job, code, members).missions) == 1
     for others in (("0" * 64, members), (code, members_of("random"))):
         with pytest.raises(InputError, match="a worker has other code"):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import dess
 from analysis import load_results, run_study
-from analysis.results import manifest
+from analysis.results import provenance
 from analysis.results.chunks import Chunk, Part, gaps, split
 from analysis.results.manifest import Cell
 from analysis.results.store import Failure, Store
@@ -40,7 +40,7 @@ def test_the_manifest_says_what_was_run(out):
     assert data["complete"]
     assert [team["policy"] for team in data["policies"]] == ["greedy", "random"]
     assert data["policies"][0]["members"][0]["class"] == "policies.heuristics:Greedy"
-    assert data["libraries"].keys() == {"python", *manifest.LIBRARIES}
+    assert data["libraries"].keys() == {"python", *provenance.LIBRARIES}
 
 
 def _cut(path):
@@ -94,7 +94,7 @@ FOREIGN = {
     "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),
-        r"made by dess 0\.0\.9 \(schema 2\), not",
+        r"made by dess 0\.0\.9 \(schema 3\), not",
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
@@ -149,18 +149,65 @@ def small_study_again(folder, **changes):
     return load_study(folder / "trial.toml", **changes)
 
 
-def test_other_code_is_refused(out, tmp_path):
-    _rewrite(out, code="0" * 64)
-    with pytest.raises(InputError, match="made by other code of the same version"):
+def _simulated_by_other_code(out, *modules):
+    """Make the manifest say that the code of the modules was another."""
+    code = json.loads((out / "manifest.json").read_text())["code"]
+    _rewrite(out, code=code | dict.fromkeys(modules, "0" * 64))
+
+
+def test_other_code_is_refused_by_its_modules(out, tmp_path):
+    _simulated_by_other_code(out, "dess.rules", "policies.guard")
+    before = files_of(out)
+    line = "made by other code of dess.rules, policies.guard; allowed: .*, or --accept-code"
+    with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
+    assert files_of(out) == before
 
 
-def test_other_code_of_a_policy_is_refused(out, tmp_path):
+def test_a_run_that_accepts_other_code_keeps_the_missions(out, tmp_path):
+    before = files_of(out)
+    _simulated_by_other_code(out, "dess.rules")
+    more = small_study(tmp_path, missions=15, policies=["greedy", "random", "tour"])
+    results = run_study(more, out, accept_code=True)
+    kept = {name: content for name, content in before.items() if name != "manifest.json"}
+    assert kept.items() <= files_of(out).items()
+    (change,) = results.manifest["accepted"]
+    assert change["missions"] == 20
+    assert change["modules"].keys() == {"dess.rules"}
+    old, new = change["modules"]["dess.rules"]
+    assert (old, new) == ("0" * 64, results.manifest["code"]["dess.rules"])
+    assert load_results(out).missions.equals(results.missions)
+    assert results.missions.equals(run_study(more, tmp_path / "at-once").missions)
+    assert results.store.manifest.key != load_results(tmp_path / "at-once").store.manifest.key
+
+
+def test_accepted_code_is_no_other_code(out, tmp_path):
+    _simulated_by_other_code(out, "dess.rules")
+    accepted = run_study(small_study(tmp_path), out, accept_code=True).manifest["accepted"]
+    again = run_study(small_study(tmp_path, missions=12), out)
+    assert again.manifest["accepted"] == accepted
+    _simulated_by_other_code(out, "policies.guard")
+    with pytest.raises(InputError, match="made by other code of policies.guard"):
+        run_study(small_study(tmp_path), out)
+    twice = run_study(small_study(tmp_path, missions=12), out, accept_code=True)
+    assert [*map(len, (accepted, twice.manifest["accepted"]))] == [1, 2]
+    assert twice.manifest["accepted"][1]["missions"] == 24
+
+
+def test_other_weights_are_refused_whatever_is_accepted(out, tmp_path):
     teams = json.loads((out / "manifest.json").read_text())["policies"]
-    teams[1]["members"][0]["code"] = "0" * 64
+    teams[1]["members"][0]["weights"] = "0" * 64
     _rewrite(out, policies=teams)
-    with pytest.raises(InputError, match="made by other code of policy random"):
-        run_study(small_study(tmp_path), out)
+    for accept_code in (False, True):
+        with pytest.raises(InputError, match="made by other weights of policy random"):
+            run_study(small_study(tmp_path), out, accept_code=accept_code)
+
+
+def test_a_policy_depends_on_the_modules_of_what_it_holds():
+    learned = provenance.code_behind(["ddqn"])
+    held = {"policies.ddqn.policy", "policies.ddqn.network", "policies.ddqn.observations.nodes"}
+    assert held <= learned.keys()
+    assert "policies.ddqn.training" not in learned
 
 
 def test_no_results_folder(tmp_path):
@@ -334,24 +381,3 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     assert files_of(tmp_path) == {"file": b"new"}
     with pytest.raises(InputError, match="is a folder"), replacing(tmp_path):
         pass
-
-
-def test_fingerprints_follow_the_sources(tmp_path, monkeypatch):
-    package = tmp_path / "pack"
-    package.mkdir()
-    for name in ("__init__", "brain", "other"):
-        (package / f"{name}.py").write_text("")
-    (tmp_path / "alone.py").write_text("")
-    monkeypatch.syspath_prepend(tmp_path)
-
-    def fingerprints():
-        manifest.fingerprint.cache_clear()
-        return manifest.fingerprint("pack.brain"), manifest.fingerprint("alone")
-
-    before = fingerprints()
-    (package / "other.py").write_text("x = 1")  # brain may import it
-    after = fingerprints()
-    assert after[0] != before[0]
-    assert after[1] == before[1]
-    (tmp_path / "alone.py").write_text("x = 1")
-    assert fingerprints()[1] != before[1]

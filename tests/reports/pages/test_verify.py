@@ -219,11 +219,15 @@ def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: 
     evidence = Evidence.of(load_results(results / "table4"))
     assert verify(evidence, ALL, 0).notes == []
     team = evidence.policies[0]
-    member = team.members[0].model_copy(update={"code": "other"})
+    member = team.members[0].model_copy(update={"weights": "other"})
     other = team.model_copy(update={"members": [member]})
-    changes = {"code": "other", "policies": [other, *evidence.policies[1:]]}
+    code = evidence.code | {"dess.rules": "other", "policies.guard": "other"}
+    changes = {"code": code, "policies": [other, *evidence.policies[1:]]}
     found = verify(evidence.model_copy(update=changes), ALL, 0)
-    assert found.notes == ["made by other code of dess", "made by other code or weights of random"]
+    assert found.notes == [
+        "made by other code of dess.rules, policies.guard",
+        "made by other weights of random",
+    ]
     assert found.differing == []
     older = evidence.model_copy(update={"version": "0.0.1"})
     assert verify(older, ALL, 0).notes[0].startswith("made by dess 0.0.1, not ")

@@ -1,0 +1,139 @@
+"""What records are made with: the code of the engines and policies, libraries, the git commit.
+
+Code is told apart by hashes of the syntax trees of modules (``dess.sources``): of the modules that
+the engines import, and of those that a policy imports. Environments and drawings are not among
+them, nor are comments and docstrings.
+"""
+
+import inspect
+import subprocess
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from platform import python_version
+
+from pydantic import Field
+
+import dess
+from analysis.results.documents import Document
+from dess.sources import OURS, code_of, combined
+from policies import load_team
+from policies.base import Policy
+
+ENGINES = ("dess.batch", "dess.mission")
+LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
+
+
+class Member(Document):
+    """The identity of a policy: its name, its class, and hashes of its code and weights.
+
+    ``learner`` is the same for trained policies that differ in the seed of their training alone.
+    """
+
+    name: str
+    class_: str = Field(alias="class")
+    code: str
+    weights: str = ""
+    learner: str = ""
+
+
+class Team(Document):
+    """A team of a study, as the study names it."""
+
+    policy: str
+    members: list[Member]
+
+    @property
+    def weights(self) -> list[tuple[str, str, str]]:
+        """What identifies the policies, whatever their code."""
+        return [(member.name, member.weights, member.learner) for member in self.members]
+
+
+class Acceptance(Document):
+    """A change of code that a run was told to accept (``--accept-code``).
+
+    Attributes:
+        modules: The hashes, old and new, of the modules that differ; empty for one that is gone.
+        missions: The number of missions that were simulated before, with the old code.
+    """
+
+    modules: dict[str, tuple[str, str]]
+    missions: int
+
+    @property
+    def text(self) -> str:
+        """The change in words."""
+        return f"other code of {', '.join(self.modules)} after {self.missions:,} missions"
+
+
+def team_of(policy: str) -> Team:
+    """A team with the identities of its policies, as this process has them."""
+    return Team(policy=policy, members=members_of(policy))
+
+
+def members_of(team: str) -> list[Member]:
+    """The identities of a team's policies, as this process has them."""
+    return [
+        Member.model_validate(
+            {
+                "name": policy.name,
+                "class": f"{type(policy).__module__}:{type(policy).__qualname__}",
+                "code": combined(_code(_modules_of(policy))),
+                "weights": getattr(policy, "weights", ""),
+                "learner": getattr(policy, "learner", ""),
+            }
+        )
+        for policy in load_team(team)
+    ]
+
+
+def engine_code() -> str:
+    """A hash of the code of the engines."""
+    return combined(_code(ENGINES))
+
+
+def code_behind(teams: Iterable[str]) -> dict[str, str]:
+    """Hashes of the modules that the records of teams depend on, by name."""
+    hashes = {**_code(ENGINES)}
+    for policy in (policy for team in teams for policy in load_team(team)):
+        hashes |= _code(_modules_of(policy))
+    return dict(sorted(hashes.items()))
+
+
+def differing(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    """The hashes, old and new, of the old modules that are not the same in the new code.
+
+    A new module does not count by itself: an old one must have changed to import it.
+    """
+    return {name: (code, new.get(name, "")) for name, code in old.items() if new.get(name) != code}
+
+
+def library_versions() -> dict[str, str]:
+    """What records may depend on besides the code: Python, and the libraries that compute."""
+    return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
+
+
+def commit_of_source() -> str | None:
+    """The git commit of the source tree; nothing outside one."""
+    root = Path(inspect.getfile(dess)).parents[1]
+    if not (root / ".git").exists():
+        return None
+    command = ["git", "-C", str(root), "rev-parse", "HEAD"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def _modules_of(policy: Policy) -> tuple[str, ...]:
+    """The modules of a policy's class, and of the classes of what it holds, such as a network."""
+    home = type(policy).__module__
+    packages = OURS | {home.partition(".")[0]}
+    held = {type(value).__module__ for value in vars(policy).values()}
+    return (home, *sorted(m for m in held - {home} if m.partition(".")[0] in packages))
+
+
+@lru_cache
+def _code(modules: tuple[str, ...]) -> dict[str, str]:
+    return code_of(*modules)

@@ -1,0 +1,129 @@
+"""What the behaviour of a module depends on: hashes of the code of all that it imports.
+
+Results and compiled functions are kept on disk, and are valid as long as the code behind them is
+unchanged. A hash is taken of the syntax tree of a module, so its statements count, and comments,
+docstrings, layout and line numbers do not. Imports are read from the source, those inside functions
+included; nothing is executed. A module that is loaded by name (``import_module``) does not count.
+
+    >>> sorted(code_of("dess.streams"))
+    ['dess.compiled', 'dess.sources', 'dess.streams']
+"""
+
+import ast
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+# Imports of other distributions are not followed: their versions tell what they are.
+OURS = {"dess", "policies"}
+
+
+class Source(NamedTuple):
+    """What is read from the source of a module.
+
+    Attributes:
+        code: A hash of its syntax tree.
+        imports: The names of all modules that it may import; those of their members among them.
+    """
+
+    code: str
+    imports: tuple[str, ...]
+
+
+def code_of(*modules: str) -> dict[str, str]:
+    """Hashes of the code of modules and of all that they import, by the name of the module.
+
+    Imports are followed within the packages of ``OURS`` and the modules' own; from a module outside
+    of packages to those beside it. A package counts where something is imported from its
+    ``__init__.py`` itself. Empty if the modules have no source.
+    """
+    packages = OURS | {module.partition(".")[0] for module in modules}
+    folders = {path.parent for path in map(_path_of, modules) if path}
+    hashes: dict[str, str] = {}
+    waiting = [*modules]
+    while waiting:
+        module = waiting.pop()
+        path = _path_of(module)
+        within = module.partition(".")[0] in packages or (path and path.parent in folders)
+        if path and within and module not in hashes:
+            hashes[module], imports = read(path, module)
+            waiting += imports
+    return dict(sorted(hashes.items()))
+
+
+def combined(hashes: Mapping[str, str]) -> str:
+    """One hash of several."""
+    return sha256(repr(sorted(hashes.items())).encode()).hexdigest()
+
+
+@lru_cache
+def read(path: Path, module: str) -> Source:
+    """Read the source of a module."""
+    tree = ast.parse(path.read_bytes())
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    imports = tuple(dict.fromkeys(_imports(tree, package)))
+    return Source(sha256(repr(_outline(tree)).encode()).hexdigest(), imports)
+
+
+def _imports(tree: ast.Module, package: str) -> Iterator[str]:
+    """The modules that a source may import: of ``from a import b`` both ``a.b`` and ``a``."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parents = package.split(".")
+            above = parents[: len(parents) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            members = [f"{base}.{alias.name}" for alias in node.names]
+            yield from (name for name in members if _path_of(name))
+            if not all(map(_path_of, members)):
+                yield base
+
+
+def _outline(node: Any) -> Any:
+    """A syntax tree as lists, without positions, docstrings and what is empty.
+
+    What is empty differs between the versions of Python. Whether a name is read or written (its
+    context) follows from its place in the tree.
+    """
+    if isinstance(node, list):
+        return [_outline(item) for item in node]
+    if not isinstance(node, ast.AST):
+        return node
+    outline = [type(node).__name__]
+    for field in node._fields:
+        value: Any = getattr(node, field, None)
+        if field == "body" and _has_docstring(node):
+            value = value[1:]
+        if value not in (None, []) and field != "ctx":
+            outline += [field, _outline(value)]
+    return outline
+
+
+def _has_docstring(node: ast.AST) -> bool:
+    return isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None
+
+
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+def _path_of(module: str) -> Path | None:
+    """The source of a module, if it has one; its packages are not imported."""
+    top, *below = module.split(".")
+    try:
+        spec = find_spec(top)
+    except (ImportError, ValueError):
+        return None
+    if spec is None:
+        return None
+    if not below:
+        return Path(spec.origin) if spec.origin and spec.origin.endswith(".py") else None
+    for folder in spec.submodule_search_locations or ():
+        stem = Path(folder, *below)
+        for path in (stem.with_name(f"{stem.name}.py"), stem / "__init__.py"):
+            if path.exists():
+                return path
+    return None
