@@ -205,7 +205,7 @@ def test_other_weights_are_refused_whatever_is_accepted(out, tmp_path):
 
 def test_a_policy_depends_on_the_modules_of_what_it_holds():
     learned = provenance.code_behind(["ddqn"])
-    held = {"policies.ddqn.policy", "policies.ddqn.network", "policies.ddqn.observations.nodes"}
+    held = {"policies.ddqn.policy", "policies.ddqn.network", "policies.ddqn.observations.vector"}
     assert held <= learned.keys()
     assert "policies.ddqn.training" not in learned
 

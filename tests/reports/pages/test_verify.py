@@ -205,7 +205,7 @@ def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) 
     weights = folder / "ddqn" / "model.safetensors"
     weights.write_bytes(weights.read_bytes() + b" ")
     assert learned_files(folder) != learned_files()
-    path.write_text(sealed(html.replace(*_digests(folder))), "utf-8")
+    path.write_text(sealed(content.replace(*_digests(folder))), "utf-8")
     assert lines_of(path) == ["ddqn/model.safetensors: is another one here"]
 
 
