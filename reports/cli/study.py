@@ -67,7 +67,7 @@ def run(
         raise typer.Exit(console.fail(line, 1)) from None
     except ChunkError as error:
         for path, failure in error.failures.items():
-            console.fail(f"failed: {failure.error} ({path}); replay: {failure.command}", 1)
+            console.fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)
         count = len(error.failures)
         line = f"dess: error: {count} of the chunks of study {study.name} failed, the rest is done"
         raise typer.Exit(console.fail(line, 1)) from None

@@ -11,7 +11,7 @@ from analysis.figures.comparison import COLOURS
 from analysis.names import PARAMETERS
 from analysis.questions import regions
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
-from analysis.results.manifest import Member
+from analysis.results.provenance import Member
 from analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.questions.test_regions import missions_of
 
