@@ -15,6 +15,11 @@ def interval(mean: float, low: float, high: float) -> str:
     return f"{percent(mean)} [{minus(f'{100 * low:.1f}')}, {minus(f'{100 * high:.1f}')}]"
 
 
+def estimate(row: pd.Series) -> str:
+    """A row of estimates (``mean``, ``low``, ``high``) as ``97.3 % [96.1, 98.1]``."""
+    return interval(row["mean"], row["low"], row["high"])
+
+
 def difference(value: float, reference: float) -> str:
     """By how many percentage points a value is above its reference, as ``+7.4`` or ``−2.1``."""
     points = round(100 * (value - reference), 1) or 0.0  # no −0.0

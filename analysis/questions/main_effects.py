@@ -1,16 +1,22 @@
-"""What each scenario parameter does: the metrics along its values, and the shape of the way.
+"""The main effects of scenario parameters: metrics along the values of each, and their shape.
 
 For designs that vary one parameter at a time (the paper's Fig. 5). All values of a parameter meet
-the same replications, so they are compared mission by mission.
+the same replications, so they are compared mission by mission:
+
+    table = effects(results)
+    pairs = changes(results, table, "greedy", "uavs", PRODUCT)
+    shape(pairs).words  # "rises"
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import pandas as pd
 
-from analysis.names import SHARES, value_text
+from analysis import numbers
+from analysis.names import PRODUCT, SHARES, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
@@ -53,12 +59,11 @@ def effects(results: Results) -> pd.DataFrame:
     positions: dict[str, int] = {}
     for number, point in enumerate(results.store.manifest.points):
         if len(point.values) != 1:
-            found = ", ".join(point.values) or "no field"
-            raise InputError(f"point {number}: sets {found}; allowed: one field at a time")
+            fields = ", ".join(point.values) or "no field"
+            raise InputError(f"point {number}: sets {fields}; allowed: one field at a time")
         ((field, value),) = point.values.items()
-        position = positions.setdefault(field, 0)
-        positions[field] = position + 1
-        points.append((number, field, value_text(value), position))
+        positions[field] = positions.get(field, -1) + 1
+        points.append((number, field, value_text(value), positions[field]))
     table = pd.DataFrame(points, columns=["point", "field", "value", "position"])
     return table.merge(summary.means(results), on="point")
 
@@ -82,23 +87,37 @@ def changes(
         replications.
     """
     points = table[table["field"] == field].drop_duplicates("position")
-    places = dict(zip(points["point"], points["position"], strict=True))
-    ours = results.missions[
-        (results.missions["policy"] == policy) & results.missions["point"].isin(places)
-    ]
-    values = ours.pivot(index="replication", columns="point", values=metric).dropna()
-    values = values.rename(columns=places).astype(float)
+    positions = dict(zip(points["point"], points["position"], strict=True))
+    missions = results.missions[results.missions["point"].isin(positions)]
+    missions = missions[missions["policy"] == policy]
+    values = missions.pivot(index="replication", columns="point", values=metric).dropna()
+    values = values.rename(columns=positions).astype(float)
     couples = [*combinations(sorted(values), 2)]
     at_once = 1 - (1 - LEVEL) / max(len(couples), 1)
     rows = []
     for first, second in couples:
-        of = values[second].to_numpy(), values[first].to_numpy()
-        pair, wide = (paired(*of, level, share=metric in SHARES) for level in (LEVEL, at_once))
+        samples = values[second].to_numpy(), values[first].to_numpy()
+        pair, wide = (paired(*samples, level, metric in SHARES) for level in (LEVEL, at_once))
         ends = pair.low, pair.high, wide.low, wide.high
         rows.append((first, second, pair.difference, *ends, pair.p, pair.n))
     columns = ["first", "second", "difference", "low", "high", "wide_low", "wide_high", "p", "n"]
     pairs = pd.DataFrame(rows, columns=columns)
     return pairs.assign(p_adjusted=adjust(pairs["p"].to_numpy(float), "holm"))
+
+
+def changes_by_field(results: Results, table: pd.DataFrame) -> dict[str, dict[str, pd.DataFrame]]:
+    """The changes of collection ratio and communication, by parameter and policy.
+
+    Args:
+        results: The study.
+        table: Its ``effects``, of some policies. A parameter with one value has no changes.
+    """
+    policies = table["policy"].unique()
+    fields = table.groupby("field", sort=False)["position"].nunique()
+    return {
+        str(field): {p: changes(results, table, p, str(field), PRODUCT) for p in policies}
+        for field in fields.index[fields > 1]
+    }
 
 
 def shape(pairs: pd.DataFrame) -> Shape:
@@ -127,3 +146,87 @@ def differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
 def _passes(peak: int, ups: set[tuple[int, int]], downs: set[tuple[int, int]]) -> bool:
     """Whether nothing falls on the way to the peak, and nothing rises behind it."""
     return all(b > peak for _, b in downs) and all(a < peak for a, _ in ups)
+
+
+def leading_policies(
+    results: Results, learned: str | None = None, heuristic: str | None = None
+) -> list[str]:
+    """The best learned policy of a study, if it has one, and its best heuristic.
+
+    Args:
+        results: The study.
+        learned: The learned policy to take instead of the best one.
+        heuristic: The heuristic to take instead of the best one.
+    """
+    trained = {policy for names in summary.learners(results).values() for policy in names}
+    ranked = summary.ranked_policies(results.missions)
+    best = [next((p for p in ranked if (p in trained) is kind), None) for kind in (True, False)]
+    return [policy for policy in (learned or best[0], heuristic or best[1]) if policy]
+
+
+def caption(table: pd.DataFrame, field: str, pairs: Mapping[str, pd.DataFrame]) -> str:
+    """What a figure of a parameter shows: the shapes of its curves, and their missions.
+
+    Args:
+        table: The ``effects`` of the policies that are drawn.
+        field: The parameter.
+        pairs: Per policy, its ``changes`` in collection ratio and communication.
+    """
+    shapes = "; ".join(f"{policy} {shape(rows).words}" for policy, rows in pairs.items())
+    n = table.loc[table["field"] == field, "n"].min()
+    return (
+        f"Collection ratio and communication: {shapes}. n = {n:,} missions per point, bars are "
+        f"{numbers.level(LEVEL)} intervals."
+    )
+
+
+def in_words(table: pd.DataFrame, pairs: pd.DataFrame, policy: str, field: str) -> str:
+    """How collection ratio and communication changes from a parameter's first value to its last.
+
+    Args:
+        table: The ``effects``.
+        pairs: The ``changes`` of the policy along the parameter.
+        policy: The policy.
+        field: The parameter.
+    """
+    rows = table[(table["field"] == field) & (table["policy"] == policy)]
+    rows = rows[rows["metric"] == PRODUCT].set_index("position")
+    values, last = rows["value"], rows.index.max()
+    change = pairs[(pairs["first"] == 0) & (pairs["second"] == last)]
+    (points,) = change[["difference", "low", "high"]].itertuples(index=False)
+    first_mean, last_mean = (numbers.percent(rows.loc[n, "mean"]) for n in (0, last))
+    along = shape(pairs)
+    text = (
+        f"{policy} **{along.words}**: {first_mean} at {values[0]}, {last_mean} at {values[last]}, "
+        f"{numbers.points(*points)} points"
+    )
+    if along.words != PEAK:
+        return text
+    about = " or so" if len(along.peaks) > 1 else ""
+    return f"{text}, highest at {numbers.words([values[n] for n in along.peaks])}{about}"
+
+
+def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]]) -> str:
+    """Every parameter and, below it, every policy ``in_words``: a list in Markdown.
+
+    Args:
+        table: The ``effects``.
+        changes: ``changes_by_field``.
+    """
+    lines = []
+    for field, pairs in changes.items():
+        lines.append(f"- **{parameter(field).name}**")
+        lines += [f"    - {in_words(table, rows, p, field)}" for p, rows in pairs.items()]
+    return "\n".join(lines)
+
+
+def by_size(changes: Mapping[str, Mapping[str, pd.DataFrame]], policy: str) -> list[str]:
+    """The parameters by their largest change, ``initial data per node (43.0 points)``.
+
+    Args:
+        changes: ``changes_by_field``.
+        policy: The policy.
+    """
+    sizes = {field: pairs[policy]["difference"].abs().max() for field, pairs in changes.items()}
+    ranked = sorted(sizes.items(), key=lambda item: -item[1])
+    return [f"{parameter(field).within} ({100 * size:.1f} points)" for field, size in ranked]

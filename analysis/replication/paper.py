@@ -3,6 +3,9 @@
 The paper: the learned policy of its Section V on a 32 x 32 map.
 """
 
+import pandas as pd
+
+from analysis import numbers
 from analysis.stats.intervals import Interval, wilson
 from analysis.stats.verdict import ABOVE, BELOW, position
 
@@ -46,12 +49,19 @@ CROSSING, LEVEL_FROM = 800_000, 500_000
 
 # A whole interval is above a printed figure, below it, or around it.
 LEVEL = "not distinguishable"
+MARKS = {ABOVE: "▲", LEVEL: "≈", BELOW: "▼"}
 
 
 def verdict(low: float, high: float, printed: float) -> str:
     """How an interval lies to a printed figure: wholly above, wholly below, or around it."""
     where = position(Interval(printed, low, high), printed)
     return where if where in (ABOVE, BELOW) else LEVEL
+
+
+def beside(estimate: pd.Series, printed: float) -> str:
+    """A mean with its interval (``mean``, ``low``, ``high``), and the mark of how it lies."""
+    mean, low, high = estimate[["mean", "low", "high"]]
+    return f"{numbers.interval(mean, low, high)} {MARKS[verdict(low, high, printed)]}"
 
 
 def spread(share: float, missions: int) -> Interval:

@@ -1,0 +1,54 @@
+"""The best setting of every policy, and its means beside the paper's (Section V-D)."""
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.names import METRICS, PRODUCT, parameter, value_text
+from analysis.questions import summary
+from analysis.replication import paper
+from analysis.results.tables import Results
+
+
+def setting(results: Results, point: int) -> dict[str, str]:
+    """The values of a design point in words, by the short names of its parameters."""
+    values = results.store.manifest.points[point].values
+    return {parameter(field).short: value_text(value) for field, value in values.items()}
+
+
+def table(results: Results) -> pd.DataFrame:
+    """A row for the paper, and one per policy: its best setting, and the means of its check."""
+    checks = summary.checks(results).set_index(["policy", "metric"])
+    printed = {name: numbers.percent(paper.SWEET_SPOT[metric]) for metric, name in METRICS.items()}
+    rows = [{"Policy": "paper", **dict.fromkeys(setting(results, 0), ""), **printed}]
+    for row in summary.selections(results).itertuples():
+        means = {
+            name: paper.beside(checks.loc[(row.policy, metric)], paper.SWEET_SPOT[metric])
+            for metric, name in METRICS.items()
+            if len(checks)
+        }
+        effort = {"Missions": f"{row.missions:,}", "Settings left": str(row.left)}
+        rows.append({"Policy": row.policy, **setting(results, row.point), **means, **effort})
+    return pd.DataFrame(rows)
+
+
+def best_in_words(results: Results) -> str:
+    """The best policy at its best setting, beside the paper; empty without missions to check."""
+    checks = summary.checks(results)
+    checks = checks[checks["metric"] == PRODUCT]
+    if checks.empty:
+        return ""
+    best, printed = checks.loc[checks["mean"].idxmax()], paper.SWEET_SPOT[PRODUCT]
+    chosen = [f"{name} {value}" for name, value in setting(results, best["point"]).items()]
+    verdict = paper.verdict(best["low"], best["high"], printed)
+    return (
+        f"The best at its best setting is **{best['policy']}**, with {numbers.words(chosen)}: "
+        f"{numbers.interval(*best[['mean', 'low', 'high']])} in collection ratio and "
+        f"communication, {verdict} {'from ' if verdict == paper.LEVEL else ''}the paper's "
+        f"{numbers.percent(printed)}."
+    )
+
+
+def guarantees(results: Results) -> str:
+    """What is known of the selection for every policy: a list in Markdown."""
+    rows = summary.selections(results).itertuples()
+    return "\n".join(f"- **{row.policy}**: {row.guarantee}." for row in rows)
