@@ -60,5 +60,5 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
         (folder / name).symlink_to(results / name)
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
     text = said_by("parameters", results=str(folder))
-    assert "Shown is greedy." in text
-    assert "what they are worth for greedy" in text
+    assert "if there is one, and the best heuristic: greedy." in text
+    assert "their verdicts for greedy" in text

@@ -1,11 +1,11 @@
-"""What a parameter does is told by values that meet the same missions."""
+"""Main effects compare values of a parameter on the same missions."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from analysis import run_study
-from analysis.names import PRODUCT, parameter
+from analysis.names import PRODUCT
 from analysis.questions import main_effects
 from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.stats.correction import adjust
@@ -13,8 +13,6 @@ from analysis.stats.intervals import mean_interval
 from analysis.stats.paired import paired
 from dess import InputError
 from tests.analysis.small import grid, small_study
-
-PRODUCT = PRODUCT
 
 
 @pytest.fixture(scope="module")
@@ -86,11 +84,6 @@ def test_intervals_that_hold_at_once_are_wider(results, table):
     assert (pairs["wide_low"] < pairs["low"]).all() and (pairs["high"] < pairs["wide_high"]).all()
 
 
-def test_a_name_inside_a_sentence():
-    assert parameter("charge_start").within == "charging start capacity C_S"
-    assert parameter("quota").within == "quota"
-
-
 def test_successes_are_compared_as_shares(results, table):
     """So that equal outcomes still have an interval."""
     pairs = main_effects.changes(results, table, "greedy", "uavs", "success")
@@ -124,3 +117,56 @@ def test_many_small_steps_make_a_rise():
     pairs = pairs_of([0.4, 0.4, 0.4], half=1.0)
     assert pairs.loc[pairs["second"] - pairs["first"] == 1, "p_adjusted"].eq(1).all()
     assert main_effects.shape(pairs).words == RISES
+
+
+def effects_of(means, field="uavs", policy="mine"):
+    """Effects with these means of collection ratio and communication at the values 1, 2, ..."""
+    rows = [(field, str(n + 1), n, policy, PRODUCT, mean, 300) for n, mean in enumerate(means)]
+    columns = ["field", "value", "position", "policy", "metric", "mean", "n"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_a_rise_is_told_by_its_ends():
+    table, pairs = effects_of([0.1, 0.3, 0.4]), pairs_of([0.2, 0.1])
+    text = main_effects.in_words(table, pairs, "mine", "uavs")
+    assert text == "mine **rises**: 10.0 % at 1, 40.0 % at 3, +30.0 [+29.9, +30.1] points"
+
+
+@pytest.mark.parametrize(("steps", "top"), [((0.2, -0.1), "2"), ((0.2, 0, -0.1), "2 and 3 or so")])
+def test_a_peak_is_told_by_where_it_may_be(steps, top):
+    means = np.cumsum([0.1, *steps])
+    text = main_effects.in_words(effects_of(means), pairs_of([*steps]), "mine", "uavs")
+    assert text.endswith(f" points, highest at {top}")
+
+
+def test_a_list_has_a_line_per_parameter_and_policy():
+    table = pd.concat([effects_of([0.1, 0.2], policy=policy) for policy in ("mine", "other")])
+    changes = {"uavs": {"mine": pairs_of([0.1]), "other": pairs_of([0.0])}}
+    lines = main_effects.listed(table, changes).splitlines()
+    assert lines[0] == "- **Number of UAVs**"
+    assert lines[1].startswith("    - mine **rises**")
+    assert lines[2].startswith("    - other **stays level**")
+    assert "mine rises; other stays level. n = 300 " in main_effects.caption(
+        table, "uavs", changes["uavs"]
+    )
+
+
+def test_parameters_are_ranked_by_their_largest_difference():
+    changes = {"uavs": {"mine": pairs_of([0.1, -0.3])}, "quota": {"mine": pairs_of([0.2, 0.2])}}
+    ranked = main_effects.by_size(changes, "mine")
+    assert ranked == ["quota (40.0 points)", "number of UAVs (30.0 points)"]
+
+
+def test_a_parameter_with_one_value_has_no_changes(tmp_path):
+    values = {"uavs": [1, 2], "quota": [20]}
+    study = small_study(tmp_path, design={"kind": "one-at-a-time", "values": values}, missions=2)
+    results = run_study(study, tmp_path / "out")
+    changes = main_effects.changes_by_field(results, main_effects.effects(results))
+    assert {field: [*pairs] for field, pairs in changes.items()} == {"uavs": ["greedy", "random"]}
+
+
+def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    assert main_effects.leading_policies(results) == [means.idxmax()]
+    named = main_effects.leading_policies(results, "learned", means.idxmin())
+    assert named == ["learned", means.idxmin()]

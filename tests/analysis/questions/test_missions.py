@@ -1,0 +1,86 @@
+"""Tables of single missions agree with the records and the event logs."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.names import PRODUCT, RATIO
+from analysis.questions import missions
+from analysis.results.tables import Results
+from analysis.stats.intervals import mean_interval
+from dess.errors import InputError
+from dess.state import sample_scenario
+from tests.analysis.small import grid, small_study
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("study")
+    study = small_study(folder, design=grid(uavs=[1, 3]), logged=2, missions=6)
+    return run_study(study, folder / "out")
+
+
+@pytest.fixture(scope="module")
+def shown(results: Results) -> list[missions.LoggedMission]:
+    return [missions.logged_mission(results, "greedy", point, 1) for point in (0, 1)]
+
+
+def test_a_mission_has_the_scenario_of_its_replication(
+    results: Results, shown: list[missions.LoggedMission]
+) -> None:
+    for point, mission in enumerate(shown):
+        assert mission.scenario == sample_scenario(results.scenario(point), 7, 1)
+        assert len(mission.uavs) == mission.row["uavs"] == (1, 3)[point]
+
+
+def test_a_mission_without_a_log_is_refused(results: Results) -> None:
+    with pytest.raises(InputError, match="no event log of greedy, point 0, replication 5"):
+        missions.logged_mission(results, "greedy", 0, 5)
+
+
+def test_outcomes_are_those_of_the_record(shown: list[missions.LoggedMission]) -> None:
+    table = missions.outcome_table(shown)
+    for row, mission in zip(table.to_dict("records"), shown, strict=True):
+        log = mission.log
+        ends = log[(log["event"] == "mission_end") & (log["node"] >= 0)].set_index("node")["value"]
+        never = [
+            k
+            for k in ends.index
+            if not (log["event"].eq("communication") & log["node"].eq(k)).any()
+        ]
+        assert row["Nodes never served"] == f"{len(never)} of 3"
+        assert row["Data left"] == f"{ends.sum():.1f}"
+        assert row["Fullest node left"].startswith(f"{ends.max():.1f} at (")
+        x, y = mission.scenario.nodes[int(ends.idxmax())]
+        assert row["Fullest node left"].endswith(f"({x}, {y})")
+        assert row["Success"] == ("yes" if mission.row["success"] else "no")
+
+
+def test_uavs_have_a_row_each(results: Results, shown: list[missions.LoggedMission]) -> None:
+    table = missions.uav_table(shown)
+    kept = results.uavs.query("policy == 'greedy' and replication == 1")
+    assert table[["UAVs", "UAV"]].to_numpy().tolist() == [[1, 1], [3, 1], [3, 2], [3, 3]]
+    assert table["Communications"].tolist() == [f"{n} of 60" for n in kept["quota"]]
+    assert table["Battery at the end"].tolist() == [f"{n} %" for n in kept["battery"]]
+
+
+def test_means_are_of_a_policy_at_a_point_or_at_all(results: Results) -> None:
+    greedy = results.missions.query("policy == 'greedy'")
+    at_point = missions.estimate(results, "greedy", RATIO, 1)
+    expected = mean_interval(greedy.query("point == 1")[RATIO])
+    assert tuple(at_point[["mean", "low", "high"]]) == pytest.approx(tuple(expected))
+    assert at_point["n"] == 6
+    everywhere = missions.estimate(results, "greedy")
+    assert everywhere["mean"] == pytest.approx(np.mean(greedy[PRODUCT]))
+
+
+def test_the_sentence_on_fleets_names_both_ends(
+    results: Results, shown: list[missions.LoggedMission]
+) -> None:
+    text = missions.growth_in_words(results, shown, [0.5, 0.9])
+    assert text.startswith("From 1 to 3 UAVs, the collection ratio goes from ")
+    means = results.missions.query("policy == 'greedy'").groupby("point")[RATIO].mean()
+    rows = pd.Series([shown[0].row[RATIO], shown[1].row[RATIO], *means, 0.5, 0.9])
+    for ratio in rows:
+        assert f"{100 * ratio:.1f} %" in text

@@ -1,0 +1,53 @@
+"""The sweet spot beside the paper is what the check found."""
+
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.names import METRICS, PRODUCT
+from analysis.replication import paper, sweet_spot
+from analysis.results.tables import Results
+from analysis.stats.intervals import mean_interval
+from tests.analysis.small import grid, small_study
+
+RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 60, "check": 12}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("study")
+    design = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
+    return run_study(small_study(folder, design=design, selection=RULE), folder / "out")
+
+
+def test_the_paper_is_the_first_row_and_policies_follow(results: Results) -> None:
+    table = sweet_spot.table(results).set_index("Policy")
+    assert table.index.tolist() == ["paper", "greedy", "random"]
+    assert table.loc["paper", METRICS[PRODUCT]] == "93.0 %"
+    for policy in results.policies:
+        checks = results.checks.query("policy == @policy")
+        mean, low, high = mean_interval(checks[PRODUCT])
+        cell = table.loc[policy, METRICS[PRODUCT]]
+        assert cell.startswith(f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}]")
+        assert cell[-1] == ("▲" if low > 0.93 else "▼" if high < 0.93 else "≈")
+        assert table.loc[policy, "Initial data"] in ("5–7.5", "10")
+        (point,) = checks["point"].unique()
+        assert table.loc[policy, "UAVs"] == ("1", "1", "3", "3")[point]
+
+
+def test_the_best_is_the_policy_with_the_highest_checked_mean(results: Results) -> None:
+    text = sweet_spot.best_in_words(results)
+    best = results.checks.groupby("policy")[PRODUCT].mean().idxmax()
+    assert text.startswith(f"The best at its best setting is **{best}**, with UAVs ")
+    assert text.endswith("the paper's 93.0 %.")
+
+
+def test_every_selection_says_what_is_known_of_it(results: Results) -> None:
+    lines = sweet_spot.guarantees(results).splitlines()
+    assert [line.split("**")[1] for line in lines] == results.policies
+
+
+def test_a_mark_says_where_the_whole_interval_lies() -> None:
+    estimate = pd.Series({"mean": 0.5, "low": 0.4, "high": 0.6})
+    marks = [paper.beside(estimate, printed)[-1] for printed in (0.3, 0.5, 0.7)]
+    assert marks == ["▲", "≈", "▼"]
