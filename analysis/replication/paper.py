@@ -3,11 +3,7 @@
 The paper: the learned policy of its Section V on a 32 x 32 map.
 """
 
-import pandas as pd
-
-from analysis import numbers
 from analysis.stats.intervals import Interval, wilson
-from analysis.stats.verdict import ABOVE, BELOW, position
 
 # Table IV: means over that many random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
@@ -46,22 +42,6 @@ TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
 # Training steps at which the curve with transfer learning passes that without, and from which on
 # that without stays level (Fig. 3b, Section V-B).
 CROSSING, LEVEL_FROM = 800_000, 500_000
-
-# A whole interval is above a printed figure, below it, or around it.
-LEVEL = "not distinguishable"
-MARKS = {ABOVE: "▲", LEVEL: "≈", BELOW: "▼"}
-
-
-def verdict(low: float, high: float, printed: float) -> str:
-    """How an interval lies to a printed figure: wholly above, wholly below, or around it."""
-    where = position(Interval(printed, low, high), printed)
-    return where if where in (ABOVE, BELOW) else LEVEL
-
-
-def beside(estimate: pd.Series, printed: float) -> str:
-    """A mean with its interval (``mean``, ``low``, ``high``), and the mark of how it lies."""
-    mean, low, high = estimate[["mean", "low", "high"]]
-    return f"{numbers.interval(mean, low, high)} {MARKS[verdict(low, high, printed)]}"
 
 
 def spread(share: float, missions: int) -> Interval:

@@ -5,8 +5,10 @@ import pandas as pd
 from analysis import numbers
 from analysis.names import METRICS, PRODUCT, parameter, value_text
 from analysis.questions import summary
+from analysis.questions.printed import with_mark
 from analysis.replication import paper
 from analysis.results.tables import Results
+from analysis.stats.verdict import position
 
 
 def setting(results: Results, point: int) -> dict[str, str]:
@@ -17,14 +19,14 @@ def setting(results: Results, point: int) -> dict[str, str]:
 
 def table(results: Results) -> pd.DataFrame:
     """A row for the paper, and one per policy: its best setting, and the means of its check."""
-    checks = summary.checks(results).set_index(["policy", "metric"])
+    checks = {(row.policy, row.metric): row for row in summary.checks(results).itertuples()}
     printed = {name: numbers.percent(paper.SWEET_SPOT[metric]) for metric, name in METRICS.items()}
     rows = [{"Policy": "paper", **dict.fromkeys(setting(results, 0), ""), **printed}]
     for row in summary.selections(results).itertuples():
         means = {
-            name: paper.beside(checks.loc[(row.policy, metric)], paper.SWEET_SPOT[metric])
+            name: with_mark(checks[row.policy, metric], paper.SWEET_SPOT[metric])
             for metric, name in METRICS.items()
-            if len(checks)
+            if checks
         }
         effort = {"Missions": f"{row.missions:,}", "Settings left": str(row.left)}
         rows.append({"Policy": row.policy, **setting(results, row.point), **means, **effort})
@@ -39,12 +41,10 @@ def best_in_words(results: Results) -> str:
         return ""
     best, printed = checks.loc[checks["mean"].idxmax()], paper.SWEET_SPOT[PRODUCT]
     chosen = [f"{name} {value}" for name, value in setting(results, best["point"]).items()]
-    verdict = paper.verdict(best["low"], best["high"], printed)
     return (
         f"The best at its best setting is **{best['policy']}**, with {numbers.words(chosen)}: "
-        f"{numbers.interval(*best[['mean', 'low', 'high']])} in collection ratio and "
-        f"communication, {verdict} {'from ' if verdict == paper.LEVEL else ''}the paper's "
-        f"{numbers.percent(printed)}."
+        f"{numbers.estimate(best)} in collection ratio and communication; against the paper's "
+        f"{numbers.percent(printed)}: {position(best, printed)}."
     )
 
 
