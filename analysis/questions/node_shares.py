@@ -1,7 +1,11 @@
-"""How a team shares out the sensor nodes: what every UAV collects where, and what is left behind.
+"""How a team shares the sensor nodes: what every UAV collects where, and what is left behind.
 
-From event logs (``dess.record.EventLog``) of missions flown again. Nodes are in the order of their
-numbers, UAVs in theirs.
+From the event log of a mission (``dess.record.EventLog``):
+
+    >>> data = collected(results.events("ddqn", point=1), uavs=2, nodes=25)  # (2, 25)
+    >>> division(data), sectors(data, nodes)
+
+Nodes and UAVs are in the order of their numbers.
 """
 
 import numpy as np
@@ -25,16 +29,14 @@ def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
 def held(events: Events, nodes: int) -> np.ndarray:
     """Data that every node ever held: at the start, and what arrived [data units], (K,)."""
     log = pd.DataFrame(events)
-    given = log[log["event"].isin(["mission_start", "arrival"]) & (log["node"] >= 0)]
-    data = np.zeros(nodes)
-    np.add.at(data, given["node"].to_numpy(int), given["value"])
-    return data
+    inflow = log[log["event"].isin(["mission_start", "arrival"]) & (log["node"] >= 0)]
+    return np.bincount(inflow["node"].to_numpy(int), inflow["value"], minlength=nodes)
 
 
 def left_behind(events: Events, uavs: int, nodes: int) -> np.ndarray:
     """Whether less than ``LEFT_BEHIND`` of what a node ever held was collected, (K,)."""
-    of_nodes = collected(events, uavs, nodes).sum(axis=0)
-    return of_nodes < LEFT_BEHIND * held(events, nodes)
+    taken = collected(events, uavs, nodes).sum(axis=0)
+    return np.asarray(taken < LEFT_BEHIND * held(events, nodes))
 
 
 def far_edges(nodes: np.ndarray) -> np.ndarray:
@@ -74,17 +76,17 @@ def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
     total = data.sum()
     if not total:
         return np.nan
-    orders = np.array([np.argsort(nodes @ way, kind="stable") for way in _ways(nodes)])
-    # What the first UAV has before the line and the second behind it, for every line.
+    orders = np.array([np.argsort(nodes @ way, kind="stable") for way in _directions(nodes)])
+    # What the first UAV collects before the line and the second behind it, for every line.
     lead = np.cumsum((data[0] - data[1])[orders], axis=1)
-    own = data[1].sum() + np.concatenate([lead.ravel(), [0.0]])
-    return float(max(own.max(), total - own.min()) / total)
+    own_side = data[1].sum() + np.concatenate([lead.ravel(), [0.0]])
+    return float(max(own_side.max(), total - own_side.min()) / total)
 
 
-def _ways(nodes: np.ndarray) -> np.ndarray:
+def _directions(nodes: np.ndarray) -> np.ndarray:
     """Directions (D, 2), one for every order in which lines across them meet the nodes.
 
-    The order changes where two nodes are level; in between there is none of these.
+    The order changes where two nodes are level; the directions lie between those changes.
     """
     one, other = np.triu_indices(len(nodes), 1)
     gaps = (nodes[other] - nodes[one])[(nodes[other] != nodes[one]).any(axis=1)]

@@ -28,15 +28,16 @@ import pandas as pd
 from analysis import load_results
 from analysis.replication.scorecard import PAPERS_NETWORK, departures, scorecard
 from reports.pages import html
-from reports.pages import scorecard as layout
+from reports.pages.scorecard import as_html
 
+# %%
 folder = Path(trained or str(files("policies") / "trained"))
 names = ("table4", "fig4", "fig5", "sweet-spot")
 studies = {name: load_results(Path(results) / name) for name in names}
 rows = scorecard(studies, pd.read_parquet(folder / "curves.parquet"))
 config = folder / PAPERS_NETWORK / "config.json"
-ours = departures(json.loads(config.read_text("utf-8"))["training"]) if config.exists() else []
-layout.scorecard(rows, departures=ours)
+training = json.loads(config.read_text("utf-8"))["training"] if config.exists() else {}
+as_html(rows, departures=departures(training) if training else [])
 
 # %% [markdown]
 # ## Where the figures come from

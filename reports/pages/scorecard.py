@@ -28,7 +28,7 @@ LOOKS = {
 }
 
 
-def scorecard(
+def as_html(
     rows: Sequence[Row],
     pages: Collection[str] | None = None,
     departures: Sequence[str] = (),

@@ -14,7 +14,7 @@ from analysis.replication.measures import Quantity
 from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Finding, Row
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from reports.pages.scorecard import scorecard
+from reports.pages.scorecard import as_html
 
 ABSENT = Finding(NO_RESULTS, note="the study fig4 has not run")
 
@@ -71,7 +71,7 @@ ROWS = [
 
 @pytest.fixture(scope="module")
 def html() -> str:
-    return scorecard(ROWS).data
+    return as_html(ROWS).data
 
 
 def text_of(html: str) -> str:
@@ -143,17 +143,17 @@ def test_it_is_whole_and_loads_nothing(html: str) -> None:
 
 
 def test_links_lead_to_pages_that_there_are() -> None:
-    assert Elements(scorecard(ROWS, ["mission.html"]).data).links == ["mission.html#fig-4"]
-    assert Elements(scorecard(ROWS, []).data).links == []
+    assert Elements(as_html(ROWS, ["mission.html"]).data).links == ["mission.html#fig-4"]
+    assert Elements(as_html(ROWS, []).data).links == []
 
 
 def test_the_same_rows_give_the_same_bytes(html: str) -> None:
-    assert scorecard([*ROWS]).data == html
+    assert as_html([*ROWS]).data == html
 
 
 def test_without_any_results_columns_have_no_policy() -> None:
     rows = [row(FIG_4, "Claim", "Place", "Holds if so.", None, ABSENT, ABSENT)]
-    text = text_of(scorecard(rows).data)
+    text = text_of(as_html(rows).data)
     assert "The best learned policy , of 1 claim: 1 – no results" in text
     assert "()" not in text
 
@@ -161,7 +161,7 @@ def test_without_any_results_columns_have_no_policy() -> None:
 def test_it_says_how_to_read_it() -> None:
     success = Quantity(*paper.spread(0.901, 1000), n=1000)
     rows = [replace(ROWS[0], claim=replace(ROWS[0].claim, printed=success)), *ROWS[1:]]
-    text = text_of(scorecard(rows, departures=["a guard", "5-step returns"]).data)
+    text = text_of(as_html(rows, departures=["a guard", "5-step returns"]).data)
     spread = numbers.interval(*success.interval).partition(" % ")[2]
     assert f"At 95 % (Wilson) they are {spread} for a success in 90.1 % of 1,000 missions" in text
     assert f"not of all {len(rows)} rows at once" in text
