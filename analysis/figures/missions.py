@@ -23,12 +23,14 @@ from analysis.figures.style import (
     ZONE,
     node_colours,
     note_at_right,
+    shifts,
     style,
     uav_colours,
 )
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
 
+EDGE = "#d9a400"  # of the charging zone
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
 
@@ -40,60 +42,34 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     of the slot's communication slots; grey where none is. Stars are charging slots. UAVs are
     numbered at their start (diamond) and end (dot) and, where they share a path, shifted apart.
     """
-    slots, colours = uav_slots(events), np.array([*node_colours(len(scenario.nodes)), MUTED])
-    _sea(scenario, ax)
-    for uav, own in slots.groupby("uav"):
-        shift = _shifts(scenario.uavs)[uav]
-        _trail(own, shift, uav_colours(scenario.uavs)[uav], ax)
-        moves = own[own["moved"]]
-        ax.quiver(
-            moves["from_x"] + shift,
-            moves["from_y"] + shift,
-            moves["x"] - moves["from_x"],
-            moves["y"] - moves["from_y"],
-            color=colours[moves["node"]],
-            angles="xy",
-            scale_units="xy",
-            scale=1,
-            width=0.15,
-            units="xy",
-            headwidth=3.8,
-            headlength=3.4,
-            headaxislength=3.2,
-            zorder=4,
-            gid=f"moves-{uav}",
+    slots = uav_slots(events)
+    colours = np.array([*node_colours(len(scenario.nodes)), MUTED])  # the last for node -1
+    offsets = shifts(scenario.uavs, SPREAD / 2)
+    _grid(scenario, ax)
+    for uav, flown in slots.groupby("uav"):
+        shifted = flown.assign(
+            **{column: flown[column] + offsets[uav] for column in ("from_x", "from_y", "x", "y")}
         )
-        hovers = own[~own["moved"] & ~own["charging"]]
-        ax.scatter(
-            hovers["x"] + shift,
-            hovers["y"] + shift,
-            c=colours[hovers["node"]],
-            marker="x",
-            s=34,
-            linewidths=1.7,
-            zorder=5,
-            gid=f"hovers-{uav}",
-        )
-        charges = own[own["charging"]]
-        ax.scatter(
-            charges["x"] + shift,
-            charges["y"] + shift,
-            color=INK,
-            marker=(8, 2, 0),
-            s=70,
-            linewidths=1.1,
-            zorder=6,
-            gid=f"charges-{uav}",
-        )
-    _ends(slots, scenario, ax)
+        colour = uav_colours(scenario.uavs)[uav]
+        _trail(shifted, colour, ax)
+        _moves(shifted[shifted["moved"]], colours, f"moves-{uav}", ax)
+        hovers = shifted[~shifted["moved"] & ~shifted["charging"]]
+        ax.scatter(hovers["x"], hovers["y"], c=colours[hovers["node"]], marker="x", s=34,
+                   linewidths=1.7, zorder=5, gid=f"hovers-{uav}")  # fmt: skip
+        charges = shifted[shifted["charging"]]
+        ax.scatter(charges["x"], charges["y"], color=INK, marker=(8, 2, 0), s=70,
+                   linewidths=1.1, zorder=6, gid=f"charges-{uav}")  # fmt: skip
+        _ends(shifted, uav, colour, ax)
 
 
 def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
     levels = battery_levels(events)
-    for uav, own in levels.groupby("uav"):
+    for uav, curve in levels.groupby("uav"):
         name = f"UAV {uav + 1}" if scenario.uavs <= 3 else f"{uav + 1}"
-        ax.plot(own["time"], own["battery"], label=name, **_uav_line(uav, scenario))
+        ax.plot(curve["time"], curve["battery"], label=name, linewidth=1.6,
+                color=uav_colours(scenario.uavs)[uav],
+                linestyle=LINES[uav % len(LINES)])  # fmt: skip
     for level, name in ((scenario.charge_start, "$C_S$"), (scenario.charge_complete, "$C_C$")):
         ax.axhline(level, color=MUTED, linewidth=0.9, zorder=1)
         _margin_note(f"{name} {level}", level, ax)
@@ -121,8 +97,8 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     slots, edges = uav_slots(events), np.arange(duration(events) + 1)
     base = np.zeros(len(edges))
     for state in ("charging", "waiting"):
-        for uav, own in slots[slots[state]].groupby("uav"):
-            top = base + np.isin(edges, own["slot"])
+        for uav, busy in slots[slots[state]].groupby("uav"):
+            top = base + np.isin(edges, busy["slot"])
             colour = uav_colours(scenario.uavs)[uav]
             face, hatch = (colour, None) if state == "charging" else ("none", "/////")
             ax.fill_between(
@@ -169,25 +145,16 @@ def _outcome(events: Events, scenario: Scenario) -> str:
     return f"I = {scenario.uavs}: {share:.1%} collected, {filled} of {scenario.uavs} quotas filled"
 
 
-def _sea(scenario: Scenario, ax: Axes) -> None:
+def _grid(scenario: Scenario, ax: Axes) -> None:
     """The grid, its zone and its nodes; y grows south."""
     x, y, width, height = scenario.zone
+    zone = Rectangle((x - 0.5, y - 0.5), width, height, facecolor=ZONE, edgecolor=EDGE, zorder=1)
     ax.set_facecolor(SEA)
     ax.grid(False)
-    ax.add_patch(
-        Rectangle((x - 0.5, y - 0.5), width, height, facecolor=ZONE, edgecolor="#d9a400", zorder=1)
-    )
+    ax.add_patch(zone)
     nodes = np.array(scenario.nodes)
-    ax.scatter(
-        nodes[:, 0],
-        nodes[:, 1],
-        c=node_colours(len(nodes)),
-        s=95,
-        edgecolors="white",
-        linewidths=1.2,
-        zorder=3,
-        gid="nodes",
-    )
+    ax.scatter(nodes[:, 0], nodes[:, 1], c=node_colours(len(nodes)), s=95,
+               edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
     ax.set(
         aspect="equal",
         xlim=(-0.5, scenario.grid - 0.5),
@@ -199,51 +166,45 @@ def _sea(scenario: Scenario, ax: Axes) -> None:
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
 
 
-def _shifts(uavs: int) -> np.ndarray:
-    """(I,) how far [cells] each UAV is drawn from the middle of its cell."""
-    return np.linspace(-SPREAD / 2, SPREAD / 2, uavs) if uavs > 1 else np.zeros(1)
-
-
-def _trail(own: pd.DataFrame, shift: float, colour: str, ax: Axes) -> None:
+def _trail(slots: pd.DataFrame, colour: str, ax: Axes) -> None:
     """The whole way of a UAV as a pale band under its arrows."""
-    x = [own["from_x"].iloc[0], *own["x"]]
-    y = [own["from_y"].iloc[0], *own["y"]]
-    ax.plot(
-        np.array(x) + shift,
-        np.array(y) + shift,
-        color=colour,
-        alpha=0.16,
-        linewidth=4.5,
-        solid_joinstyle="round",
-        zorder=2,
+    x, y = ([slots[f"from_{axis}"].iloc[0], *slots[axis]] for axis in ("x", "y"))
+    ax.plot(x, y, color=colour, alpha=0.16, linewidth=4.5, solid_joinstyle="round", zorder=2)
+
+
+def _moves(moves: pd.DataFrame, colours: np.ndarray, name: str, ax: Axes) -> None:
+    """An arrow per move, in the colour of the node served."""
+    ax.quiver(
+        moves["from_x"],
+        moves["from_y"],
+        (moves["x"] - moves["from_x"]).round(),  # one cell, whatever the shift
+        (moves["y"] - moves["from_y"]).round(),
+        color=colours[moves["node"]],
+        angles="xy",
+        scale_units="xy",
+        scale=1,
+        width=0.15,
+        units="xy",
+        headwidth=3.8,
+        headlength=3.4,
+        headaxislength=3.2,
+        zorder=4,
+        gid=name,
     )
 
 
-def _ends(slots: pd.DataFrame, scenario: Scenario, ax: Axes) -> None:
-    """A numbered diamond where each UAV starts, a numbered dot where its mission ends."""
-    for uav, own in slots.groupby("uav"):
-        shift, colour = _shifts(scenario.uavs)[uav], uav_colours(scenario.uavs)[uav]
-        first, last = own.iloc[0], own.iloc[-1]
-        marks = (
-            (first["from_x"], first["from_y"], "D", "white", colour, "start"),
-            (last["x"], last["y"], "o", colour, "white", "end"),
-        )
-        for x, y, marker, face, text, what in marks:
-            spot = (x + shift, y + shift)
-            ax.scatter(
-                *spot,
-                marker=marker,
-                s=62,
-                facecolor=face,
-                edgecolor=colour,
-                linewidth=1.6,
-                zorder=8,
-                gid=f"{what}-{uav}",
-            )
-            ax.annotate(
-                str(uav + 1), spot, ha="center", va="center", fontsize=6.5, color=text,
-                fontweight="bold", zorder=9,
-            )  # fmt: skip
+def _ends(slots: pd.DataFrame, uav: int, colour: str, ax: Axes) -> None:
+    """A numbered diamond where a UAV starts, a numbered dot where its mission ends."""
+    first, last = slots.iloc[0], slots.iloc[-1]
+    marks = (
+        (first["from_x"], first["from_y"], "D", "white", colour, "start"),
+        (last["x"], last["y"], "o", colour, "white", "end"),
+    )
+    for x, y, marker, face, text, name in marks:
+        ax.scatter(x, y, marker=marker, s=62, facecolor=face, edgecolor=colour, linewidth=1.6,
+                   zorder=8, gid=f"{name}-{uav}")  # fmt: skip
+        ax.annotate(str(uav + 1), (x, y), ha="center", va="center", fontsize=6.5, color=text,
+                    fontweight="bold", zorder=9)  # fmt: skip
 
 
 def _map_legend(ax: Axes) -> None:
@@ -255,7 +216,7 @@ def _map_legend(ax: Axes) -> None:
 
     served = node_colours(2)[1]
     handles = [
-        Patch(facecolor=ZONE, edgecolor="#d9a400", label="start and charging zone"),
+        Patch(facecolor=ZONE, edgecolor=EDGE, label="start and charging zone"),
         mark("o", "sensor node", face=served, size=8),
         mark("D", "start of UAV", face="white"),
         mark("o", "end of UAV"),
@@ -269,14 +230,6 @@ def _map_legend(ax: Axes) -> None:
     ]  # fmt: skip
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.48, -0.1), ncols=3,
               handletextpad=0.4, columnspacing=1.0, fontsize=8.5)  # fmt: skip
-
-
-def _uav_line(uav: int, scenario: Scenario) -> dict:
-    return {
-        "color": uav_colours(scenario.uavs)[uav],
-        "linestyle": LINES[uav % len(LINES)],
-        "linewidth": 1.6,
-    }
 
 
 def _margin_note(text: str, level: float, ax: Axes) -> None:
