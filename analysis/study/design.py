@@ -1,8 +1,8 @@
 """Designs: which points of the parameter space a study visits.
 
-A design is a table ``[design]`` of a study's TOML file, of one of six kinds: ``grid``,
-``one-at-a-time``, ``table``, ``latin-hypercube``, ``sobol``, ``saltelli``. It is data: its points
-are a pure function of its fields, in their written order.
+A design is a table ``[design]`` of a study's TOML file, of one of five kinds: ``grid``,
+``one-at-a-time``, ``table``, ``latin-hypercube``, ``saltelli``. It is data: its points are a pure
+function of its fields, in their written order.
 """
 
 import sys
@@ -164,21 +164,6 @@ class LatinHypercube(_Sampled):
         return tuple(self._point(unit) for unit in sample)
 
 
-class Sobol(_Sampled):
-    """The first points of a scrambled Sobol sequence: evenly spread in many dimensions at once."""
-
-    kind: Literal["sobol"] = "sobol"
-    size: PowerOfTwo = Field(ge=1, le=MAX_SIZE, description="number of points, a power of two")
-
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, in the order of the sequence."""
-        from scipy.stats import qmc
-
-        sample = qmc.Sobol(len(self.ranges), rng=self.seed).random(self.size)
-        return tuple(self._point(unit) for unit in sample)
-
-
 class Saltelli(_Sampled):
     """The design of a global sensitivity analysis (Saltelli et al. 2010), noise included.
 
@@ -224,7 +209,7 @@ def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
     return min(float(high), float(low + u * (high - low)))
 
 
-_AnyDesign = Grid | OneAtATime | Table | LatinHypercube | Sobol | Saltelli
+_AnyDesign = Grid | OneAtATime | Table | LatinHypercube | Saltelli
 _KINDS: dict[str, type[_Design]] = {
     kind.model_fields["kind"].default: kind for kind in get_args(_AnyDesign)
 }

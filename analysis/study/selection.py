@@ -22,21 +22,12 @@ whose promise is asymptotic), and the margin W_il(r) is as if Bernstein's inequa
 to the errors of the means, for what has not happened yet: no difference is further than 2 from its
 mean. It takes more missions: a point that lags by g stays for some 2 ln((k - 1) / alpha) / (3 g).
 
-``ocba``, the optimal computing budget allocation of Chen et al., spends a fixed budget so that the
-best is found most probably, and promises nothing. With b the point of the best mean, gap_i its
-lead over i and s2_i the sample variances, the numbers of missions n_i approach
-    n_i : n_j = s2_i / gap_i^2 : s2_j / gap_j^2,    n_b = s_b sqrt(sum over i of n_i^2 / s2_i)
-and the approximate probability that b is the best is, by Bonferroni's inequality,
-    1 - sum over i of Phi(-gap_i / sqrt(s2_b / n_b + s2_i / n_i)).
-
 Sources:
     S.-H. Kim, B. L. Nelson, A fully sequential procedure for indifference-zone selection in
     simulation, ACM TOMACS 11 (2001) 251-273.
     S.-H. Kim, B. L. Nelson, On the asymptotic validity of fully sequential selection procedures
     for steady-state simulation, Oper. Res. 54 (2006) 475-488.
     S. Boucheron, G. Lugosi, P. Massart, Concentration inequalities, Oxford 2013, section 2.8.
-    C.-H. Chen, J. Lin, E. Yucesan, S. E. Chick, Simulation budget allocation for further enhancing
-    the efficiency of ordinal optimization, Discrete Event Dyn. Syst. 10 (2000) 251-270.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,15 +36,12 @@ from typing import Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
-from scipy.special import ndtr
 
 from analysis.study.stopping import MOST, Metric
 from dess.scenario import Integer, Number
 
 # Stages of the race that are summed at once; their number changes no result.
 _BLOCK = 128
-# Leads below this share of the largest count as that: ties do not divide by zero.
-_LEAST_LEAD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -66,14 +54,13 @@ class Choice:
         counts: Missions per point that the selection rests on.
         means: Means of the metric over these missions. That of the selected point is likely to be
             too high: it was selected for it.
-        procedure: ``kn``, ``kn-bounded`` or ``ocba``.
+        procedure: ``kn`` or ``kn-bounded``.
         guarantee: What can be said of the selection, in plain words.
         guaranteed: Whether that is a promised probability.
         done: Whether the procedure has all missions that it wants.
         stage: Missions of the selected point that decided.
         rounds: Rounds of simulation.
         missions: All missions.
-        probability: The approximate probability of correct selection, of ``ocba`` alone.
     """
 
     best: int
@@ -87,14 +74,13 @@ class Choice:
     stage: int
     rounds: int
     missions: int
-    probability: float | None = None
 
 
 class Selection(BaseModel):
     """The rule that missions are spent to find the best of the design points.
 
     The missions come in rounds that grow. What is wanted is a function of the values in the order
-    of their replications, found by replaying all rounds, so the counts are the same however a run
+    of their replications, found by playing all rounds again, so the counts are the same however a run
     was interrupted; and ``kn`` decides as if missions came one by one.
 
     Raises:
@@ -103,8 +89,8 @@ class Selection(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
-    procedure: Literal["kn", "kn-bounded", "ocba"] = Field(
-        description="kn, kn-bounded: a promised probability; ocba: the most of a fixed budget"
+    procedure: Literal["kn", "kn-bounded"] = Field(
+        description="kn-bounded: for metrics between 0 and 1 with rare failures; kn: for others"
     )
     metric: Metric = Field(
         "collection_ratio_and_communication", description="the best has its largest mean"
@@ -112,15 +98,10 @@ class Selection(BaseModel):
     first: Integer = Field(
         20, ge=2, le=MOST, description="missions of every design point in round one"
     )
-    indifference: Number | None = Field(
-        None, gt=0, description="of kn: the least lead of the best that matters"
-    )
-    confidence: Number = Field(0.95, gt=0.5, lt=1, description="of kn: probability of finding it")
+    indifference: Number = Field(gt=0, description="the least lead of the best that matters")
+    confidence: Number = Field(0.95, gt=0.5, lt=1, description="probability of finding it")
     budget: Integer = Field(
-        100_000,
-        ge=2,
-        le=MOST,
-        description="missions over all design points: of kn at most, of ocba exactly",
+        100_000, ge=2, le=MOST, description="missions over all design points at most"
     )
     check: Integer = Field(
         300, ge=0, le=MOST, description="further, independent missions of the selected design point"
@@ -128,14 +109,8 @@ class Selection(BaseModel):
 
     @model_validator(mode="after")
     def _fits_the_procedure(self) -> Self:
-        if self.procedure == "ocba":
-            for key in ("indifference", "confidence"):
-                if getattr(self, key) != type(self).model_fields[key].default:
-                    raise ValueError(f"{key}: belongs to kn; allowed: none with ocba")
-        elif self.indifference is None:
-            raise ValueError("indifference: is missing; allowed: a number above 0")
         if self.procedure == "kn-bounded" and self.metric == "reward":
-            raise ValueError("metric: reward is not bounded; allowed: procedure kn or ocba with it")
+            raise ValueError("metric: reward is not bounded; allowed: procedure kn with it")
         return self
 
     def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
@@ -149,8 +124,8 @@ class Selection(BaseModel):
         """
         values = self._values(samples)
         return [
-            max(len(own), int(count))
-            for own, count in zip(values, self._play(values).counts, strict=True)
+            max(len(sample), int(count))
+            for sample, count in zip(values, self._play(values).counts, strict=True)
         ]
 
     def choice(self, samples: Sequence[Mapping[str, np.ndarray]]) -> Choice:
@@ -166,9 +141,8 @@ class Selection(BaseModel):
         if not values or min(map(len, values)) < self.first:
             raise ValueError(f"choice: needs points, with {self.first} or more missions each")
         played = self._play(values)
-        counts = [min(n, len(own)) for n, own in zip(played.counts, values, strict=True)]
-        means = [own[:n].mean() for n, own in zip(counts, values, strict=True)]
-        guaranteed = played.decided and (self.procedure != "ocba" or len(values) == 1)
+        counts = [min(n, len(sample)) for n, sample in zip(played.counts, values, strict=True)]
+        means = [sample[:n].mean() for n, sample in zip(counts, values, strict=True)]
         return Choice(
             best=played.best,
             survivors=tuple(map(int, played.alive)),
@@ -176,21 +150,17 @@ class Selection(BaseModel):
             means=tuple(map(float, means)),
             procedure=self.procedure,
             guarantee=self._guarantee(played),
-            guaranteed=guaranteed,
+            guaranteed=played.decided,
             done=played.done,
             stage=played.stage,
             rounds=played.rounds,
             missions=int(sum(counts)),
-            probability=played.probability,
         )
 
     def _values(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray]:
         return [np.asarray(sample[self.metric], float) for sample in samples]
 
     def _play(self, values: list[np.ndarray]) -> "_Played":
-        if self.procedure == "ocba":
-            return _ocba(values, self.first, self.budget)
-        assert self.indifference is not None
         alpha, bounded = 1 - self.confidence, self.procedure == "kn-bounded"
         margins = _Margins(len(values), self.first, self.indifference, alpha, bounded)
         return _kn(values, margins, self.budget)
@@ -200,11 +170,6 @@ class Selection(BaseModel):
             return "it is the only design point"
         if not played.done:
             return "none yet: the procedure wants more missions"
-        if self.procedure == "ocba":
-            return (
-                "none; the probability that it is the best is about "
-                f"{played.probability:.3g} or more (normal approximation)"
-            )
         left = len(played.alive)
         if not played.decided:
             return (
@@ -232,7 +197,6 @@ class _Played:
         rounds: Rounds played.
         done: No more missions are wanted.
         decided: The race ended before the budget.
-        probability: Approximate probability of correct selection.
     """
 
     counts: np.ndarray
@@ -242,11 +206,10 @@ class _Played:
     rounds: int = 1
     done: bool = False
     decided: bool = False
-    probability: float | None = None
 
     def covered_by(self, values: list[np.ndarray]) -> bool:
         """Whether all missions of the round are there."""
-        return all(len(own) >= count for own, count in zip(values, self.counts, strict=True))
+        return all(len(sample) >= n for sample, n in zip(values, self.counts, strict=True))
 
 
 @dataclass(frozen=True)
@@ -301,8 +264,8 @@ def _variances_of_differences(values: np.ndarray) -> np.ndarray:
     centred = values - values.mean(axis=1, keepdims=True)
     # Not a matrix product: its last bits would depend on the number of threads.
     covariances = np.einsum("in,ln->il", centred, centred) / (values.shape[1] - 1)
-    own = np.diagonal(covariances)
-    return np.maximum(own[:, None] + own - 2 * covariances, 0.0)
+    variances = np.diagonal(covariances)
+    return np.maximum(variances[:, None] + variances - 2 * covariances, 0.0)
 
 
 def _kn(values: list[np.ndarray], margins: _Margins, budget: int) -> _Played:
@@ -391,79 +354,3 @@ class _Race:
         if np.ptp(means[left]) > 0:  # then the margin between them is above zero
             return False
         return bool(self.reach[np.ix_(left, left)].max() < self.stage)
-
-
-def _ocba(values: list[np.ndarray], first: int, budget: int) -> _Played:
-    """Spend the budget as far as the values reach."""
-    k = len(values)
-    played = _Played(np.full(k, first), np.arange(k))
-    known = np.zeros(k, int)
-    means, variances = np.zeros(k), np.zeros(k)
-    while played.covered_by(values):
-        for i in np.flatnonzero(played.counts > known):
-            own = values[i][: played.counts[i]]
-            means[i], variances[i] = own.mean(), own.var(ddof=1)
-        known = played.counts
-        # A sample without spread says little about the spread: it gets a mission's share of that
-        # of the others.
-        spread = np.maximum(variances, variances.mean() / known)
-        played.best = int(np.argmax(means))
-        played.stage = int(known[played.best])
-        played.probability = _probability(means, spread, known)
-        total = int(known.sum())
-        if total >= budget or k == 1:
-            played.done, played.decided = True, k == 1
-            break
-        total = min(total + max(total // 5, 1), budget)
-        played.counts = _filled(known, _ratios(means, spread), total)
-        played.rounds += 1
-    return played
-
-
-def _leads(means: np.ndarray) -> tuple[int, np.ndarray]:
-    """The best point, and its lead over every point."""
-    best = int(np.argmax(means))
-    return best, means[best] - means
-
-
-def _ratios(means: np.ndarray, variances: np.ndarray) -> np.ndarray:
-    """(k,) numbers to which the missions are to be proportional."""
-    if not variances.any():
-        return np.ones(len(means))
-    best, leads = _leads(means)
-    leads = np.maximum(leads / (leads.max() or 1.0), _LEAST_LEAD)
-    leads[best] = np.inf
-    ratios = variances / leads**2
-    ratios[best] = np.sqrt(variances[best] * np.sum(variances / leads**4))
-    return ratios
-
-
-def _filled(counts: np.ndarray, ratios: np.ndarray, total: int) -> np.ndarray:
-    """Counts of a sum that come nearest to the ratios, none below what it is.
-
-    Args:
-        counts: (k,) what there is.
-        ratios: (k,) zero or above, not all zero.
-        total: The sum, no less than that of the counts.
-    """
-    with np.errstate(divide="ignore"):
-        levels = counts / ratios
-    order = np.argsort(levels, kind="stable")
-    # With the first j points of the order filled up to a level, the others as they are:
-    filled = total - counts.sum() + np.cumsum(counts[order])
-    common = filled / np.cumsum(ratios[order])
-    last = np.flatnonzero(common >= levels[order])[-1]
-    shares = np.maximum(counts, common[last] * ratios)
-    whole = np.floor(shares).astype(int)
-    by_remainder = np.argsort(whole - shares, kind="stable")
-    whole[by_remainder[: total - whole.sum()]] += 1
-    return whole
-
-
-def _probability(means: np.ndarray, variances: np.ndarray, counts: np.ndarray) -> float:
-    """The approximate probability that the best mean is that of the best point."""
-    best, leads = _leads(means)
-    errors = np.sqrt(variances[best] / counts[best] + variances / counts)
-    certain = np.where(leads > 0, np.inf, 0.0)
-    scores = np.delete(np.divide(leads, errors, out=certain, where=errors > 0), best)
-    return max(0.0, 1.0 - float(ndtr(-scores).sum()))

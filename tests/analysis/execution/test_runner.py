@@ -332,7 +332,7 @@ def test_every_row_has_a_command_that_simulates_it_again(tmp_path, monkeypatch):
 
 def test_points_that_are_one_scenario_share_their_missions(tmp_path):
     """Where a list holds the scenario's own value, or drawn integers fall together."""
-    rule = {"procedure": "ocba", "first": 4, "budget": 60, "check": 0}
+    rule = {"procedure": "kn", "first": 4, "indifference": 0.02, "budget": 60, "check": 0}
     values = {"quota": [20, 60], "flying_time": [[20, 30], 20]}
     design = {"kind": "one-at-a-time", "values": values}
     study = small_study(tmp_path, selection=rule, design=design)

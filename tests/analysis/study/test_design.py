@@ -14,7 +14,6 @@ from analysis.study.design import (
     LatinHypercube,
     OneAtATime,
     Saltelli,
-    Sobol,
     Table,
 )
 from dess.files import parse_toml
@@ -61,13 +60,6 @@ TOML = {
         kind = "latin-hypercube"
         ranges = {uavs = [1, 3], pads = [1, 16], arrival_rate = [0, 0.1]}
         size = 20
-        """,
-    "sobol": """
-        [design]
-        kind = "sobol"
-        ranges = {charge_start = [10, 50], edge_snr = [-30.0, -20.0]}
-        size = 16
-        seed = 7
         """,
     "saltelli": """
         [design]
@@ -138,31 +130,13 @@ def test_a_latin_hypercube_has_one_point_per_stratum_of_every_field():
     assert strata["edge_snr"] != strata["arrival_rate"]
 
 
-@pytest.mark.parametrize("columns", [1, 2, 4, 8, 16, 32, 64])
-def test_a_sobol_sequence_is_balanced(columns):
-    # 64 points of two dimensions are a (0, 6, 2)-net: one in each of 64 boxes, of whatever shape.
-    ranges = {"edge_snr": (-30, -20), "arrival_rate": (0, 2)}
-    rows = 64 // columns
-    boxes = {
-        (int((v["edge_snr"] + 30) / 10 * columns), int(v["arrival_rate"] / 2 * rows))
-        for v in values_of(Sobol(ranges=ranges, size=64))
-    }
-    assert len(boxes) == 64
-
-
-@pytest.mark.parametrize(
-    ("design", "times"),
-    [
-        (LatinHypercube(ranges={"uavs": (1, 3), "pads": (5, 10)}, size=300), {3: 100, 6: 50}),
-        (Sobol(ranges={"uavs": (1, 4), "charge_start": (10, 17)}, size=64), {4: 16, 8: 8}),
-    ],
-)
-def test_integers_are_equally_frequent_both_ends_included(design, times):
+def test_integers_are_equally_frequent_both_ends_included():
+    design = LatinHypercube(ranges={"uavs": (1, 3), "pads": (5, 10)}, size=300)
     for field, (low, high) in design.ranges.items():
         drawn = [values[field] for values in values_of(design)]
         assert {type(value) for value in drawn} == {int}
         number = high - low + 1
-        assert Counter(drawn) == dict.fromkeys(range(low, high + 1), times[number])
+        assert Counter(drawn) == dict.fromkeys(range(low, high + 1), 300 // number)
 
 
 def test_other_fields_get_floats_within_the_range():
@@ -180,13 +154,13 @@ def test_the_far_end_of_the_unit_interval_stays_in_the_range(monkeypatch):
 
 
 def test_a_range_of_one_is_a_constant():
-    for values in values_of(Sobol(ranges={"uavs": (2, 2), "edge_snr": (-25, -25)}, size=8)):
+    for values in values_of(
+        LatinHypercube(ranges={"uavs": (2, 2), "edge_snr": (-25, -25)}, size=8)
+    ):
         assert values == {"uavs": 2, "edge_snr": -25.0}
 
 
-@pytest.mark.parametrize(
-    ("kind", "size"), [(LatinHypercube, "size"), (Sobol, "size"), (Saltelli, "base")]
-)
+@pytest.mark.parametrize(("kind", "size"), [(LatinHypercube, "size"), (Saltelli, "base")])
 def test_a_sample_depends_on_its_seed_alone(kind, size):
     def points(seed):
         return kind(ranges={"edge_snr": (0, 1)}, seed=seed, **{size: 4}).points
@@ -242,7 +216,7 @@ HEAD = 'ranges = {arrival_rate = [0, 1]}\nkind = "'
 BAD = {
     "design = 3": ["design: ", "not 3"],
     "[design]\nsize = 3": ["kind: None is unknown", "allowed: grid, one-at-a-time, table, latin"],
-    "[design]\nkind = 'sobel'": ["kind: 'sobel' is unknown", "sobol, saltelli"],
+    "[design]\nkind = 'sobel'": ["kind: 'sobel' is unknown", "latin-hypercube, saltelli"],
     "[design]\nkind = ['grid']": ["kind: ['grid'] is unknown"],
     "kind = 'grid'\nsize = 3": ["grid: size: unknown key; allowed: kind, values"],
     "kind = 'grid'\nvalues = {uavs = []}": ["grid: values: uavs has no values; allowed: one"],
@@ -252,15 +226,13 @@ BAD = {
     "kind = 'one-at-a-time'": ["one-at-a-time: values: ", "field -> values"],
     "kind = 'table'\nrows = []": ["table: rows: ", "at least 1"],
     "kind = 'table'\nrows = [3]": ["table: rows.0: ", "not 3"],
-    "kind = 'sobol'\nsize = 8\nranges = {}": ["sobol: ranges: ", "at least 1"],
-    HEAD + 'sobol"\nsize = 12': ["sobol: size: 12 is no power of two; allowed: 1, 2, 4"],
-    HEAD + 'sobol"\nsize = 0': ["sobol: size: ", "greater than or equal to 1"],
-    HEAD + 'sobol"\nsize = true': ["sobol: size: ", "valid integer"],
+    "kind = 'latin-hypercube'\nsize = 8\nranges = {}": ["latin-hypercube: ranges: ", "at least 1"],
+    HEAD + 'latin-hypercube"\nsize = true': ["latin-hypercube: size: ", "valid integer"],
     HEAD + 'latin-hypercube"\nsize = 0': ["latin-hypercube: size: ", "equal to 1, not 0"],
     HEAD + f'latin-hypercube"\nsize = {MAX_SIZE + 1}': ["size: ", f"equal to {MAX_SIZE}"],
     HEAD + 'latin-hypercube"\nsize = 4\nseed = -1': ["seed: ", "equal to 0, not -1"],
     HEAD + 'saltelli"\nbase = 1': ["saltelli: base: ", "equal to 2, not 1"],
-    HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is no power of two"],
+    HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is no power of two; allowed: 1, 2, 4"],
     HEAD + 'saltelli"\nbase = 4\nreplications = 0': ["replications: ", "equal to 1, not 0"],
     HEAD + f'saltelli"\nbase = 4\nreplications = {MAX_REPLICATION + 2}': ["replications: "],
 }
@@ -279,7 +251,7 @@ NO_RANGES = {
     f"arrival_rate = [0, {10**400}]": "arrival_rate: [0, 10000",
 }
 BAD |= {
-    f"kind = 'sobol'\nsize = 8\nranges = {{{text}}}": [f"sobol: ranges: {what}", "is no range"]
+    f"kind = 'latin-hypercube'\nsize = 8\nranges = {{{text}}}": [f"ranges: {what}", "is no range"]
     for text, what in NO_RANGES.items()
 }
 
