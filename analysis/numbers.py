@@ -37,6 +37,11 @@ def minus(number: str) -> str:
     return number.replace("-", "−") if float(number) else number.replace("-", "")
 
 
+def margin(share: float) -> str:
+    """A difference of shares in words, as ``1 point`` or ``0.5 points``."""
+    return f"{100 * share:g} point{'' if share == 0.01 else 's'}"
+
+
 def level(share: float) -> str:
     """A confidence level, as ``95 %``."""
     return f"{100 * share:g} %"

@@ -1,10 +1,10 @@
-"""Figures of trainings: the paper's Fig. 3, the ablation, and the curve of one training.
+"""Figures of trainings: the paper's Fig. 3, the variants' ends, and the curve of one training.
 
 Each returns a figure of its own; nothing touches pyplot's state.
 """
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -14,13 +14,14 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
+from analysis import numbers
 from analysis.figures.style import INK, LINES, MUTED, panels, round_ticks, style
 from analysis.names import METRICS
-from analysis.questions.learning import bands, smoothed
+from analysis.questions.learning import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
 # What is evaluated while training, and its name.
-NAMES = {"evaluation_reward": "Cumulative reward", **EVALUATED}
+NAMES = {REWARD: "Cumulative reward", **EVALUATED}
 
 # A variant whose trainings all reach less than this share of the baseline lies off the axis.
 OFF = 0.5
@@ -43,9 +44,9 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     with style():
         figure, ax = panels(3.9)
         for number, (variant, label) in enumerate(labels.items()):
-            own = averages[averages["variant"] == variant]
-            _trainings(own, colours[variant], ax)
-            _mean(own, colours[variant], LINES[number], label, ax)
+            of_variant = averages[averages["variant"] == variant]
+            _trainings(of_variant, colours[variant], ax)
+            _mean(of_variant, colours[variant], LINES[number], label, ax)
         low, high = averages["value"].min(), averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         ax.set(title=NAMES[metric], ylim=(low - room, high + room))
@@ -57,12 +58,26 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     return figure
 
 
+def trainings_caption(counts: Sequence[int]) -> str:
+    """What ``trainings`` shows of variants with so many trainings each."""
+    level = numbers.level(BAND)
+    if min(counts) >= FEWEST:
+        n = numbers.words([str(count) for count in counts])
+        band = f"Bands: {level} by Student's t over n = {n} trainings."
+    else:
+        band = f"No band: over n = {min(counts)}, one of {level} would be of no use."
+    return (
+        f"Thick: mean of the exponential moving averages (weight of the newest evaluation {ALPHA:g})"
+        f"; thin: single trainings; dotted: phase I. {band}"
+    )
+
+
 def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str) -> Figure:
     """What every variant reaches: its trainings as dots, their mean with interval as a diamond.
 
     Args:
-        table: Rows of ``analysis.questions.learning.ablation``.
-        last: Rows of ``analysis.questions.learning.finals``.
+        table: Rows of ``analysis.questions.ablation.ablation``.
+        last: Rows of ``analysis.questions.ablation.finals``.
         metric: The column of the final metric, ``final_`` and one of ``METRICS``.
         baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
             ``OFF`` times as much are an arrow at the edge.
@@ -74,11 +89,11 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
         figure, ax = panels(0.9 + 0.42 * len(table))
         ax.axvline(level, color=INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, row in table.reset_index(drop=True).iterrows():
-            own = values.get_group(row["variant"])
-            if own.max() < left:
+            reached = values.get_group(row["variant"])
+            if reached.max() < left:
                 ax.plot(left, y, "<", color=INK, markersize=7, clip_on=False, gid=row["variant"])
             else:
-                _seeds(own, row, y, ax)
+                _seeds(reached, row, y, ax)
             note = f"{row['mean']:.1%}, n = {row['n']}"
             ax.annotate(note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
                         textcoords="offset points", va="center", fontsize=9)  # fmt: skip
@@ -105,8 +120,8 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
         figure, ax = panels(3.9)
         colours = sns.color_palette("colorblind").as_hex()
         for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
-            for n, (_, own) in enumerate(curve.groupby("phase", sort=False)):
-                ax.plot(own["updates"], own[metric], line, color=colour, linewidth=1.5,
+            for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
+                ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
                         label="" if n else EVALUATED[metric])  # fmt: skip
         ax.plot(kept["updates"], kept[metric], "*", color=INK, markersize=13, zorder=5,
                 label=f"weights kept: {kept[metric]:.1%}")  # fmt: skip
@@ -118,33 +133,41 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     return figure
 
 
+def training_caption(seed: int, missions: int) -> str:
+    """What ``training`` shows of a training of a seed, with evaluations of so many missions."""
+    return (
+        f"n = 1 training, of seed {seed}, which has no interval; every evaluation is over "
+        f"{missions:,} missions. The star: the weights that were kept, by the best moving average."
+    )
+
+
 def _ends(table: pd.DataFrame, values: pd.Series, floor: float) -> tuple[float, float]:
     """The ends of the axis: all that is not below the floor, intervals included."""
-    seen = pd.concat([values, table["low"], table["high"]])
-    seen = seen[seen >= floor]
-    room = 0.06 * (seen.max() - seen.min()) or 0.01
-    return max(seen.min() - room, 0.0), min(seen.max() + room, 1.02)
+    drawn = pd.concat([values, table["low"], table["high"]])
+    drawn = drawn[drawn >= floor]
+    room = 0.06 * (drawn.max() - drawn.min()) or 0.01
+    return max(drawn.min() - room, 0.0), min(drawn.max() + room, 1.02)
 
 
-def _seeds(own: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
+def _seeds(reached: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
     """The trainings of a variant, and above them their mean with its interval."""
     colour = sns.color_palette("colorblind").as_hex()[0]
     if row["n"] > 1:
         arms = [[row["mean"] - row["low"]], [row["high"] - row["mean"]]]
         ax.errorbar(row["mean"], y - 0.14, xerr=arms, marker="D", markersize=5, color=colour,
                     capsize=4, elinewidth=1.8, zorder=2)  # fmt: skip
-    spots = np.full(len(own), y + 0.18 * (row["n"] > 1))
-    ax.scatter(own, spots, color=MUTED, s=18, zorder=3, gid=row["variant"])
+    spots = np.full(len(reached), y + 0.18 * (row["n"] > 1))
+    ax.scatter(reached, spots, color=MUTED, s=18, zorder=3, gid=row["variant"])
 
 
-def _trainings(own: pd.DataFrame, colour: str, ax: Axes) -> None:
-    for _, one in own.groupby(["seed", "phase"], sort=False):
+def _trainings(averages: pd.DataFrame, colour: str, ax: Axes) -> None:
+    for _, one in averages.groupby(["seed", "phase"], sort=False):
         ax.plot(one["updates"], one["value"], color=colour, linewidth=0.7, alpha=0.55)
 
 
-def _mean(own: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> None:
+def _mean(averages: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> None:
     """The mean of the trainings with its band; its last phase in full."""
-    rows = bands(own)
+    rows = bands(averages)
     last = rows["phase"].iloc[-1]
     for phase, part in rows.groupby("phase", sort=False):
         n = part["n"].iloc[-1]
@@ -154,7 +177,7 @@ def _mean(own: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> No
         if part["low"].notna().all():
             ax.fill_between(part["updates"], part["low"], part["high"], color=colour, alpha=0.16,
                             linewidth=0, gid=f"band-{phase}")  # fmt: skip
-    _phases(own, ax)
+    _phases(averages, ax)
 
 
 def _phases(curve: pd.DataFrame, ax: Axes) -> None:

@@ -1,30 +1,41 @@
-"""Learning curves: smoothed, with bands over trainings, and what a means of learning is worth.
+"""Learning curves: smoothed, with bands over trainings, with and without transfer learning.
 
 A training is the unit: trainings of one variant differ in their seed alone, and intervals hold for
 trainings to come. One training says nothing of the spread.
 
 Curves are tables with a row per evaluation while training: ``variant``, ``seed`` (of the training),
 ``updates`` (the training step), ``phase`` (of the paper's Algorithm 1; the last is the mission
-itself), the evaluated metrics, and the ``final_...`` metrics of the weights that were kept.
+itself), the evaluated metrics, and the ``final_...`` metrics of the weights that were kept:
+
+    averages = smoothed(pd.read_parquet("curves.parquet"), "evaluation_reward")
+    transfer(averages, "quick", "no transfer", shortest=800_000)
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from analysis.replication.paper import CROSSING
-from analysis.stats.correction import adjust
-from analysis.stats.intervals import LEVEL, Interval, mean_interval
+from analysis import numbers
+from analysis.questions.ablation import difference
+from analysis.stats.intervals import Interval, mean_interval
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
+# What is evaluated while training.
+REWARD, PRODUCT = "evaluation_reward", "evaluation_collection_ratio_and_communication"
+# What trainings of the curves that are shipped have besides -> the variants with transfer learning
+# and without it.
+PAIRS = {
+    "all means of this project": ("quick", "no transfer"),
+    "no return guard": ("no guard", "no guard, no transfer"),
+    "the paper's means alone": ("none of the three", "none of the three, no transfer"),
+}
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
 # Level of the band of the paper's Fig. 3.
 BAND = 0.99
-# Trainings that a band takes: Student's t for two is 64 standard errors wide at 99 %.
+# The smallest number of trainings that has a band: Student's t for two is 64 standard errors wide.
 FEWEST = 3
 
 
@@ -34,9 +45,9 @@ class Transfer:
 
     Attributes:
         verdict: Of ``verdicts``, whether the mean curve with transfer ends above, by the interval
-            of the last difference; ``INCONCLUSIVE`` if the trainings are too short to tell.
+            of the last difference; ``INCONCLUSIVE`` if the trainings are too short.
         since: The first training step from which the mean curve stays above; none if it ends below.
-        throughout: Whether that is the first step that both can be compared at.
+        throughout: Whether that is the first step that both have.
         last: Difference of the curves at the last step, with its interval.
         length: The last step that both reach.
         trainings: Numbers of trainings with and without transfer.
@@ -54,15 +65,13 @@ def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
     """The exponential moving average of every training, begun anew in every phase.
 
     With x(t) an evaluation, e(t) = (1 - ALPHA) e(t - 1) + ALPHA x(t), and e = x at the first of a
-    phase: what is flown in one phase is no measure of the next.
+    phase: missions of one phase are no measure of the next.
 
     Returns:
         A row per evaluation: ``variant``, ``seed``, ``phase``, ``updates``, ``value``.
     """
     keys = ["variant", "seed", "phase"]
-    averages = curves.groupby(keys, sort=False)[metric].transform(
-        lambda values: values.ewm(alpha=ALPHA, adjust=False).mean()
-    )
+    averages = curves.groupby(keys, sort=False)[metric].transform(_average)
     return curves[[*keys, "updates"]].assign(value=averages)
 
 
@@ -87,23 +96,25 @@ def bands(averages: pd.DataFrame, level: float = BAND) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*keys, "mean", "low", "high", "n"])
 
 
+def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:
+    """Those of ``PAIRS`` that have trainings of both variants."""
+    variants = {*curves["variant"]}
+    return {name: pair for name, pair in PAIRS.items() if {*pair} <= variants}
+
+
 def transfer(
-    averages: pd.DataFrame,
-    using: str,
-    without: str,
-    level: float = BAND,
-    shortest: int = CROSSING,
+    averages: pd.DataFrame, using: str, without: str, shortest: int, level: float = BAND
 ) -> Transfer:
     """Whether a variant with transfer learning passes the one without it and ends higher.
 
-    They are compared where both fly the mission itself: in the last phase of both.
+    They are compared in the last phase of both, where both train in the mission itself.
 
     Args:
         averages: Rows of ``smoothed``.
         using: The variant with transfer learning.
         without: The variant without it.
+        shortest: Trainings of fewer steps are inconclusive.
         level: Confidence level of the last difference.
-        shortest: Steps below which trainings cannot tell; the paper's crossing.
     """
     a, b = (_last_phase(averages, variant) for variant in (using, without))
     steps = a.index.intersection(b.index)
@@ -117,62 +128,16 @@ def transfer(
     return Transfer(verdict, since, not len(behind), last, length, (a.shape[1], b.shape[1]))
 
 
-def finals(curves: pd.DataFrame) -> pd.DataFrame:
-    """The last row of every training: it has the metrics of the weights that were kept."""
-    return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
-
-
-def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
-    """What every variant reaches in the end, and its difference to the baseline.
-
-    Args:
-        last: Rows of ``finals``.
-        metric: The column of the final metric.
-        baseline: The variant that the others are compared with.
-        level: Confidence level.
-
-    Returns:
-        A row per variant, in order of appearance: ``variant``, ``n`` trainings, ``mean``, ``low``,
-        ``high`` (nan with one training), ``difference``, ``difference_low``, ``difference_high``,
-        ``p`` and ``p_adjusted`` (Holm), of ``difference``; nan for the baseline.
-    """
-    values = {variant: part[metric].to_numpy() for variant, part in _variants(last)}
-    rows = []
-    for variant, own in values.items():
-        mean, *ends = mean_interval(own, level) if len(own) > 1 else (own[0], np.nan, np.nan)
-        beside = (Interval(*3 * [np.nan]), np.nan)
-        if variant != baseline:
-            beside = difference(own, values[baseline], level)
-        rows.append((variant, len(own), mean, *ends, *beside[0], beside[1]))
-    columns = ["variant", "n", "mean", "low", "high"]
-    columns += ["difference", "difference_low", "difference_high", "p"]
-    table = pd.DataFrame(rows, columns=columns)
-    known = table["p"].notna()
-    table.loc[known, "p_adjusted"] = adjust(table.loc[known, "p"].to_numpy(), "holm")
-    return table
-
-
-def difference(
-    a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, level: float = LEVEL
-) -> tuple[Interval, float]:
-    """Difference of two means of independent trainings, with its interval and p-value.
-
-    Welch's t. Where one of the two is a single training, Student's t with the spread of the other:
-    the interval then holds 0 if one more training of the other might have come out like that.
-
-    Returns:
-        The interval (nan ends where both are single trainings; degenerate where neither has any
-        spread) and the p-value (1 where there is none).
-    """
-    a, b = np.asarray(a, float), np.asarray(b, float)
-    gap = float(a.mean() - b.mean())
-    if a.size + b.size < 3:
-        return Interval(gap, np.nan, np.nan), 1.0
-    if np.ptp(a) == np.ptp(b) == 0:
-        return Interval(gap, gap, gap), 1.0
-    test = stats.ttest_ind(a, b, equal_var=min(a.size, b.size) == 1)
-    ends = test.confidence_interval(level)
-    return Interval(gap, float(ends.low), float(ends.high)), float(test.pvalue)
+def transfers(
+    curves: pd.DataFrame, metrics: Iterable[str], shortest: int
+) -> dict[tuple[str, str], Transfer]:
+    """``transfer`` of all pairs of variants, by the name of the pair and the metric."""
+    averages = {metric: smoothed(curves, metric) for metric in metrics}
+    return {
+        (name, metric): transfer(averages[metric], *pair, shortest)
+        for name, pair in pairs_in(curves).items()
+        for metric in averages
+    }
 
 
 def settled(curve: pd.DataFrame, metric: str, margin: float) -> pd.Series:
@@ -186,18 +151,77 @@ def settled(curve: pd.DataFrame, metric: str, margin: float) -> pd.Series:
     Returns:
         The row of the curve.
     """
-    own = curve[curve["phase"] == curve["phase"].iloc[-1]]
-    averages = own[metric].ewm(alpha=ALPHA, adjust=False).mean()
+    last_phase = curve[curve["phase"] == curve["phase"].iloc[-1]]
+    averages = _average(last_phase[metric])
     far = np.flatnonzero((averages - averages.iloc[-1]).abs() > margin)
-    return own.iloc[far[-1] + 1 if len(far) else 0]
+    return last_phase.iloc[far[-1] + 1 if len(far) else 0]
 
 
-def _variants(last: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    yield from last.groupby("variant", sort=False)
+def transfer_table(
+    transfers: Mapping[tuple[str, str], Transfer], verdicts: Mapping[tuple[str, str], str]
+) -> pd.DataFrame:
+    """Trainings with transfer learning compared with those without, as a table of text.
+
+    Args:
+        transfers: By what the trainings have besides, and the metric: ``REWARD`` or ``PRODUCT``.
+        verdicts: The verdict on each.
+    """
+    rows = [
+        (
+            name[0].upper() + name[1:],
+            f"{compared.trainings[0]} and {compared.trainings[1]}",
+            "Reward" if metric == REWARD else "Product",
+            verdicts[name, metric],
+            _where_above(compared),
+            _last_difference(compared, metric),
+        )
+        for (name, metric), compared in transfers.items()
+    ]
+    head = ["Trainings with", "n", "Metric", "Verdict", "With transfer, the mean curve"]
+    return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
+
+
+def counts_in_words(verdicts: Collection[str]) -> str:
+    """How often each verdict is given, in order of appearance: ``**holds** in 2 and ...``."""
+    counts = {verdict: [*verdicts].count(verdict) for verdict in verdicts}
+    return numbers.words([f"**{verdict}** in {count}" for verdict, count in counts.items()])
+
+
+def open_ends_in_words(transfers: Collection[Transfer]) -> str:
+    """In how many comparisons the interval of the last difference holds 0."""
+    unclear = [t.last for t in transfers if t.last.low <= 0 <= t.last.high]
+    alike = sum(last.low == last.high for last in unclear)
+    text = f"the interval of the last difference holds 0 in {len(unclear)} of {len(transfers)}"
+    same = f"; in {alike} of these all trainings end alike" if alike else ""
+    return f"{text} comparisons{same}"
+
+
+def _where_above(compared: Transfer) -> str:
+    if compared.since is None:
+        return "ends below, or level"
+    if compared.throughout:
+        return "is above in all of phase II"
+    return f"is above from step {compared.since:,} on"
+
+
+def _last_difference(compared: Transfer, metric: str) -> str:
+    """The last difference with its interval: of the product in percentage points."""
+    last = compared.last
+    if metric == REWARD:
+        mean, low, high = (numbers.minus(f"{value:+.0f}") for value in last)
+        text = f"{mean} [{low}, {high}]"
+    else:
+        text = numbers.points(*last)
+    same = last.low == last.high
+    return f"{text.split()[0]}, the same in all trainings" if same else text
+
+
+def _average(values: pd.Series) -> pd.Series:
+    return values.ewm(alpha=ALPHA, adjust=False).mean()
 
 
 def _last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
     """(steps, trainings) averages of a variant in its last phase."""
-    own = averages[averages["variant"] == variant]
-    own = own[own["phase"] == own["phase"].iloc[-1]]
-    return own.pivot(index="updates", columns="seed", values="value").dropna()
+    curves = averages[averages["variant"] == variant]
+    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
+    return curves.pivot(index="updates", columns="seed", values="value").dropna()

@@ -9,7 +9,6 @@ from functools import partial
 from typing import NamedTuple
 
 from analysis.names import METRICS, PRODUCT, RATIO, SHARES, SUCCESS, value_text
-from analysis.questions.learning import Transfer
 from analysis.replication import measures, paper, rules
 from analysis.replication.measures import Measured, Quantity
 from analysis.replication.rules import Rule
@@ -235,13 +234,3 @@ FIG_3 = Section("Fig. 3: transfer learning", "learning.html#fig-3", TRAININGS, [
 # fmt: on
 
 SECTIONS = [TABLE_4, FIG_4, FIG_4_MAPS, FIG_5, SWEET_SPOT, FIG_3]
-
-
-def curve_verdict(metric: str, transfer: Transfer) -> str:
-    """The verdict on transfer learning by the curves of a metric.
-
-    Of the reward the paper claims that it is higher all along, of the other metrics that it ends
-    higher.
-    """
-    rule = rules.throughout if metric == "evaluation_reward" else rules.passes
-    return rule.judge(transfer)

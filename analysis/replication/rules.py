@@ -17,6 +17,7 @@ from math import hypot
 import numpy as np
 import pandas as pd
 
+from analysis import numbers
 from analysis.questions import main_effects
 from analysis.questions.learning import BAND, Transfer
 from analysis.questions.main_effects import Shape
@@ -75,18 +76,13 @@ class Rule:
 
     def in_words(self, margin: float) -> str:
         """The words with a margin in them; what they leave open is inconclusive."""
-        words = self.words.format(margin=margin_in_words(margin))
+        words = self.words.format(margin=numbers.margin(margin))
         return f"{words}; else it is inconclusive. {self.remark}".strip()
 
 
 def rule(words: str, *takes: str, remark: str = "") -> Callable[[Judge], Rule]:
     """Join words to the judge that they stand above."""
     return lambda judge: Rule(words, judge, takes, remark)
-
-
-def margin_in_words(margin: float) -> str:
-    """``1 point``, ``0.5 points``."""
-    return f"{100 * margin:g} point{'' if margin == 0.01 else 's'}"
 
 
 # Means, shares and differences.
@@ -296,7 +292,7 @@ def throughout(transfer: Transfer) -> str:
 
 
 @rule(
-    f"Holds if the mean curve stays within {margin_in_words(MARGIN)} of its end from the first "
+    f"Holds if the mean curve stays within {numbers.margin(MARGIN)} of its end from the first "
     "half of the training on, and ends lower than that with transfer, by the "
     f"{100 * BAND:g} % interval; in part if only one of the two is so; does not hold if neither "
     "is, and it ends surely higher",

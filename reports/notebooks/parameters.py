@@ -29,7 +29,7 @@ from analysis.figures.policies import performance
 from analysis.questions import main_effects, sensitivity, summary
 from analysis.replication import paper, scorecard, sweet_spot
 from analysis.replication.claims import FIG_5
-from analysis.replication.rules import NO_RESULTS, margin_in_words
+from analysis.replication.rules import NO_RESULTS
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -122,7 +122,7 @@ html.say(
     n=len(sweet.manifest["points"]),
     metric=names.METRICS[rule["metric"]].lower(),
     rule=rule,
-    margin=margin_in_words(scorecard.margin(studies)),
+    margin=numbers.margin(scorecard.margin(studies)),
     paper=paper.SWEET_SPOT_MISSIONS,
 )
 

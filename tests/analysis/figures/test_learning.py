@@ -8,6 +8,7 @@ from matplotlib.colors import to_hex
 
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
+from analysis.questions import ablation
 from analysis.questions import learning as curves
 from tests.analysis.questions.test_learning import training
 
@@ -89,7 +90,7 @@ def ended():
 
 def test_the_ablation_shows_trainings_means_and_intervals(ended):
     metric = "final_collection_ratio_and_communication"
-    table = curves.ablation(ended, metric, "base")
+    table = ablation.ablation(ended, metric, "base")
     (ax,) = learning_figures.ablation(table, ended, metric, "base").axes
     dots = {a.get_gid(): a.get_offsets()[:, 0].tolist() for a in ax.collections if a.get_gid()}
     assert dots == {"base": [0.7, 0.8, 0.75], "once": [0.6]}

@@ -1,4 +1,4 @@
-"""Trainings are the unit: what their curves say, and how sure."""
+"""Learning curves: averages, bands over trainings, and transfer learning by the last difference."""
 
 import numpy as np
 import pandas as pd
@@ -6,7 +6,6 @@ import pytest
 from scipy import stats
 
 from analysis.questions import learning
-from analysis.replication import paper
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 METRIC = "evaluation_reward"
@@ -31,7 +30,7 @@ def several(variant, ends, level=0.0, before=0):
 
 def compared(using, without, **options):
     both = pd.concat([several("with", using, **options), several("without", without)])
-    return learning.transfer(learning.smoothed(both, METRIC), "with", "without", shortest=STEPS[-1])
+    return learning.transfer(learning.smoothed(both, METRIC), "with", "without", STEPS[-1])
 
 
 def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
@@ -63,80 +62,40 @@ def test_a_band_is_students_over_the_trainings_and_none_for_too_few(n):
     assert [last["low"], last["high"]] == pytest.approx(expected, nan_ok=True)
 
 
-def test_transfer_holds_where_the_curve_passes_and_ends_surely_higher():
-    found = compared([9.0, 9.01, 9.02], [5.0, 5.01, 5.02], level=-1.0)
-    assert (found.verdict, found.trainings) == (HOLDS, (3, 3))
-    assert found.since in STEPS[1:] and not found.throughout
-    assert 0 < found.last.low < found.last.mean < found.last.high
+def test_transfer_holds_where_the_whole_interval_of_the_end_is_above_0():
+    result = compared([9.0, 9.01, 9.02], [5.0, 5.01, 5.02], level=-1.0)
+    assert (result.verdict, result.trainings) == (HOLDS, (3, 3))
+    assert result.since in STEPS[1:] and not result.throughout
+    assert 0 < result.last.low < result.last.mean < result.last.high
 
 
-def test_transfer_cannot_be_told_where_the_end_is_not_sure():
-    found = compared([4.0, 9.0], [3.0, 8.0], level=1.0)
-    assert (found.verdict, found.since, found.throughout) == (INCONCLUSIVE, STEPS[0], True)
-    assert found.last.low < 0 < found.last.mean
-    found = compared([3.0, 8.0], [4.0, 9.0])  # nor where it ends below
-    assert (found.verdict, found.since) == (INCONCLUSIVE, None)
+def test_transfer_is_inconclusive_where_the_interval_of_the_end_holds_0():
+    result = compared([4.0, 9.0], [3.0, 8.0], level=1.0)
+    assert (result.verdict, result.since, result.throughout) == (INCONCLUSIVE, STEPS[0], True)
+    assert result.last.low < 0 < result.last.mean
+    result = compared([3.0, 8.0], [4.0, 9.0])  # nor where it ends below
+    assert (result.verdict, result.since) == (INCONCLUSIVE, None)
     assert compared([9.0], [5.0]).verdict == INCONCLUSIVE  # two single trainings
 
 
-def test_transfer_does_not_hold_where_the_curve_ends_surely_below():
-    found = compared([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], level=1.0)  # ahead at first
-    assert (found.verdict, found.since) == (REFUTED, None)
+def test_transfer_does_not_hold_where_the_whole_interval_of_the_end_is_below_0():
+    result = compared([2.0, 2.1, 2.2], [9.0, 9.1, 9.2], level=1.0)  # ahead at first
+    assert (result.verdict, result.since) == (REFUTED, None)
 
 
 @pytest.mark.parametrize("ends", [([9.0, 9.1, 9.2], [5.0, 5.1, 5.2]), ([2.0, 2.1], [9.0, 9.1])])
-def test_trainings_shorter_than_the_paper_s_crossing_cannot_tell(ends):
+def test_trainings_that_are_too_short_are_inconclusive(ends):
     both = pd.concat([several("with", ends[0]), several("without", ends[1])])
     averages = learning.smoothed(both, METRIC)
-    found = learning.transfer(averages, "with", "without")
-    assert (found.verdict, found.length) == (INCONCLUSIVE, STEPS[-1])
-    assert STEPS[-1] < paper.CROSSING
-    assert (
-        learning.transfer(averages, "with", "without", shortest=found.length).verdict
-        != INCONCLUSIVE
-    )
+    short = learning.transfer(averages, "with", "without", shortest=STEPS[-1] + 1)
+    assert (short.verdict, short.length) == (INCONCLUSIVE, STEPS[-1])
+    long_enough = learning.transfer(averages, "with", "without", shortest=STEPS[-1])
+    assert long_enough.verdict != INCONCLUSIVE
 
 
 def test_transfer_is_judged_in_the_last_phase_alone():
-    found = compared([9.0, 9.1, 9.2], [5.0, 5.1, 5.2], level=1.0, before=2)
-    assert found.throughout and found.since == STEPS[2]
-
-
-def test_the_difference_of_means_is_welchs():
-    a, b = [1.0, 2.0, 4.0], [3.0, 3.5]
-    ends, p = learning.difference(a, b)
-    test = stats.ttest_ind(a, b, equal_var=False)
-    assert ends.mean == pytest.approx(np.mean(a) - np.mean(b))
-    assert (ends.low, ends.high) == pytest.approx(tuple(test.confidence_interval(0.95)))
-    assert p == pytest.approx(test.pvalue)
-
-
-def test_a_single_training_is_held_against_the_spread_of_the_others():
-    """By hand: the prediction interval of one more, mean +- t s sqrt(1 + 1/n)."""
-    others = np.array([1.0, 2.0, 3.0])
-    ends, p = learning.difference([5.0], others)
-    half = stats.t.ppf(0.975, 2) * 1.0 * np.sqrt(1 + 1 / 3)
-    assert (ends.low, ends.high) == pytest.approx((3.0 - half, 3.0 + half))
-    assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
-
-
-def test_two_single_trainings_tell_nothing_of_the_spread():
-    ends, p = learning.difference([5.0], [3.0])
-    assert ends.mean == 2.0 and np.isnan([ends.low, ends.high]).all() and p == 1.0
-
-
-def test_the_ablation_compares_what_trainings_end_with():
-    ends = {"base": [1.0, 2.0, 3.0], "much": [9.0, 9.5, 9.7], "once": [2.5]}
-    last = learning.finals(pd.concat(several(name, values) for name, values in ends.items()))
-    table = learning.ablation(last, "final_product", "base").set_index("variant")
-    assert table["n"].to_dict() == {"base": 3, "much": 3, "once": 1}
-    assert table["mean"].to_dict() == pytest.approx({n: np.mean(v) for n, v in ends.items()})
-    assert table.loc["base", ["difference", "p", "p_adjusted"]].isna().all()
-    assert table.loc["once", ["low", "high"]].isna().all()
-    assert table.loc["once", "difference_low"] < 0 < table.loc["once", "difference_high"]
-    p = table.loc["much", "p"]
-    assert table.loc["much", "p_adjusted"] == pytest.approx(2 * p)  # Holm, of two
-    assert p == learning.difference(ends["much"], ends["base"])[1]
+    result = compared([9.0, 9.1, 9.2], [5.0, 5.1, 5.2], level=1.0, before=2)
+    assert result.throughout and result.since == STEPS[2]
 
 
 def test_a_curve_has_settled_where_it_stays_near_its_end():
@@ -144,3 +103,53 @@ def test_a_curve_has_settled_where_it_stays_near_its_end():
     assert learning.settled(curve, METRIC, 1.0)["updates"] == STEPS[1]
     assert learning.settled(curve, METRIC, 0.2)["updates"] == STEPS[2]
     assert learning.settled(curve, METRIC, 0.0)["updates"] == STEPS[3]
+
+
+def described(using, without, metric=learning.REWARD):
+    compared_by_name = {("all means", metric): compared(using, without)}
+    table = learning.transfer_table(compared_by_name, {("all means", metric): HOLDS})
+    return table.iloc[0].to_dict()
+
+
+def test_a_comparison_is_a_row_of_text():
+    row = described([900.0, 910.0, 920.0], [500.0, 510.0, 520.0])
+    assert row["Trainings with"] == "All means"
+    assert (row["n"], row["Metric"], row["Verdict"]) == ("3 and 3", "Reward", HOLDS)
+    assert row["With transfer, the mean curve"] == "is above from step 2,000 on"
+    # of four even steps the last average is 17 / 24 on the way: 400 x 17 / 24
+    assert row["Difference at the end"].startswith("+283 [")
+    assert described([0.1] * 3, [0.5] * 3)["With transfer, the mean curve"].startswith("ends below")
+
+
+def test_the_product_is_in_points_and_equal_ends_are_named():
+    row = described([0.5, 0.5], [0.5, 0.5], learning.PRODUCT)
+    assert row["Difference at the end"] == "0.0, the same in all trainings"
+    assert row["With transfer, the mean curve"] == "ends below, or level"
+
+
+def test_verdicts_are_counted_in_order_of_appearance():
+    words = learning.counts_in_words([INCONCLUSIVE, HOLDS, INCONCLUSIVE])
+    assert words == "**inconclusive** in 2 and **holds** in 1"
+
+
+def test_open_ends_are_counted():
+    ends = [[5.0, 5.1, 5.2], [9.0, 9.1, 9.2], [5.0, 5.1, 5.3], [5.0, 5.0, 5.0]]
+    base = [5.0, 5.1, 5.2]
+    transfers = [compared(values, base) for values in ends[:3]]
+    assert learning.open_ends_in_words(transfers) == (
+        "the interval of the last difference holds 0 in 2 of 3 comparisons"
+    )
+    transfers = [compared(ends[3], ends[3]), compared(ends[1], base)]
+    assert learning.open_ends_in_words(transfers) == (
+        "the interval of the last difference holds 0 in 1 of 2 comparisons; in 1 of these all "
+        "trainings end alike"
+    )
+
+
+def test_pairs_need_trainings_of_both_variants():
+    curves = pd.concat(
+        [several("quick", [1.0]), several("no transfer", [1.0]), several("no guard", [1.0])]
+    )
+    assert learning.pairs_in(curves) == {"all means of this project": ("quick", "no transfer")}
+    (key,) = learning.transfers(curves, [METRIC], shortest=STEPS[-1])
+    assert key == ("all means of this project", METRIC)

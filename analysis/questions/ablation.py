@@ -1,0 +1,141 @@
+"""What each means of learning is worth: variants of a training, compared by what they end with.
+
+    table = ablation(finals(curves), "final_reward", "quick")
+
+Curves are those of ``analysis.questions.learning``; trainings of a variant differ in their seed.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis import numbers
+from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.stats.correction import adjust
+from analysis.stats.intervals import LEVEL, Interval, mean_interval
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+
+_UNKNOWN = Interval(np.nan, np.nan, np.nan)
+_WORDS = {BELOW: "worse", ABOVE: "better", INCONCLUSIVE: INCONCLUSIVE}
+
+
+BASELINE = "quick"  # the variant that the others of the shipped curves are compared with
+
+
+def finals(curves: pd.DataFrame) -> pd.DataFrame:
+    """The last row of every training: it has the metrics of the weights that were kept."""
+    return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
+
+
+def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
+    """What every variant reaches in the end, and its difference to the baseline.
+
+    Args:
+        last: Rows of ``finals``.
+        metric: The column of the final metric.
+        baseline: The variant that the others are compared with.
+        level: Confidence level.
+
+    Returns:
+        A row per variant, the highest mean first: ``variant``, ``n`` trainings, ``mean``, ``low``,
+        ``high`` (nan with one training), ``difference``, ``difference_low``, ``difference_high``,
+        ``p`` and ``p_adjusted`` (Holm), of ``difference``; nan for the baseline.
+    """
+    values = {v: part[metric].to_numpy() for v, part in last.groupby("variant", sort=False)}
+    rows = []
+    for variant, sample in values.items():
+        mean = mean_interval(sample, level)
+        if len(sample) == 1:
+            mean = Interval(mean.mean, np.nan, np.nan)
+        gap, p = _UNKNOWN, np.nan
+        if variant != baseline:
+            gap, p = difference(sample, values[baseline], level)
+        rows.append((variant, len(sample), *mean, *gap, p))
+    columns = ["variant", "n", "mean", "low", "high"]
+    columns += ["difference", "difference_low", "difference_high", "p"]
+    table = pd.DataFrame(rows, columns=columns)
+    known = table["p"].notna()
+    table.loc[known, "p_adjusted"] = adjust(table.loc[known, "p"].to_numpy(), "holm")
+    return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
+
+
+def difference(
+    a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, level: float = LEVEL
+) -> tuple[Interval, float]:
+    """The mean of A minus that of B, over trainings of their own.
+
+    Welch's t. Where one of the two is a single training, Student's t with the spread of the other:
+    the interval then holds 0 if one more training of the other might have come out like that.
+
+    Returns:
+        The interval (nan ends where both are single trainings; degenerate where neither has any
+        spread) and the p-value (1 where there is none).
+    """
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    gap = float(a.mean() - b.mean())
+    if a.size + b.size < 3:
+        return Interval(gap, np.nan, np.nan), 1.0
+    if np.ptp(a) == np.ptp(b) == 0:
+        return Interval(gap, gap, gap), 1.0
+    test = stats.ttest_ind(a, b, equal_var=min(a.size, b.size) == 1)
+    ends = test.confidence_interval(level)
+    return Interval(gap, float(ends.low), float(ends.high)), float(test.pvalue)
+
+
+def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+    """The rows of ``ablation`` of collection ratio and communication as a table of text.
+
+    Args:
+        table: Rows of ``ablation``.
+        last: Rows of ``finals``, for the means of the other metrics.
+        baseline: The variant that the others are compared with.
+    """
+    means = last.groupby("variant")[[f"final_{SUCCESS}", f"final_{RATIO}"]].mean()
+    others = means.loc[table["variant"]].map(numbers.percent).to_numpy()
+    columns = {
+        "Variant": table["variant"],
+        "n": table["n"],
+        METRICS[PRODUCT]: [_mean(row) for row in table.itertuples()],
+        f"To {baseline} [points]": [_gap(row) for row in table.itertuples()],
+        "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
+        METRICS[SUCCESS]: others[:, 0],
+        METRICS[RATIO]: others[:, 1],
+    }
+    return pd.DataFrame(columns)
+
+
+def positions_in_words(table: pd.DataFrame) -> str:
+    """A Markdown list of the variants that are worse, better and inconclusive by the interval."""
+    variants: dict[str, list[str]] = {word: [] for word in _WORDS.values()}
+    for row in _compared(table).itertuples():
+        gap = Interval(row.difference, row.difference_low, row.difference_high)
+        variants[_WORDS[position(gap)]].append(row.variant)
+    return "\n".join(
+        f"- **{word}**: {'; '.join(names)}" for word, names in variants.items() if names
+    )
+
+
+def significant_in_words(table: pd.DataFrame, level: float = LEVEL) -> str:
+    """The variants that differ from the baseline by the corrected p-values, or ``nothing``."""
+    significant = table[table["p_adjusted"] <= 1 - level]["variant"]
+    return f"**{'; '.join(significant)}**" if len(significant) else "nothing"
+
+
+def _compared(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of variants other than the baseline."""
+    return table[table["p"].notna()]
+
+
+def _mean(row: Any) -> str:
+    if row.low < row.high:
+        return numbers.interval(row.mean, row.low, row.high)
+    return numbers.percent(row.mean)
+
+
+def _gap(row: Any) -> str:
+    if np.isnan(row.p):
+        return ""
+    return numbers.points(row.difference, row.difference_low, row.difference_high)

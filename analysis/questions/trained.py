@@ -1,0 +1,93 @@
+"""The trained policies in a folder: how each was trained, and where more training stops paying.
+
+policies = trained_policies(Path("policies/trained"))
+several_trainings(policies)  # {"ddqn": ["ddqn", "ddqn-2", "ddqn-3"]}
+"""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.questions.learning import PRODUCT, settled, smoothed
+from policies.ddqn.config import TrainingConfig, config_of, learner_of
+
+
+class Trained(NamedTuple):
+    """A trained policy.
+
+    Attributes:
+        name: The policy.
+        config: Its training.
+        curve: A row per evaluation while training.
+    """
+
+    name: str
+    config: TrainingConfig
+    curve: pd.DataFrame
+
+
+def trained_policies(folder: Path) -> list[Trained]:
+    """The trained policies in a folder that come with the curve of their training, by name."""
+    return [
+        Trained(path.parent.name, _config(path.parent), pd.read_parquet(path))
+        for path in sorted(folder.glob("*/training.parquet"))
+    ]
+
+
+def several_trainings(policies: Iterable[Trained]) -> list[list[Trained]]:
+    """The policies of each learner of several trainings, which differ in their seed alone."""
+    learners: dict[str, list[Trained]] = {}
+    for policy in policies:
+        learners.setdefault(learner_of(policy.config), []).append(policy)
+    return [trainings for trainings in learners.values() if len(trainings) > 1]
+
+
+def curves_of(trainings: Iterable[Trained], variant: str) -> pd.DataFrame:
+    """The curves of trainings as those of one variant, as of ``analysis.questions.learning``."""
+    return pd.concat(t.curve.assign(variant=variant, seed=t.config.seed) for t in trainings)
+
+
+def course_in_words(policy: Trained, margin: float) -> str:
+    """Where a training ends, and since when it has stayed within a margin: a Markdown item."""
+    end = policy.curve.iloc[-1]
+    near = settled(policy.curve, PRODUCT, margin)
+    average = smoothed(curves_of([policy], policy.name), PRODUCT)["value"].iloc[-1]
+    return (
+        f"- **{policy.name}** ends at {numbers.percent(average)} after {end['updates']:,} updates, "
+        f"{end['uav_slots'] / 1e6:.1f} million UAV-slots and {end['seconds'] / 60:.0f} minutes. "
+        f"From update {near['updates']:,} on ({near['seconds'] / 60:.0f} minutes) it stays within "
+        f"{numbers.margin(margin)} of that: the other "
+        f"{numbers.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
+    )
+
+
+def settings_table(policies: Iterable[Trained]) -> pd.DataFrame:
+    """How policies were trained, a row each."""
+    return pd.DataFrame(
+        {
+            "Policy": policy.name,
+            "Observation": policy.config.observation,
+            "Phases": ", ".join(f"{p.name} ({p.ticks:,} ticks)" for p in policy.config.phases),
+            "Seed": policy.config.seed,
+            "Discount": f"{policy.config.discount:g}",
+            "Steps of return": policy.config.n_step,
+        }
+        for policy in policies
+    )
+
+
+def commands(policies: Iterable[Trained]) -> list[str]:
+    """The commands that train policies anew."""
+    return [
+        f"dess train {policy.config.name} --seed {policy.config.seed} --out runs/{policy.name}"
+        for policy in policies
+    ]
+
+
+def _config(folder: Path) -> TrainingConfig:
+    path = folder / "config.json"
+    return config_of(json.loads(path.read_text("utf-8"))["training"], str(path))

@@ -1,0 +1,88 @@
+"""Variants of a training, compared by what their trainings end with."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.questions.ablation import (
+    ablation,
+    ablation_table,
+    difference,
+    finals,
+    positions_in_words,
+    significant_in_words,
+)
+from tests.analysis.questions.test_learning import several
+
+
+def test_the_difference_of_means_is_welchs():
+    a, b = [1.0, 2.0, 4.0], [3.0, 3.5]
+    ends, p = difference(a, b)
+    test = stats.ttest_ind(a, b, equal_var=False)
+    assert ends.mean == pytest.approx(np.mean(a) - np.mean(b))
+    assert (ends.low, ends.high) == pytest.approx(tuple(test.confidence_interval(0.95)))
+    assert p == pytest.approx(test.pvalue)
+
+
+def test_a_single_training_is_held_against_the_spread_of_the_others():
+    """By hand: the prediction interval of one more, mean +- t s sqrt(1 + 1/n)."""
+    others = np.array([1.0, 2.0, 3.0])
+    ends, p = difference([5.0], others)
+    half = stats.t.ppf(0.975, 2) * 1.0 * np.sqrt(1 + 1 / 3)
+    assert (ends.low, ends.high) == pytest.approx((3.0 - half, 3.0 + half))
+    assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
+
+
+def test_two_single_trainings_tell_nothing_of_the_spread():
+    ends, p = difference([5.0], [3.0])
+    assert ends.mean == 2.0 and np.isnan([ends.low, ends.high]).all() and p == 1.0
+
+
+def test_the_ablation_compares_what_trainings_end_with():
+    ends = {"base": [1.0, 2.0, 3.0], "much": [9.0, 9.5, 9.7], "once": [2.5]}
+    last = finals(pd.concat(several(name, values) for name, values in ends.items()))
+    table = ablation(last, "final_product", "base").set_index("variant")
+    assert table["n"].to_dict() == {"base": 3, "much": 3, "once": 1}
+    assert table["mean"].to_dict() == pytest.approx({n: np.mean(v) for n, v in ends.items()})
+    assert table.loc["base", ["difference", "p", "p_adjusted"]].isna().all()
+    assert table.loc["once", ["low", "high"]].isna().all()
+    assert table.loc["once", "difference_low"] < 0 < table.loc["once", "difference_high"]
+    p = table.loc["much", "p"]
+    assert table.loc["much", "p_adjusted"] == pytest.approx(2 * p)  # Holm, of two
+    assert p == difference(ends["much"], ends["base"])[1]
+
+
+@pytest.fixture
+def last() -> pd.DataFrame:
+    """Final metrics of three variants: one is worse than the baseline, one was trained once."""
+    products = {"base": [0.7, 0.72, 0.74], "worse": [0.1, 0.11, 0.12], "once": [0.73]}
+    rows = [
+        (variant, seed, value, 1.0, value + 0.1)
+        for variant, values in products.items()
+        for seed, value in enumerate(values)
+    ]
+    metrics = [
+        "final_collection_ratio_and_communication",
+        "final_success",
+        "final_collection_ratio",
+    ]
+    return pd.DataFrame(rows, columns=["variant", "seed", *metrics])
+
+
+def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
+    table = ablation(last, "final_collection_ratio_and_communication", "base")
+    rows = ablation_table(table, last, "base").fillna("").set_index("Variant")
+    assert rows.index.tolist() == ["once", "base", "worse"]  # by their means
+    # by hand: 0.02 t(0.975, 2) / sqrt(3) = 0.0497
+    assert rows.loc["base"].tolist() == [3, "72.0 % [67.0, 77.0]", "", "", "100.0 %", "82.0 %"]
+    assert rows.loc["once", "Collection ratio and communication"] == "73.0 %"
+    assert rows.loc["worse", "To base [points]"].startswith("−61.0 [")
+    assert rows.loc["worse", "p (Holm)"] == "< 0.001"
+
+
+def test_variants_are_listed_by_where_their_intervals_lie(last: pd.DataFrame) -> None:
+    table = ablation(last, "final_collection_ratio_and_communication", "base")
+    assert positions_in_words(table) == "- **worse**: worse\n- **inconclusive**: once"
+    assert significant_in_words(table) == "**worse**"
+    assert significant_in_words(table[table["variant"] == "once"]) == "nothing"

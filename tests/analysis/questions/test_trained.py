@@ -1,0 +1,62 @@
+"""Trained policies in a folder: learners, courses of their trainings, settings and commands."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from analysis.questions import trained
+from tests.policies.ddqn.tiny import tiny
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two trainings of one learner, one of another, and a policy without a curve."""
+    for name, settings in {
+        "one": {"seed": 1},
+        "two": {"seed": 2},
+        "other": {"seed": 1, "discount": 0.9},
+        "bare": {},
+    }.items():
+        (tmp_path / name).mkdir()
+        config = tiny(**settings).model_dump(mode="json")
+        (tmp_path / name / "config.json").write_text(json.dumps({"training": config}), "utf-8")
+        if name == "bare":
+            continue
+        product = [0.0, 0.8, 0.5, 0.5]
+        curve = {
+            "phase": "battery",
+            "updates": [250, 500, 750, 1000],
+            "seconds": [60, 120, 180, 240],
+        }
+        curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], trained.PRODUCT: product}
+        pd.DataFrame(curve).to_parquet(tmp_path / name / "training.parquet")
+    return tmp_path
+
+
+def test_trainings_that_differ_in_their_seed_are_of_one_learner(folder: Path) -> None:
+    policies = trained.trained_policies(folder)
+    assert [policy.name for policy in policies] == ["one", "other", "two"]
+    (group,) = trained.several_trainings(policies)
+    assert [policy.name for policy in group] == ["one", "two"]
+    curves = trained.curves_of(group, "learner")
+    assert curves.groupby("seed").size().to_dict() == {1: 4, 2: 4}
+    assert set(curves["variant"]) == {"learner"}
+
+
+def test_the_course_of_a_training(folder: Path) -> None:
+    first = trained.trained_policies(folder)[0]
+    # averages 0, 0.4, 0.45 and 0.475: within 0.05 from the third evaluation on
+    assert trained.course_in_words(first, 0.05) == (
+        "- **one** ends at 47.5 % after 1,000 updates, 4.0 million UAV-slots and 4 minutes. From "
+        "update 750 on (3 minutes) it stays within 5 points of that: the other 25.0 % of the "
+        "updates moved it by less."
+    )
+
+
+def test_settings_and_commands(folder: Path) -> None:
+    policies = trained.trained_policies(folder)
+    table = trained.settings_table(policies).set_index("Policy")
+    assert table.loc["other", ["Seed", "Discount"]].tolist() == [1, "0.9"]
+    assert trained.commands(policies)[-1] == "dess train tiny --seed 2 --out runs/two"
