@@ -1,4 +1,9 @@
-"""Pieces of a report page: figures, tables and numbers as clean HTML."""
+"""Parts of a page as HTML or Markdown: sentences, tables, figures, and where results come from.
+
+html.say("{n:,} missions per policy.", n=300)
+html.table(frame, "Means with 95 % intervals")
+html.gallery([(drawing, "Success of every policy", "n = 300 missions")])
+"""
 
 import io
 import json
@@ -13,51 +18,52 @@ import pandas as pd
 from IPython.display import HTML, Markdown
 from matplotlib.figure import Figure
 
+from analysis.numbers import span
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import Results
 
 SHORT = 12  # characters of a hash that are shown
-STUDY, FILES = "dess-study", "dess-files"  # what a page carries, by the class of its element
+STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that hold evidence
 
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
 def say(text: str, **values: object) -> Markdown:
-    """A sentence with numbers in it, as Markdown: ``say("{n:,} missions", n=300)``."""
+    """Markdown with values in it, as ``say("{n:,} missions", n=300)``."""
     return Markdown(text.format(**values))
 
 
 def commands(lines: Iterable[str]) -> str:
-    """Lines for a shell, as Markdown: none is broken, and all can be copied at once."""
+    """A block of shell commands in Markdown, to be copied at once."""
     return "\n".join(["```sh", *lines, "```"])
 
 
 def provenance(studies: Iterable[Results]) -> HTML:
-    """Where the results of a page come from: a column per study, and the evidence to check them."""
+    """A table of what the studies of a page were made with, and the evidence to verify it."""
     return carrying([Evidence.of(results) for results in studies])
 
 
 def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
-    """What studies were made with, a column per study, and the evidence itself, out of sight.
+    """A table of what studies were made with, a column each, and the evidence in hidden elements.
 
     Args:
         evidence: Of the studies.
-        files: The lists of files that pages carry, as of ``embedded``.
+        files: Lists of files, as JSON, to hide in the page as well.
     """
-    hidden = [_embedded(STUDY, each.text) for each in evidence]
+    hidden = [_embedded(STUDY, of_study.text) for of_study in evidence]
     hidden += [_embedded(FILES, text) for text in files]
     return HTML((_origins(evidence).data if evidence else "") + "".join(hidden))
 
 
 def _origins(evidence: Sequence[Evidence]) -> HTML:
-    names = [each.study for each in evidence]
+    names = [of_study.study for of_study in evidence]
     columns = {
         e.study if names.count(e.study) == 1 else f"{e.study} {e.key}": {
             "Scenario": e.scenario_name,
             "Policies": ", ".join(team.policy for team in e.policies),
             "Weights": ", ".join(_weights(e)) or "none",
             "Design points": f"{e.points:,}",
-            "Missions per policy and point": _range(e.missions),
+            "Missions per policy and point": span(e.missions),
             "Budget": e.budget,
             "Seed": e.seed,
             "Engine": e.engine,
@@ -77,7 +83,7 @@ def _origins(evidence: Sequence[Evidence]) -> HTML:
 
 
 def weights(folder: Path) -> HTML:
-    """The files of the learned policies in a folder, and the evidence to check them."""
+    """A table of the files of the learned policies in a folder, and the evidence to verify it."""
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
     shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]))
@@ -85,9 +91,9 @@ def weights(folder: Path) -> HTML:
 
 
 def embedded(kind: str, html: str) -> list[str]:
-    """The texts of a kind, ``STUDY`` or ``FILES``, that a page carries; each once."""
-    found = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', html, re.S)
-    return list(dict.fromkeys(found))
+    """The JSON texts of a kind, ``STUDY`` or ``FILES``, that are hidden in a page; each once."""
+    texts = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', html, re.S)
+    return list(dict.fromkeys(texts))
 
 
 def _embedded(kind: str, text: str) -> str:
@@ -96,7 +102,7 @@ def _embedded(kind: str, text: str) -> str:
 
 
 def _weights(evidence: Evidence) -> Iterator[str]:
-    """The hashes of the weights of every learned policy of a study, each once."""
+    """The name and the hash of the weights of every learned policy of a study, each once."""
     for name, digest in dict.fromkeys(
         (team.policy if len(team.members) == 1 else member.name, member.weights)
         for team in evidence.policies
@@ -106,18 +112,13 @@ def _weights(evidence: Evidence) -> Iterator[str]:
             yield f"{name} {digest[:SHORT]}"
 
 
-def _range(ends: tuple[int, int]) -> str:
-    """``300``, or ``20 to 1,200``."""
-    return " to ".join(f"{n:,}" for n in sorted({*ends}))
-
-
 def table(frame: pd.DataFrame, caption: str = "", wrap: bool = False) -> HTML:
-    """A table without its index, under its caption; where it is too wide, it scrolls.
+    """A table without its index, under its caption; a wide one scrolls.
 
     Args:
         frame: The table.
-        caption: What stands above it.
-        wrap: Whether cells with many words take several lines.
+        caption: The text above it.
+        wrap: Whether long cells take several lines.
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
@@ -126,17 +127,17 @@ def table(frame: pd.DataFrame, caption: str = "", wrap: bool = False) -> HTML:
 
 
 def figure(drawing: Figure, alt: str, caption: str = "") -> HTML:
-    """A figure with its caption, and what it shows for those who cannot see it."""
+    """A figure with its alternative text and its caption."""
     return HTML(_figure(drawing, alt, caption))
 
 
 def gallery(drawings: list[tuple[Figure, str, str]]) -> HTML:
-    """Figures, each with its alternative text and caption, side by side as far as there is room."""
-    return HTML(f'<div class="gallery">{"".join(_figure(*each) for each in drawings)}</div>')
+    """Figures with alternative texts and captions, side by side as far as there is room."""
+    return HTML(f'<div class="gallery">{"".join(_figure(*parts) for parts in drawings)}</div>')
 
 
 def svg(drawing: Figure) -> bytes:
-    """A figure as SVG that is the same, byte for byte, whenever and wherever it is drawn."""
+    """A figure as SVG, the same bytes on each rendering."""
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
