@@ -3,7 +3,7 @@
 Each returns a figure of its own; nothing touches pyplot's state.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -21,13 +21,14 @@ from analysis.figures.style import (
     panels,
     policy_colours,
     round_ticks,
+    shifts,
     signed_points,
     style,
 )
 from analysis.names import METRICS, parameter
 from analysis.study.design import NOISE
 
-# How far the policies stand apart at a value, of the width of the axis.
+# Half the distance between the outer policies at a value, as a share of the width of the axis.
 APART = 0.02
 
 
@@ -54,14 +55,12 @@ def effect(
             _means(rows[rows["metric"] == metric], [*changes], colours, ax)
             ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        for policy, shift in _shifts([*changes], len(values)).items():
+        for policy, shift in zip(changes, _shifts(len(changes), len(values)), strict=True):
             _changes(changes[policy], shift, dot(policy, colours), axes[3])
-        axes[3].set_title(f"Change of the last, from {values[0]} on")
-        axes[3].set_ylabel("points")
+        axes[3].set(title=f"Change of the last, from {values[0]} on", ylabel="points")
         axes[3].yaxis.set_major_formatter(FuncFormatter(signed_points))
-        axes[3].set_xlim(-0.4, len(values) - 0.6)
+        axes[3].set(xlim=(-0.4, len(values) - 0.6), xlabel=parameter(field).label)
         axes[3].set_xticks(range(len(values)), values)
-        axes[3].set_xlabel(parameter(field).label)
         for ax in axes:
             round_ticks(ax.yaxis, 5)
             ax.grid(axis="x", visible=False)
@@ -84,9 +83,9 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
             name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
             spots = np.arange(len(rows)) + shift
-            arms = [rows[index] - rows[f"{index}_low"], rows[f"{index}_high"] - rows[index]]
             ax.barh(spots, rows[index], 0.32, color=face, edgecolor=colour, label=name, zorder=2)
-            ax.errorbar(rows[index], spots, xerr=arms, fmt="none", ecolor=INK, capsize=3,
+            ax.errorbar(rows[index], spots, xerr=arms(rows, index, f"{index}_low", f"{index}_high"),
+                        fmt="none", ecolor=INK, capsize=3,
                         elinewidth=1.3, zorder=3)  # fmt: skip
         ax.axvline(0, color=INK, linewidth=0.8, zorder=1)
         for y in rows.index[rows["parameter"] == NOISE]:
@@ -101,32 +100,27 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
 
 
 def _means(
-    rows: pd.DataFrame, drawn: list[str], colours: dict[str, tuple[str, str]], ax: Axes
+    rows: pd.DataFrame, policies: Sequence[str], colours: dict[str, tuple[str, str]], ax: Axes
 ) -> None:
-    for policy, shift in _shifts(drawn, rows["position"].nunique()).items():
-        own = rows[rows["policy"] == policy].sort_values("position")
-        ax.errorbar(
-            own["position"] + shift,
-            own["mean"],
-            yerr=arms(own),
-            **dot(policy, colours),
-            linewidth=1,
-            label=policy,
-        )
+    offsets = _shifts(len(policies), rows["position"].nunique())
+    for policy, shift in zip(policies, offsets, strict=True):
+        means = rows[rows["policy"] == policy].sort_values("position")
+        ax.errorbar(means["position"] + shift, means["mean"], yerr=arms(means), linewidth=1,
+                    label=policy, **dot(policy, colours))  # fmt: skip
 
 
 def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
-    """Differences to the first value, which is where they begin: at 0."""
-    own = pairs[pairs["first"] == 0].rename(columns={"difference": "mean"}).sort_values("second")
-    bars = np.concatenate([np.zeros((2, 1)), arms(own)], axis=1)
-    spots = np.array([0, *own["second"]]) + shift
-    ax.errorbar(spots, [0, *own["mean"]], yerr=bars, **look, linewidth=1)
+    """Differences to the first value, whose own difference is 0."""
+    rows = pairs[pairs["first"] == 0].sort_values("second")
+    bars = np.concatenate([np.zeros((2, 1)), arms(rows, "difference")], axis=1)
+    spots = np.array([0, *rows["second"]]) + shift
+    ax.errorbar(spots, [0, *rows["difference"]], yerr=bars, **look, linewidth=1)
     ax.axhline(0, color=MUTED, linewidth=0.9, zorder=1)
 
 
-def _shifts(drawn: list[str], values: int) -> dict[str, float]:
-    ends = APART * values * (len(drawn) > 1)
-    return dict(zip(drawn, np.linspace(-ends, ends, len(drawn)), strict=True))
+def _shifts(policies: int, values: int) -> np.ndarray:
+    """(policies,) how far each policy is drawn from the middle of a value."""
+    return shifts(policies, APART * values)
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:

@@ -1,5 +1,8 @@
 """The event log of a mission as tables per mission slot, for figures and reports.
 
+    slots = uav_slots(results.events("greedy", point=0, replication=0))
+    slots.groupby("uav")["charging"].sum()  # slots that each UAV charged
+
 ``events`` is everywhere a data frame, or the columns, of ``dess.record.EventLog``.
 """
 
@@ -22,16 +25,10 @@ def uav_slots(events: Events) -> pd.DataFrame:
         without; ``moved``, ``charging``, ``waiting`` (for a pad).
     """
     log = pd.DataFrame(events)
-    moves = log[log["event"] == "move"]
-    table = pd.DataFrame(
-        {
-            "uav": moves["uav"],
-            "slot": moves["time"].astype(int),
-            "x": moves["x"].astype(int),
-            "y": moves["y"].astype(int),
-            "battery": moves["value"].astype(int),
-        }
-    ).sort_values(["uav", "slot"], ignore_index=True)
+    moves = log[log["event"] == "move"].astype({"time": int, "x": int, "y": int, "value": int})
+    names = {"time": "slot", "value": "battery"}
+    table = moves.rename(columns=names)[["uav", "slot", "x", "y", "battery"]]
+    table = table.sort_values(["uav", "slot"], ignore_index=True)
     start = _of_uavs(log, "mission_start").set_index("uav")
     for axis in ("x", "y"):
         first = table["uav"].map(start[axis])
@@ -47,14 +44,11 @@ def uav_slots(events: Events) -> pd.DataFrame:
 def battery_levels(events: Events) -> pd.DataFrame:
     """Battery [%] of every UAV at every slot's start and at its end: ``uav, time, battery``."""
     log = pd.DataFrame(events)
-    start, moves = _of_uavs(log, "mission_start"), log[log["event"] == "move"]
-    return pd.DataFrame(
-        {
-            "uav": pd.concat([start["uav"], moves["uav"]]),
-            "time": pd.concat([start["time"], moves["time"] + 1]).astype(int),
-            "battery": pd.concat([start["value"], moves["value"]]).astype(int),
-        }
-    ).sort_values(["uav", "time"], ignore_index=True)
+    moves = log[log["event"] == "move"]
+    states = pd.concat([_of_uavs(log, "mission_start"), moves.assign(time=moves["time"] + 1)])
+    levels = states.rename(columns={"value": "battery"})[["uav", "time", "battery"]]
+    levels = levels.astype({"time": int, "battery": int})
+    return levels.sort_values(["uav", "time"], ignore_index=True)
 
 
 def residual_data(events: Events) -> pd.DataFrame:
@@ -104,14 +98,17 @@ def _charging(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
 
 def _waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     """A UAV waits from its ``charge_request`` on until it charges, moves off or tries to."""
-    overruled = log[log["event"] == "collision"]
-    tried = set(zip(overruled["uav"], overruled["time"].astype(int), strict=True))
-    requests = log[log["event"] == "charge_request"]
-    asked = set(zip(requests["uav"], requests["time"].astype(int), strict=True))
+    overruled, requested = _slots_of(log, "collision"), _slots_of(log, "charge_request")
     waiting, queued = np.zeros(len(table), bool), False
     keys = zip(table["uav"], table["slot"], table["moved"], table["charging"], strict=True)
     for row, (uav, slot, moved, charging) in enumerate(keys):
-        stays = queued and slot > 0 and not moved and (uav, slot) not in tried
-        queued = not charging and ((uav, slot) in asked or stays)
+        stays = queued and slot > 0 and not moved and (uav, slot) not in overruled
+        queued = not charging and ((uav, slot) in requested or stays)
         waiting[row] = queued
     return waiting
+
+
+def _slots_of(log: pd.DataFrame, event: str) -> set[tuple[int, int]]:
+    """UAV and slot of every event of a kind."""
+    rows = log[log["event"] == event]
+    return set(zip(rows["uav"], rows["time"].astype(int), strict=True))
