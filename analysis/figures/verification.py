@@ -17,21 +17,22 @@ from scipy import stats
 from analysis.figures.style import INK, MUTED, SEA, ZONE, legend_below, panels, round_ticks, style
 from analysis.stats.intervals import LEVEL
 from analysis.verification import closed_forms
-from analysis.verification.chance import Fit
+from analysis.verification.fits import Fit
 from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
 SHOWN = 60  # blocks of a caterpillar
 
 
-def fit(observed: Fit, title: str, label: str, logarithmic: bool = False) -> Figure:
+def fit(observed: Fit, title: str, label: str) -> Figure:
     """Observed against expected numbers, and how far they are apart in standard errors.
+
+    Where the expected numbers range over more than two powers of ten, their axis is logarithmic.
 
     Args:
         observed: The classes.
         title: Of the figure.
         label: What the classes are.
-        logarithmic: Whether the numbers range over powers of ten.
     """
     table, spots = observed.table, np.arange(len(observed.table))
     n = table["expected"].sum()
@@ -41,7 +42,7 @@ def fit(observed: Fit, title: str, label: str, logarithmic: bool = False) -> Fig
         ax.bar(spots, table["expected"], 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
         ax.set(title=title, ylabel="observations")
-        if logarithmic:
+        if table["expected"].max() > 100 * table["expected"].min():
             ax.set_yscale("log")
             ax.set_ylim(bottom=max(table[["expected", "observed"]].min().min(), 1) / 3)
             ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.0f}"))
@@ -97,26 +98,25 @@ def totals(values: np.ndarray, law: Any, title: str, label: str) -> Figure:
     return figure
 
 
-def caterpillar(blocks: pd.DataFrame, reference: float, title: str) -> Figure:
+def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
     """The intervals of the first blocks of missions, those that miss the mean of all marked.
 
     Args:
-        blocks: As ``analysis.verification.chance.blocks`` has them.
-        reference: The mean of all missions.
+        blocks: As ``analysis.verification.coverage.blocks`` has them.
         title: Of the figure.
     """
-    own = blocks.head(SHOWN)
+    shown = blocks.head(SHOWN)
     with style():
         figure, ax = panels(3.6)
         looks = ((True, SEEN, "o", "holds the mean of all"), (False, MISS, "X", "misses it"))
         for holds, colour, marker, name in looks:
-            rows = own[own["holds"] == holds]
+            rows = shown[shown["holds"] == holds]
             ax.vlines(rows.index + 1, rows["low"], rows["high"], color=colour,
                       linewidth=1.2 if holds else 2.2)  # fmt: skip
             ax.scatter(rows.index + 1, rows["mean"], s=10 if holds else 34, color=colour,
                        marker=marker, zorder=3, label=name)  # fmt: skip
-        ax.axhline(reference, color=INK, linewidth=1.1, zorder=1)
-        ax.set(title=title, xlabel="block of missions", xlim=(0, len(own) + 1))
+        ax.axhline(blocks["reference"].iloc[0], color=INK, linewidth=1.1, zorder=1)
+        ax.set(title=title, xlabel="block of missions", xlim=(0, len(shown) + 1))
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
         round_ticks(ax.yaxis, 6)
         ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
@@ -158,8 +158,8 @@ def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
     """A panel and a lower one for the deviations, over the same axis."""
     figure, (ax, below) = panels(4.6, 2, sharex=True, height_ratios=(2, 1))
     ax.grid(axis="x", visible=False)
-    for each in (ax, below):
-        sns.despine(ax=each)
+    for panel in (ax, below):
+        sns.despine(ax=panel)
     return figure, (ax, below)
 
 

@@ -1,33 +1,46 @@
-"""Checks: what was seen beside what is known, and the verdict on all of them together.
+"""Checks of the simulator, and the verdict on all of them together.
 
-A check of chance has a p-value, an exact one an error and the bound that it must keep.
+A check of chance has a p-value, an exact one an error and the bound that it must keep::
+
+    checks = [z_check(CHANNEL, "Mean", known=0, estimate=0.1, error=0.2, n=50), ...]
+    table = judge(checks)
+    overall(table)  # "**2 of 2 checks hold**. 1 is exact ..."
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
+from analysis import numbers
 from analysis.stats.correction import adjust
+from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
+
+ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"
+CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
+REALISATIONS, ENGINES = "Realisations", "Engines"
 
 # The chance that any check of chance fails although all that is known holds.
 ALPHA = 0.01
 
+_NORMAL = stats.norm.ppf((1 + LEVEL) / 2)
+
 
 class Check(NamedTuple):
-    """Something known, and what was seen of it; without ``p`` and ``error`` it cannot be told.
+    """A comparison with what is known; inconclusive if it has neither ``p`` nor ``error``.
 
     Attributes:
-        topic: What part of the simulator it is about.
+        topic: The part of the simulator, one of the constants of this module.
         test: What was compared, and how.
         known: The closed form.
         seen: The estimate that stands beside it.
         n: Number of observations.
-        p: Chance of a deviation as large as that seen, if the closed form holds.
+        p: Probability of a deviation as large as that seen, if the closed form holds.
         error: Deviation where there must be none.
-        bound: The largest error that is none.
+        bound: The largest error that is allowed.
     """
 
     topic: str
@@ -39,22 +52,130 @@ class Check(NamedTuple):
     error: float | None = None
     bound: float = 0.0
 
+    @classmethod
+    def exact(
+        cls, topic: str, test: str, known: str, seen: str, n: int, error: float, bound: float = 0.0
+    ) -> Self:
+        """A check of an error; inconclusive without observations."""
+        return cls(topic, test, known, seen, n, error=float(error) if n else None, bound=bound)
+
+    @classmethod
+    def counted(cls, topic: str, test: str, known: str, wrong: int, n: int) -> Self:
+        """An exact check of n cases, of which some are wrong."""
+        seen = f"otherwise {wrong:,} times" if wrong else "always"
+        return cls.exact(topic, test, known, seen, n, wrong)
+
+    @classmethod
+    def normal(
+        cls,
+        topic: str,
+        test: str,
+        known: float,
+        estimate: float,
+        error: float,
+        n: int,
+        digits: int = 4,
+    ) -> Self:
+        """A check of an estimate that is normal around the known value.
+
+        Args:
+            topic, test, n: As above.
+            known: The value in closed form.
+            estimate: What was seen.
+            error: The standard error of the estimate, if the known value holds.
+            digits: Decimals of the estimate as text.
+        """
+        ends = (estimate - _NORMAL * error, estimate + _NORMAL * error)
+        seen = numbers.estimate(estimate, *ends, digits=digits)
+        p = float(2 * stats.norm.sf(abs(estimate - known) / error))
+        return cls(topic, test, f"{known:g}", seen, n, p)
+
 
 def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
     """The verdicts: by Holm over all checks of chance, by their bounds of the exact ones.
 
     Args:
         checks: The checks of a page; p-values of all of them are corrected together.
-        alpha: Chance that any of them is refused although all hold.
+        alpha: Probability that any of them is refused although all hold.
 
     Returns:
-        A row per check: its fields, ``p_adjusted`` and ``verdict``, one of ``effects.HOLDS``,
-        ``REFUTED`` and ``INCONCLUSIVE``.
+        A row per check: its fields, ``p_adjusted`` and ``verdict``, one of ``HOLDS``, ``REFUTED``
+        and ``INCONCLUSIVE`` of ``analysis.stats.verdict``.
     """
     table = pd.DataFrame(checks, columns=Check._fields).astype({"p": float, "error": float})
     chance = table["p"].notna()
     table.loc[chance, "p_adjusted"] = adjust(table.loc[chance, "p"].to_numpy(), "holm")
     fails = (table["p_adjusted"] <= alpha) | (table["error"] > table["bound"])
-    told = chance | table["error"].notna()
-    verdicts = np.select([fails, told], [REFUTED, HOLDS], INCONCLUSIVE)
+    decided = chance | table["error"].notna()
+    verdicts = np.select([fails, decided], [REFUTED, HOLDS], INCONCLUSIVE)
     return table.assign(verdict=verdicts)
+
+
+def as_text(judged: pd.DataFrame) -> pd.DataFrame:
+    """The table of a page: a row of text per check.
+
+    Args:
+        judged: As ``judge`` returns it.
+    """
+    return pd.DataFrame(
+        {
+            "Test": judged["test"],
+            "Verdict": judged["verdict"],
+            "Known": judged["known"],
+            "Seen": judged["seen"],
+            "p-value or error": [_reason(row) for _, row in judged.iterrows()],
+            "n": judged["n"].map("{:,}".format),
+        }
+    )
+
+
+def _reason(row: pd.Series) -> str:
+    """The p-value and its correction, or the error and its bound."""
+    if not np.isnan(row["p"]):
+        return f"p {numbers.p_value(row['p'])}, Holm {numbers.p_value(row['p_adjusted'])}"
+    if np.isnan(row["error"]):
+        return ""
+    if not row["bound"]:
+        return f"error {row['error']:g}"
+    return f"error {row['error']:.2g}, allowed {row['bound']:.2g}"
+
+
+def overall(judged: pd.DataFrame) -> str:
+    """What all checks together say, as Markdown.
+
+    Args:
+        judged: As ``judge`` returns it.
+    """
+    refuted, open_tests = (_tests(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE))
+    if refuted:
+        names = numbers.words(refuted)
+        return f"**{len(refuted)} of {len(judged)} checks do not hold**: {names}." + _few(
+            open_tests
+        )
+    holding = f"**{len(_tests(judged, HOLDS))} of {len(judged)} checks hold**"
+    return holding + ("; the others are inconclusive." if open_tests else ".") + _few(open_tests)
+
+
+def _few(tests: Sequence[str]) -> str:
+    return f" Too few observations for: {numbers.words(tests)}." if tests else ""
+
+
+def on_topics(judged: pd.DataFrame, *topics: str) -> str:
+    """How many checks of some topics hold, and which do not, as Markdown.
+
+    Args:
+        judged: As ``judge`` returns it.
+        topics: Constants of this module.
+    """
+    rows = judged[judged["topic"].isin(topics)]
+    others = "".join(
+        f"; {verdict}: {numbers.words(tests)}"
+        for verdict in (REFUTED, INCONCLUSIVE)
+        if (tests := _tests(rows, verdict))
+    )
+    return f"**{len(_tests(rows, HOLDS))} of {len(rows)} checks hold**{others}."
+
+
+def _tests(judged: pd.DataFrame, verdict: str) -> list[str]:
+    """The names of the tests with a verdict."""
+    return judged.loc[judged["verdict"] == verdict, "test"].tolist()

@@ -1,10 +1,13 @@
 """A lone UAV that hovers within reach of a single node: the channel without anybody's choice.
 
 In a mission UAVs serve the node that they hear best, so what they collect is no fair sample of
-the channel. Here there is nothing to choose, and a communication slot is one draw of the rate.
+the channel. Here there is nothing to choose, and a communication slot is one draw of the rate::
+
+    means = simulate_rates(space, seed)  # by the batch engine
+    rates(space, means)  # beside the closed form
 """
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -15,14 +18,16 @@ from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View
 
+MISSIONS, SLOTS = 200, 100  # per distance, by the batch engine
+LONG = 5000  # mission slots of the mission by the SimPy engine
+
 _PLENTY = 1e9  # data units: more than anybody takes
-MISSIONS, SLOTS = 200, 100  # per distance
 
 
-class Still:
-    """Hovers, whatever happens."""
+class Hovering:
+    """A policy that hovers in every slot."""
 
-    name = "still"
+    name = "hovering"
 
     def act(self, view: View) -> np.ndarray:
         """(R,) hovering."""
@@ -32,52 +37,78 @@ class Still:
 def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
     """The channel of a scenario, with one UAV and one node ``dx, dy`` cells away.
 
-    The mission lasts that many slots: the battery does not decrease and the node never runs dry.
+    The mission lasts that many slots: the battery does not decrease, and the node is never empty.
     """
-    still: dict[str, Any] = {"uavs": 1, "flying_time": 100, "flight_cost": 0, "pads": None}
-    place: dict[str, Any] = {"zone": (0, 0, 1, 1), "nodes": ((dx, dy),)}
-    data: dict[str, Any] = {"initial_data": _PLENTY, "arrival_rate": 0.0}
-    quota = slots * space.communication_slots
-    return ScenarioSpace.of(space, **still, **place, **data, quota=quota, max_slots=slots)
+    return ScenarioSpace.of(
+        space,
+        uavs=1,
+        flying_time=100,
+        flight_cost=0,
+        pads=None,
+        zone=(0, 0, 1, 1),
+        nodes=((dx, dy),),
+        initial_data=_PLENTY,
+        arrival_rate=0.0,
+        quota=slots * space.communication_slots,
+        max_slots=slots,
+    )
 
 
 def offsets(space: ScenarioSpace) -> list[tuple[int, int]]:
-    """Where the node stands from the UAV [cells]: below it, ever farther off, across the grid."""
+    """Offsets of the node from the UAV [cells]: none, ever greater, and across the grid."""
     along = [0, *(2**k for k in range(8) if 2**k < space.grid)]
     return [*((d, 0) for d in along), (space.grid - 1, space.grid - 1)]
 
 
-def rates(space: ScenarioSpace, seed: int) -> pd.DataFrame:
-    """Mean rates by the batch engine at several distances, beside those of the closed form.
+def simulate_rates(space: ScenarioSpace, seed: int) -> list[float]:
+    """Mean rates at all offsets by the batch engine [data units per communication slot].
 
-    Every distance has replications of its own: otherwise all would meet the same shadowing.
+    Every offset has replications of its own: otherwise all would have the same shadowing.
+    """
+    means = []
+    for number, (dx, dy) in enumerate(offsets(space)):
+        replications = range(number * MISSIONS, (number + 1) * MISSIONS)
+        scenario = alone(space, dx, dy, SLOTS)
+        missions = simulate_batch(scenario, Hovering(), seed, replications).missions
+        means.append(float(missions["collected"].sum() / _draws(space)))
+    return means
+
+
+def simulate_slots(space: ScenarioSpace, seed: int, slots: int = LONG) -> list[float]:
+    """Data of every communication slot of a mission by the SimPy engine [data units]."""
+    scenario = alone(space, space.grid // 2, 0, slots)
+    log = simulate(scenario, Hovering(), seed, len(offsets(space)) * MISSIONS, events=True).events
+    assert log is not None
+    columns = log.columns()
+    return columns["value"][columns["event"] == "communication"].tolist()
+
+
+def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
+    """The rates of ``simulate_rates`` beside those of the closed form.
 
     Returns:
         A row per distance: ``distance`` [m], ``n`` communication slots, ``mean`` [data units per
         communication slot], ``known`` and ``error``, the closed form's mean and the standard error
         of a mean of n draws.
     """
-    rows = []
-    for number, (dx, dy) in enumerate(offsets(space)):
-        which = range(number * MISSIONS, (number + 1) * MISSIONS)
-        missions = simulate_batch(alone(space, dx, dy, SLOTS), Still(), seed, which).missions
-        n = MISSIONS * SLOTS * space.communication_slots
-        away = float(closed_forms.distance(space, dx, dy))
-        known, deviation = closed_forms.rate_moments(space, away)
-        rows.append((away, n, missions["collected"].sum() / n, known, deviation / np.sqrt(n)))
+    rows, n = [], _draws(space)
+    for (dx, dy), mean in zip(offsets(space), means, strict=True):
+        distance = float(closed_forms.distance(space, dx, dy))
+        known, deviation = closed_forms.rate_moments(space, distance)
+        rows.append((distance, n, mean, known, deviation / np.sqrt(n)))
     return pd.DataFrame(rows, columns=["distance", "n", "mean", "known", "error"])
 
 
-def deviates(space: ScenarioSpace, seed: int, slots: int = 5000) -> np.ndarray:
-    """Shadowing as told by the event log of the SimPy engine, in standard deviations.
+def deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
+    """Shadowing behind the data of ``simulate_slots``, in standard deviations.
 
-    What a communication slot carried gives its SNR (eq. 9), and that its shadowing (eq. 10).
+    The data of a communication slot give its SNR (eq. 9), and that its shadowing (eq. 10).
     """
-    here = alone(space, space.grid // 2, 0, slots)
-    log = simulate(here, Still(), seed, len(offsets(space)) * MISSIONS, events=True).events
-    assert log is not None
-    columns = log.columns()
-    collected = columns["value"][columns["event"] == "communication"]
-    away = closed_forms.distance(space, space.grid // 2, 0)
-    shadowing = closed_forms.snr_of(space, collected) - closed_forms.mean_snr(space, away)
-    return shadowing / np.sqrt(space.shadowing_variance)
+    distance = closed_forms.distance(space, space.grid // 2, 0)
+    snr = closed_forms.snr_of(space, np.array(collected))
+    return (snr - closed_forms.mean_snr(space, distance)) / np.sqrt(space.shadowing_variance)
+
+
+def _draws(space: ScenarioSpace) -> int:
+    """Communication slots per distance."""
+    return MISSIONS * SLOTS * space.communication_slots

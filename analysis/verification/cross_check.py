@@ -1,0 +1,129 @@
+"""Missions that only the page of the verification needs: simulated by a command, kept in a file.
+
+``dess cross-check`` simulates missions of the study ``verification`` again with the SimPy engine,
+and a lone UAV with both engines; pages read them, and simulate nothing::
+
+    missions = read("results/cross-check", results)
+    records.engine_check(results, missions)
+"""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from analysis.results.tables import Results
+from analysis.verification import lone_uav
+from dess import simulate
+from dess.errors import InputError
+from dess.files import replacing
+from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
+from dess.state import END_NAMES
+from policies import load_team
+
+FILE = "cross_check.json"
+MISSIONS = 50  # of every policy that are simulated again, spread over its replications
+
+# Called with the steps done and the steps in all.
+Progress = Callable[[int, int], None]
+Fields = dict[str, Any]
+
+
+class CrossCheck(BaseModel):
+    """Missions beside those of a study.
+
+    Attributes:
+        study: The key of the study, a hash of all that its records depend on.
+        missions: Records by the SimPy engine, each with its ``policy``.
+        uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
+        rates: As ``lone_uav.simulate_rates`` returns them.
+        slots: As ``lone_uav.simulate_slots`` returns them.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    study: str
+    missions: list[Fields]
+    uavs: list[Fields]
+    rates: list[float]
+    slots: list[float]
+
+
+def simulate_missions(
+    results: Results, count: int = MISSIONS, progress: Progress | None = None
+) -> CrossCheck:
+    """Simulate the missions.
+
+    Args:
+        results: Of the study.
+        count: Missions of every policy to simulate again; all, if there are fewer.
+        progress: Called after every mission.
+    """
+    space, seed = results.scenario(), results.store.manifest.seed
+    teams = {policy: load_team(policy) for policy in results.policies}
+    missions, uavs, chosen = [], [], [*_chosen(results, count)]
+    for done, (policy, replication) in enumerate(chosen, 1):
+        record = simulate(space, teams[policy], seed, replication)
+        fields = {name: record.metrics[name].item() for name in MISSION_RECORD.names or ()}
+        missions.append({"policy": policy, **fields})
+        uavs += [{"policy": policy, "replication": replication, **uav} for uav in _uavs(record)]
+        if progress:
+            progress(done, len(chosen))
+    return CrossCheck(
+        study=results.store.manifest.key,
+        missions=missions,
+        uavs=uavs,
+        rates=lone_uav.simulate_rates(space, seed),
+        slots=lone_uav.simulate_slots(space, seed),
+    )
+
+
+def _chosen(results: Results, count: int) -> Iterator[tuple[str, int]]:
+    """Policies and replications of missions of the first design point."""
+    missions = results.missions[results.missions["point"] == 0]
+    for policy in results.policies:
+        replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
+        rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
+        yield from ((policy, int(replication)) for replication in replications[rows])
+
+
+def _uavs(record: MissionRecord) -> Iterator[Fields]:
+    for number, uav in enumerate(record.uavs):
+        fields = {name: uav[name].item() for name in UAV_RECORD.names or ()}
+        yield {"uav": number, **fields, "end": END_NAMES[uav["end"]]}
+
+
+def write(missions: CrossCheck, folder: str | Path) -> Path:
+    """Write missions into a folder, in place of those that it holds; returns the file.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    path = Path(folder) / FILE
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_text(missions.model_dump_json(indent=1), "utf-8")
+    return path
+
+
+def read(folder: str | Path, results: Results) -> CrossCheck:
+    """Read the missions in a folder.
+
+    Args:
+        folder: The folder that ``write`` was called with.
+        results: Of the study that the missions must belong to.
+
+    Raises:
+        InputError: If there are none, or they are damaged or of other results.
+    """
+    path = Path(folder) / FILE
+    allowed = "allowed: what is made by: dess cross-check"
+    try:
+        missions = CrossCheck.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError):
+        raise InputError(f"{path}: missing or damaged; {allowed}") from None
+    if missions.study != results.store.manifest.key:
+        raise InputError(f"{path}: of other results than those of the study; {allowed}")
+    return missions

@@ -1,0 +1,91 @@
+"""Observed numbers against those that a distribution lets expect, by the chi-square test."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+LEAST = 5.0  # expected observations of a class, for the chi-square distribution to be good
+
+
+class Fit(NamedTuple):
+    """Observed against expected numbers.
+
+    Attributes:
+        table: A row per class: ``label``, ``observed``, ``expected``.
+        p: Of the chi-square test; none if there are too few observations for two classes.
+    """
+
+    table: pd.DataFrame
+    p: float | None
+
+    @property
+    def n(self) -> int:
+        """Number of observations."""
+        return int(self.table["observed"].sum())
+
+    @property
+    def shares(self) -> str:
+        """The shares of the first classes, observed and expected, as far as a line holds them."""
+        if not self.n:
+            return ""
+        rows, percent = self.table.head(3), 100 / self.n
+        observed = ", ".join(f"{r.label}: {percent * r.observed:.2f} %" for r in rows.itertuples())
+        expected = " / ".join(f"{percent * number:.2f}" for number in rows["expected"])
+        return f"{observed}; expected {expected} %"
+
+    @property
+    def range(self) -> str:
+        """How often the rarest and the most frequent class were observed."""
+        counts = self.table["observed"]
+        return f"each {counts.min():,} to {counts.max():,} times"
+
+
+def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
+    """Counts against a Poisson distribution; rare counts are pooled at either end.
+
+    Args:
+        counts: Numbers of any shape.
+        mean: Of the distribution, above 0.
+    """
+    n, law = counts.size, stats.poisson(mean)
+    numbers = np.arange(int(law.ppf(1 - 1e-12)) + 1)
+    frequent = numbers[n * law.pmf(numbers) >= LEAST]
+    if not len(frequent):
+        return _fit(["0 or more"], np.array([n]), np.array([float(n)]))
+    low, high = int(frequent[0]), int(frequent[-1])
+    low -= n * law.cdf(low - 1) >= LEAST
+    high += n * law.sf(high) >= LEAST
+    classes = np.arange(low, high + 1)
+    observed = np.bincount(np.clip(counts, low, high).ravel() - low, minlength=len(classes))
+    below = law.cdf(classes)
+    below[-1] = 1.0
+    labels = [*map(str, classes)]
+    labels[0] += " or less" if low > 0 else ""
+    labels[-1] += " or more"
+    return _fit(labels, observed, n * np.diff(below, prepend=0.0))
+
+
+def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
+    """Integers against the uniform distribution on ``low..high``, ends included.
+
+    A value outside has probability 0, so has the fit then.
+    """
+    classes = np.arange(low, high + 1)
+    observed = (np.asarray(values)[:, None] == classes).sum(0)
+    fit = _fit([*map(str, classes)], observed, np.full(len(classes), len(values) / len(classes)))
+    return fit if fit.n == len(values) else fit._replace(p=0.0)
+
+
+def chi_square(observed: np.ndarray, expected: np.ndarray, freedom: int) -> float:
+    """The p-value of numbers against those expected, by Pearson's chi-square statistic."""
+    return float(stats.chi2.sf(((observed - expected) ** 2 / expected).sum(), freedom))
+
+
+def _fit(labels: Sequence[str], observed: np.ndarray, expected: np.ndarray) -> Fit:
+    table = pd.DataFrame({"label": labels, "observed": observed, "expected": expected})
+    if len(table) < 2 or expected.min() < LEAST:
+        return Fit(table, None)
+    return Fit(table, chi_square(observed, expected, len(table) - 1))

@@ -1,0 +1,141 @@
+"""All checks of the page of the verification, on the results that they compare::
+
+suite = Suite.load("results")
+table = judge(suite.checks(block=100))
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pandas as pd
+
+from analysis.names import METRICS, SUCCESS
+from analysis.numbers import words
+from analysis.questions.summary import best_policy
+from analysis.results.tables import Results, load_results
+from analysis.verification import budgets, channel, coverage, cross_check, draws, lone_uav, records
+from analysis.verification import logs as event_logs
+from analysis.verification.checks import Check
+from analysis.verification.cross_check import CrossCheck
+from analysis.verification.logs import Log
+from dess.scenario import ScenarioSpace
+
+STUDY, CROSS_CHECK = "verification", "cross-check"
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Results of the study of the verification, and of all studies beside it.
+
+    Attributes:
+        study: The study of the verification.
+        others: The other studies, by their names.
+        damaged: The names of the studies that cannot be loaded.
+        again: Missions that ``dess cross-check`` has simulated.
+    """
+
+    study: Results
+    others: dict[str, Results]
+    damaged: list[str]
+    again: CrossCheck
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Self:
+        """Load a folder that holds a results folder per study.
+
+        Raises:
+            InputError: If the study or its cross-check is missing or damaged.
+        """
+        study = load_results(Path(folder) / STUDY)
+        again = cross_check.read(Path(folder) / CROSS_CHECK, study)
+        return cls(study, *budgets.studies_in(Path(folder), but=STUDY), again)
+
+    @property
+    def studies(self) -> dict[str, Results]:
+        """All studies that could be loaded, by their names."""
+        return {STUDY: self.study, **self.others}
+
+    @property
+    def names(self) -> str:
+        """The studies in words, those that cannot be loaded too."""
+        unread = f" (not read, incomplete or of other code: {words(self.damaged)})"
+        return words([f"`{name}`" for name in self.studies]) + (unread if self.damaged else "")
+
+    @cached_property
+    def space(self) -> ScenarioSpace:
+        """The scenario of the study."""
+        return self.study.scenario()
+
+    @cached_property
+    def logs(self) -> list[Log]:
+        """All missions with an event log."""
+        return event_logs.logs_of(self.study)
+
+    @cached_property
+    def realisations(self) -> list[Log]:
+        """A mission with an event log per replication, since policies share what is drawn."""
+        return event_logs.longest(self.logs)
+
+    @cached_property
+    def missions(self) -> pd.DataFrame:
+        """The missions of one policy, since policies share what is drawn."""
+        return self._missions_of(self.study.policies[0])
+
+    @cached_property
+    def best(self) -> str:
+        """The policy whose intervals are checked."""
+        return best_policy(self.study.missions)
+
+    @cached_property
+    def arrivals(self) -> np.ndarray:
+        """(T, K) data units that arrived in all realisations, by mission slot and node."""
+        return event_logs.arrivals(self.realisations, self.space)
+
+    @cached_property
+    def rates(self) -> pd.DataFrame:
+        """The rates of a lone UAV, as ``lone_uav.rates`` returns them."""
+        return lone_uav.rates(self.space, self.again.rates)
+
+    def values(self, metric: str) -> np.ndarray:
+        """(n,) a metric of the missions of the best policy."""
+        return self._missions_of(self.best)[metric].to_numpy()
+
+    def blocks(self, metric: str, size: int) -> pd.DataFrame:
+        """Intervals of blocks of missions, as ``coverage.blocks`` returns them."""
+        return coverage.blocks(self.values(metric), size, metric == SUCCESS)
+
+    def _missions_of(self, policy: str) -> pd.DataFrame:
+        missions = self.study.missions
+        return missions[(missions["policy"] == policy) & (missions["point"] == 0)]
+
+    def checks(self, block: int) -> list[Check]:
+        """All checks.
+
+        Args:
+            block: Missions of a block whose interval is compared with the mean of all missions.
+        """
+        space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
+        initial = event_logs.initial_data(self.realisations, space)
+        return [
+            *draws.arrival_checks(self.arrivals, space.arrival_rate),
+            draws.arrived_check(self.missions, space),
+            channel.rate_check(self.rates),
+            *channel.shadowing_checks(lone_uav.deviates(space, self.again.slots)),
+            *channel.communication_checks(logs, seed),
+            budgets.conservation_check(self.studies),
+            budgets.balance_check(logs),
+            budgets.battery_check(logs),
+            records.record_check(logs),
+            *records.realisation_checks(self.study, logs),
+            records.engine_check(self.study, self.again),
+            *draws.parameter_checks(self.missions, space),
+            *draws.initial_checks(initial, self.missions["initial"].to_numpy(), space),
+            draws.start_check(event_logs.start_cells(self.realisations), space),
+            *(
+                coverage.coverage_check(name, self.values(metric), block, metric == SUCCESS)
+                for metric, name in METRICS.items()
+            ),
+        ]
