@@ -9,7 +9,8 @@ from scipy import stats
 
 from analysis.figures import verification as drawings
 from analysis.figures.verification import MISS, SEEN
-from analysis.verification import chance, closed_forms, lone_uav
+from analysis.verification import closed_forms, coverage, lone_uav
+from analysis.verification.fits import Fit
 from dess import load_scenario
 
 SPACE = load_scenario("paper")
@@ -32,7 +33,7 @@ def dots(figure: Figure, panel: int, colour: str | None = None) -> np.ndarray:
 
 
 def test_a_fit_shows_both_numbers_and_their_difference() -> None:
-    figure = drawings.fit(chance.Fit(TABLE, 0.1), "Title", "units")
+    figure = drawings.fit(Fit(TABLE, 0.1), "Title", "units")
     bars = [bar.get_height() for bar in figure.axes[0].patches]
     assert bars == TABLE["expected"].tolist()
     assert dots(figure, 0)[:, 1].tolist() == TABLE["observed"].tolist()
@@ -44,16 +45,23 @@ def test_a_fit_shows_both_numbers_and_their_difference() -> None:
 
 
 def test_classes_that_are_far_off_are_marked() -> None:
-    figure = drawings.fit(chance.Fit(TABLE, 0.1), "Title", "units", logarithmic=True)
+    figure = drawings.fit(Fit(TABLE, 0.1), "Title", "units")
     assert dots(figure, 1, MISS)[:, 0].tolist() == [2]
     assert dots(figure, 1, SEEN)[:, 0].tolist() == [0, 1]
     low, high = figure.axes[1].get_ylim()
     assert low < dots(figure, 1)[:, 1].min() and high > dots(figure, 1)[:, 1].max()
-    assert figure.axes[0].get_yscale() == "log"
+
+
+def test_numbers_over_powers_of_ten_have_a_logarithmic_axis() -> None:
+    scales = [
+        drawings.fit(Fit(table, 0.1), "Title", "units").axes[0].get_yscale()
+        for table in (TABLE, TABLE.assign(expected=[980.0, 15.0, 5.0]))
+    ]
+    assert scales == ["linear", "log"]
 
 
 def test_rates_stand_beside_their_curve() -> None:
-    table = lone_uav.rates(SPACE, 3)
+    table = lone_uav.rates(SPACE, lone_uav.simulate_rates(SPACE, 3))
     figure = drawings.rates(table, SPACE)
     assert dots(figure, 0) == pytest.approx(table[["distance", "mean"]].to_numpy())
     (curve,) = figure.axes[0].lines
@@ -74,19 +82,21 @@ def test_totals_are_bars_below_their_density() -> None:
 
 def test_blocks_that_miss_the_mean_are_marked() -> None:
     values = np.random.default_rng(2).normal(size=900)
-    blocks = chance.blocks(values, 10, share=False)
-    figure = drawings.caterpillar(blocks, values.mean(), "Title")
-    own = blocks.head(drawings.SHOWN)
-    missing = own.index[~own["holds"]] + 1
+    blocks = coverage.blocks(values, 10, share=False)
+    figure = drawings.caterpillar(blocks, "Title")
+    shown = blocks.head(drawings.SHOWN)
+    missing = shown.index[~shown["holds"]] + 1
     assert len(missing) > 0
     assert dots(figure, 0, MISS)[:, 0].tolist() == missing.tolist()
-    assert len(dots(figure, 0, SEEN)) == len(own) - len(missing)
-    assert dots(figure, 0, MISS)[:, 1] == pytest.approx(own.loc[~own["holds"], "mean"].to_numpy())
+    assert len(dots(figure, 0, SEEN)) == len(shown) - len(missing)
+    assert dots(figure, 0, MISS)[:, 1] == pytest.approx(
+        shown.loc[~shown["holds"], "mean"].to_numpy()
+    )
 
 
 def test_blocks_that_all_hold_it_are_drawn_too() -> None:
-    blocks = chance.blocks(np.ones(40), 10, share=True)
-    figure = drawings.caterpillar(blocks, 1.0, "Title")
+    blocks = coverage.blocks(np.ones(40), 10, share=True)
+    figure = drawings.caterpillar(blocks, "Title")
     assert len(dots(figure, 0)) == 4
 
 

@@ -1,7 +1,9 @@
 """Verdicts follow from p-values, corrected together, and from errors and their bounds."""
 
+import pytest
+
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
-from analysis.verification.checks import ALPHA, Check, judge
+from analysis.verification.checks import ALPHA, Check, as_text, judge, on_topics, overall
 
 
 def check(**values: float) -> Check:
@@ -28,3 +30,47 @@ def test_exact_checks_and_open_ones_do_not_count_for_the_correction() -> None:
 def test_a_page_without_chance_is_judged_too() -> None:
     assert judge([check(error=0.0), check()])["verdict"].tolist() == [HOLDS, INCONCLUSIVE]
     assert judge([check()])["verdict"].tolist() == [INCONCLUSIVE]
+
+
+def test_an_estimate_of_a_normal_variable_by_hand() -> None:
+    made = Check.normal("topic", "test", 1, 3.0, 1.0, 10, digits=2)
+    assert (made.known, made.seen) == ("1", "3.00 [1.04, 4.96]")
+    assert made.p == pytest.approx(0.0455, abs=1e-4)  # two standard errors
+
+
+def test_an_exact_check_without_cases_is_inconclusive() -> None:
+    assert Check.counted("topic", "test", "known", 0, 0).error is None
+    assert Check.counted("topic", "test", "known", 0, 7).seen == "always"
+    assert Check.counted("topic", "test", "known", 2, 7)[3:7] == ("otherwise 2 times", 7, None, 2)
+
+
+def named(name: str, topic: str = "one", **values: float) -> Check:
+    return Check(topic, name, "known", "seen", 1000, **values)
+
+
+def test_the_words_of_checks_that_all_hold() -> None:
+    table = judge([named("a", error=0.0), named("b", topic="two", p=0.5)])
+    assert overall(table) == "**2 of 2 checks hold**."
+    assert on_topics(table, "two") == "**1 of 1 checks hold**."
+
+
+def test_the_words_name_checks_that_do_not_hold_or_are_inconclusive() -> None:
+    table = judge([named("a", error=0.0), named("b", error=1.0), named("c", "two"), named("d")])
+    few = " Too few observations for: c and d."
+    assert overall(table) == f"**1 of 4 checks do not hold**: b.{few}"
+    assert overall(table[table["test"] != "b"]) == (
+        f"**1 of 3 checks hold**; the others are inconclusive.{few}"
+    )
+    assert on_topics(table, "one") == ("**1 of 3 checks hold**; does not hold: b; inconclusive: d.")
+
+
+def test_a_row_of_the_table_gives_the_reason_of_its_verdict() -> None:
+    checks = [named("a", error=0.0), named("b", error=2e-16, bound=1e-9), named("c", p=0.0004)]
+    table = as_text(judge([*checks, named("d")]))
+    assert table["p-value or error"].tolist() == [
+        "error 0",
+        "error 2e-16, allowed 1e-09",
+        "p < 0.001, Holm < 0.001",
+        "",
+    ]
+    assert table["n"].tolist() == ["1,000"] * 4

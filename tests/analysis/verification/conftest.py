@@ -1,0 +1,32 @@
+"""A small study with event logs, for the checks of logs and records."""
+
+from typing import Any
+
+import pytest
+
+from analysis import run_study
+from analysis.results.tables import Results
+from analysis.verification import cross_check
+from analysis.verification import logs as event_logs
+from analysis.verification.cross_check import CrossCheck
+from analysis.verification.logs import Log
+from tests.analysis.small import small_study
+
+# Two groups of communication slots, a queue for one pad, all nodes emptied now and then.
+CHANGES: dict[str, Any] = {"communication_slots": 6, "pads": 1, "initial_data": [0, 2], "quota": 90}
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("results")
+    return run_study(small_study(folder, logged=8, set=CHANGES), folder / "out")
+
+
+@pytest.fixture(scope="session")
+def logs(results: Results) -> list[Log]:
+    return event_logs.logs_of(results)
+
+
+@pytest.fixture(scope="session")
+def again(results: Results) -> CrossCheck:
+    return cross_check.simulate_missions(results, 3)

@@ -1,0 +1,175 @@
+"""Draws from the distributions of the scenario hold; draws from others do not."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.verification import draws
+from dess import load_scenario
+from dess.scenario import SAMPLED
+from tests.analysis.verification.verdicts import failing
+
+SPACE = load_scenario("paper")
+
+RATE = SPACE.arrival_rate
+
+NODES = len(SPACE.nodes)
+
+
+def poisson(rate: float = RATE, slots: int = 8000, seed: int = 1) -> np.ndarray:
+    return np.random.default_rng(seed).poisson(rate, (slots, NODES))
+
+
+def test_poisson_arrivals_hold() -> None:
+    assert not failing(draws.arrival_checks(poisson(), RATE))
+
+
+def test_arrivals_of_another_rate_do_not() -> None:
+    found = failing(draws.arrival_checks(poisson(1.2 * RATE), RATE))
+    assert {
+        "Counts per node and slot: chi-square",
+        f"Rates of the {NODES} nodes: chi-square",
+    } <= found
+
+
+def test_packets_that_come_in_pairs_are_overdispersed() -> None:
+    found = failing(draws.arrival_checks(2 * poisson(RATE / 2), RATE))
+    assert "Index of dispersion per slot" in found
+
+
+def test_arrivals_that_are_too_even_are_found_out() -> None:
+    even = np.zeros((8000, NODES), int)
+    even[np.arange(8000) % 2 == 0, 0] = 1  # as many as lambda says, one every other slot
+    assert "Index of dispersion per slot" in failing(draws.arrival_checks(even, RATE))
+
+
+def test_nodes_that_depend_on_each_other_are_found_out() -> None:
+    together = poisson()
+    together[:, 1::2] = together[:, 0:-1:2]
+    found = failing(draws.arrival_checks(together, RATE))
+    assert "Counts per slot, all nodes: chi-square" in found
+
+
+def test_slots_that_depend_on_each_other_are_found_out() -> None:
+    lasting = np.repeat(poisson(slots=4000), 2, axis=0)
+    found = failing(draws.arrival_checks(lasting, RATE))
+    assert {
+        "Correlation of a slot and the next",
+        "Counts per node and 50 slots: chi-square",
+    } <= found
+
+
+def test_a_node_of_another_rate_is_found_out() -> None:
+    counts = poisson()
+    counts[:, 3] = np.random.default_rng(5).poisson(2 * RATE, 8000)
+    assert f"Rates of the {NODES} nodes: chi-square" in failing(draws.arrival_checks(counts, RATE))
+
+
+def test_few_arrivals_tell_nothing_and_none_at_all_neither() -> None:
+    for slots in (0, 3):
+        checks = draws.arrival_checks(poisson(slots=slots), RATE)
+        assert {check.p for check in checks} == {None}
+        assert all(check.error is None for check in checks)
+
+
+def test_without_arrivals_a_single_one_is_wrong() -> None:
+    counts = np.zeros((50, NODES), int)
+    assert not failing(draws.arrival_checks(counts, 0.0))
+    counts[7, 2] = 1
+    assert failing(draws.arrival_checks(counts, 0.0))
+
+
+def test_the_chance_of_a_false_alarm_is_what_the_p_values_say() -> None:
+    p = np.array(
+        [
+            [check.p for check in draws.arrival_checks(poisson(slots=1000, seed=seed), RATE)]
+            for seed in range(150)
+        ]
+    )
+    for share in (0.05, 0.5):
+        low, high = stats.binom(len(p), share).ppf([0.0005, 0.9995]) / len(p)
+        assert ((p <= share).mean(0) >= low - 0.02).all()
+        assert ((p <= share).mean(0) <= high + 0.02).all()
+
+
+def test_the_arrivals_of_all_missions_are_held_to_how_long_they_last() -> None:
+    slots = np.full(400, 100)
+    arrived = np.random.default_rng(4).poisson(RATE * NODES * 100, 400)
+    missions = pd.DataFrame({"slots": slots, "arrived": arrived})
+    assert not failing([draws.arrived_check(missions, SPACE)])
+    assert failing([draws.arrived_check(missions.assign(slots=105), SPACE)])
+
+
+def drawn(**ranges: Any) -> pd.DataFrame:
+    generator = np.random.default_rng(8)
+    ends = {field: ranges.get(field, getattr(SPACE, field)) for field in SAMPLED}
+    columns = {f: generator.integers(low, high + 1, 5000) for f, (low, high) in ends.items()}
+    return pd.DataFrame(columns)
+
+
+def test_uniform_parameters_hold() -> None:
+    assert not failing(draws.parameter_checks(drawn(), SPACE))
+
+
+@pytest.mark.parametrize(
+    "missions",
+    [
+        drawn(uavs=(1, 2)),
+        drawn(flying_time=(70, 79)),
+        drawn(charge_start=(10, 51)),
+        drawn(charge_complete=(59, 100)),
+    ],
+    ids=SAMPLED,
+)
+def test_parameters_of_other_ranges_do_not(missions: pd.DataFrame) -> None:
+    assert len(failing(draws.parameter_checks(missions, SPACE))) == 1
+
+
+def test_a_single_value_outside_its_range_is_wrong() -> None:
+    missions = drawn()
+    missions.loc[17, "flying_time"] = 81
+    assert failing(draws.parameter_checks(missions, SPACE))
+
+
+def test_parameters_that_depend_on_each_other_are_found_out() -> None:
+    missions = drawn()
+    missions["charge_complete"] = 60 + (missions["charge_start"] - 10)
+    assert failing(draws.parameter_checks(missions, SPACE)) == {
+        "Correlations of all pairs: chi-square"
+    }
+
+
+def test_fixed_parameters_are_not_tested() -> None:
+    fixed = load_scenario("fig4", uavs=2)
+    assert not draws.parameter_checks(drawn(), fixed)
+
+
+def test_initial_data_hold_and_others_do_not() -> None:
+    starts = np.random.default_rng(9).uniform(5, 20, (3000, NODES))
+    assert not failing(draws.initial_checks(starts, starts.sum(1), SPACE))
+    narrow = 12.5 + 0.8 * (starts - 12.5)
+    assert len(failing(draws.initial_checks(narrow, narrow.sum(1), SPACE))) == 2
+
+
+def test_fixed_initial_data_are_exact() -> None:
+    fixed = load_scenario("paper", initial_data=12.5)
+    starts = np.full((4, NODES), 12.5)
+    assert not failing(draws.initial_checks(starts, starts.sum(1), fixed))
+    starts[2, 3] = 12.6
+    assert failing(draws.initial_checks(starts, starts.sum(1), fixed))
+
+
+def test_start_cells_are_uniform_over_the_zone() -> None:
+    generator = np.random.default_rng(10)
+    x, y, width, height = SPACE.zone
+    cells = np.stack(
+        [generator.integers(x, x + width, 400), generator.integers(y, y + height, 400)]
+    )
+    assert not failing([draws.start_check(cells.T, SPACE)])
+    assert failing([draws.start_check(np.full((400, 2), [x, y]), SPACE)])
+    beside = cells.T.copy()
+    beside[0] = [x + width, y]
+    assert failing([draws.start_check(beside, SPACE)])

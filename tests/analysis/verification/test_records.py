@@ -1,0 +1,98 @@
+"""Records agree with logs and with the other engine; whatever is changed in them is noticed."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis import run_study
+from analysis.results.tables import Results
+from analysis.verification import budgets, channel, records
+from analysis.verification import logs as event_logs
+from analysis.verification.cross_check import CrossCheck
+from analysis.verification.logs import Log
+from tests.analysis.small import small_study
+from tests.analysis.verification.changes import altered, with_records
+from tests.analysis.verification.verdicts import fails
+
+
+def test_what_the_simulator_leaves_passes(
+    results: Results, logs: list[Log], again: CrossCheck
+) -> None:
+    seed = results.manifest["seed"]
+    checks = [
+        *channel.communication_checks(logs, seed),
+        budgets.conservation_check({"trial": results}),
+        budgets.balance_check(logs),
+        budgets.battery_check(logs),
+        records.record_check(logs),
+        *records.realisation_checks(results, logs),
+        records.engine_check(results, again),
+    ]
+    assert not any(map(fails, checks))
+    assert all(check.n > 0 for check in checks)
+
+
+def test_an_arrival_that_is_lost_is_noticed(results: Results, logs: list[Log]) -> None:
+    longest = event_logs.longest(logs)
+    log = next(log for log in logs if log not in longest and log.arrivals.any())
+    row = log.events.index[log.events["event"] == "arrival"][0]
+    lossy = replace(log, events=log.events.drop(index=row))
+    changed = [lossy if other is log else other for other in logs]
+    assert fails(budgets.balance_check(changed))
+    assert fails(records.record_check(changed))
+    assert fails(records.realisation_checks(results, changed)[1])
+
+
+@pytest.mark.parametrize("name", ["slots", "uav_slots", "arrived", "initial", "collected"])
+def test_a_record_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], name: str) -> None:
+    mission = logs[0].mission.copy()
+    mission[name] += 1
+    assert fails(records.record_check([replace(logs[0], mission=mission), *logs[1:]]))
+
+
+@pytest.mark.parametrize("name", ["quota", "battery", "slots_charging", "collected"])
+def test_a_uav_that_its_log_does_not_add_up_to_is_noticed(logs: list[Log], name: str) -> None:
+    uavs = logs[0].uavs.assign(**{name: logs[0].uavs[name] + 1})
+    assert fails(records.record_check([replace(logs[0], uavs=uavs), *logs[1:]]))
+
+
+@pytest.mark.parametrize("name", ["initial", "flying_time"])
+def test_policies_that_meet_different_missions_are_noticed(
+    results: Results, logs: list[Log], name: str
+) -> None:
+    parameters, arrivals = records.realisation_checks(
+        with_records(results, 0, **{name: lambda value: value + 1}), logs
+    )
+    assert fails(parameters) and not fails(arrivals)
+
+
+def test_a_uav_that_starts_elsewhere_is_noticed(results: Results, logs: list[Log]) -> None:
+    changed = altered(logs, "mission_start", 0, x=lambda x: x - 1)
+    assert fails(records.realisation_checks(results, changed)[1])
+
+
+def test_a_single_policy_shares_its_realisations_with_none(
+    results: Results, tmp_path: Path
+) -> None:
+    alone = run_study(small_study(tmp_path, policies=["greedy"], missions=3), tmp_path / "out")
+    assert not records.realisation_checks(alone, [])
+
+
+@pytest.mark.parametrize("name", ["collected", "reward", "residual"])
+def test_a_record_that_is_off_by_its_last_bit_is_noticed(
+    results: Results, again: CrossCheck, name: str
+) -> None:
+    changed = with_records(results, 0, **{name: lambda value: np.nextafter(value, np.inf)})
+    check = records.engine_check(changed, again)
+    assert (check.n, check.error) == (6, 1)
+    assert check.seen == "5 of 6 missions"
+
+
+def test_a_uav_that_the_other_engine_does_not_leave_is_noticed(
+    results: Results, again: CrossCheck
+) -> None:
+    uavs = results.uavs.copy()
+    uavs.loc[0, "battery"] += 1
+    assert records.engine_check(replace(results, uavs=uavs), again).error == 1
