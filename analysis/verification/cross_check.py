@@ -3,7 +3,7 @@
 ``dess cross-check`` simulates missions of the study ``verification`` again with the SimPy engine,
 and a lone UAV with both engines; pages read them, and simulate nothing::
 
-    missions = read("results/cross-check", results)
+    missions = read("results", results)
     records.engine_check(results, missions)
 """
 
@@ -18,12 +18,13 @@ from analysis.results.tables import Results
 from analysis.verification import lone_uav
 from dess import simulate
 from dess.errors import InputError
-from dess.files import replacing
+from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.state import END_NAMES
 from policies import load_team
 
-FILE = "cross_check.json"
+STUDY = "verification"
+FILE = Path("cross-check/missions.json")  # in the folder of all results
 MISSIONS = 50  # of every policy that are simulated again, spread over its replications
 
 # Called with the steps done and the steps in all.
@@ -96,23 +97,28 @@ def _uavs(record: MissionRecord) -> Iterator[Fields]:
 
 
 def write(missions: CrossCheck, folder: str | Path) -> Path:
-    """Write missions into a folder, in place of those that it holds; returns the file.
+    """Write missions, in place of earlier ones; returns the file.
+
+    Args:
+        missions: The missions.
+        folder: Holds a results folder per study.
 
     Raises:
         InputError: If it cannot be written.
     """
     path = Path(folder) / FILE
-    path.parent.mkdir(parents=True, exist_ok=True)
+    with writable(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:
         temporary.write_text(missions.model_dump_json(indent=1), "utf-8")
     return path
 
 
 def read(folder: str | Path, results: Results) -> CrossCheck:
-    """Read the missions in a folder.
+    """Read missions.
 
     Args:
-        folder: The folder that ``write`` was called with.
+        folder: Holds a results folder per study.
         results: Of the study that the missions must belong to.
 
     Raises:

@@ -19,11 +19,9 @@ from analysis.results.tables import Results, load_results
 from analysis.verification import budgets, channel, coverage, cross_check, draws, lone_uav, records
 from analysis.verification import logs as event_logs
 from analysis.verification.checks import Check
-from analysis.verification.cross_check import CrossCheck
+from analysis.verification.cross_check import STUDY, CrossCheck
 from analysis.verification.logs import Log
 from dess.scenario import ScenarioSpace
-
-STUDY, CROSS_CHECK = "verification", "cross-check"
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Suite:
             InputError: If the study or its cross-check is missing or damaged.
         """
         study = load_results(Path(folder) / STUDY)
-        again = cross_check.read(Path(folder) / CROSS_CHECK, study)
+        again = cross_check.read(folder, study)
         return cls(study, *budgets.studies_in(Path(folder), but=STUDY), again)
 
     @property

@@ -12,6 +12,7 @@ import pytest
 
 from analysis import load_study, run_study
 from analysis.execution import decision_time as timing
+from analysis.verification import cross_check
 from reports.pages import html
 from reports.pages.notebook import read
 from reports.player import library
@@ -45,9 +46,14 @@ STUDIES: dict[str, dict[str, Any]] = {
 
 
 def run_small_studies(folder: Path, *names: str) -> Path:
-    """Run the studies, all or some, each into a folder of its name; with all, a timing."""
+    """Run the studies, all or some, each into a folder of its name; with all, a timing.
+
+    Beside the study verification stand the missions of its cross-check.
+    """
     for name in names or STUDIES:
-        run_study(load_study(name, **STUDIES[name]), folder / name)
+        study = run_study(load_study(name, **STUDIES[name]), folder / name)
+        if name == cross_check.STUDY:
+            cross_check.write(cross_check.simulate_missions(study, 2), folder)
     if not names:
         timing.write(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
     return folder

@@ -43,6 +43,7 @@ def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="missing or damaged.*dess cross-check"):
         cross_check.read(tmp_path, results)
+    (tmp_path / FILE).parent.mkdir()
     (tmp_path / FILE).write_text("{")
     with pytest.raises(InputError, match="missing or damaged"):
         cross_check.read(tmp_path, results)
