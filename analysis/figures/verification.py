@@ -82,8 +82,14 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     return figure
 
 
-def totals(values: np.ndarray, law: Any, title: str, label: str) -> Figure:
-    """How values are distributed, and the density that they are said to have."""
+def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
+    """The initial data of missions, and the density of the sum over their nodes.
+
+    Args:
+        values: (n,) initial data of missions [data units].
+        space: The scenario, with a range of initial data.
+    """
+    law = closed_forms.initial_total(space)
     with style():
         figure, ax = panels(3.4)
         bins = int(np.clip(np.sqrt(len(values)), 8, 50))
@@ -91,7 +97,8 @@ def totals(values: np.ndarray, law: Any, title: str, label: str) -> Figure:
         reach = law.mean() + 3 * law.std() * np.array([-1, 1])
         spots = np.linspace(min(values.min(), reach[0]), max(values.max(), reach[1]), 120)
         ax.plot(spots, law.pdf(spots), color=SEEN, linewidth=1.8, label="known density")
-        ax.set(title=title, xlabel=label, ylabel="density")
+        ax.set(title="Initial data of a mission", ylabel="density")
+        ax.set_xlabel("data units, all nodes together")
         ax.yaxis.set_major_locator(MaxNLocator(nbins=5))
         sns.despine(ax=ax)
         legend_below(figure, ax, 2)

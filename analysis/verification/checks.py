@@ -22,6 +22,7 @@ from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 ARRIVALS, CHANNEL, DRAWS, COVERAGE = "Arrivals", "Channel", "Draws", "Intervals"
 CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
 REALISATIONS, ENGINES = "Realisations", "Engines"
+BOOKKEEPING = (CONSERVATION, ENERGY, RECORDS, REALISATIONS, ENGINES)
 
 # The chance that any check of chance fails although all that is known holds.
 ALPHA = 0.01
@@ -147,17 +148,18 @@ def overall(judged: pd.DataFrame) -> str:
         judged: As ``judge`` returns it.
     """
     refuted, open_tests = (_tests(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE))
+    n, exact, chance = len(judged), judged["error"].count(), judged["p"].count()
     if refuted:
-        names = numbers.words(refuted)
-        return f"**{len(refuted)} of {len(judged)} checks do not hold**: {names}." + _few(
-            open_tests
-        )
-    holding = f"**{len(_tests(judged, HOLDS))} of {len(judged)} checks hold**"
-    return holding + ("; the others are inconclusive." if open_tests else ".") + _few(open_tests)
-
-
-def _few(tests: Sequence[str]) -> str:
-    return f" Too few observations for: {numbers.words(tests)}." if tests else ""
+        verdict = f"**{len(refuted)} of {n} checks do not hold**: {numbers.words(refuted)}."
+    else:
+        others = "; the others are inconclusive." if open_tests else "."
+        verdict = f"**{len(_tests(judged, HOLDS))} of {n} checks hold**{others}"
+    few = f" Too few observations for: {numbers.words(open_tests)}." if open_tests else ""
+    return (
+        f"{verdict}{few} {exact} are exact. {chance} are of chance, judged at "
+        f"{numbers.level(ALPHA)}: if all is as it should be, any of them fails for at most one seed "
+        f"in {1 / ALPHA:.0f}."
+    )
 
 
 def on_topics(judged: pd.DataFrame, *topics: str) -> str:

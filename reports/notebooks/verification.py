@@ -20,14 +20,13 @@ results = "../../results"  # folder of the results folder verification and of th
 block = 100  # missions of a block, whose interval is to hold the mean of all
 
 # %%
-import numpy as np
 from IPython.display import Markdown, display
 
 from analysis import numbers
 from analysis.figures import verification as drawings
 from analysis.names import METRICS, parameter
 from analysis.stats.intervals import LEVEL
-from analysis.verification import checks, closed_forms, draws
+from analysis.verification import checks, draws
 from analysis.verification.suite import Suite
 from reports.pages import html, stress
 
@@ -39,40 +38,30 @@ band = f"the band below, which holds all dots of {level} of such figures."
 
 # %% [markdown]
 # ## What was checked
+#
+# An exact check fails if its error is above its bound, which is zero or what rounding can do. A check
+# of chance has a p-value, corrected by Holm for the number of these checks.
 
 # %%
-html.say(
-    "{overall} {exact} are exact: an error above its bound, which is zero or what rounding can do, "
-    "refutes. {chance} are of chance: they have a p-value, corrected by Holm for their number and "
-    "judged at {alpha}. So if all is as it should be, any of them fails for at most one seed in "
-    "{seeds:.0f}.",
-    overall=checks.overall(judged),
-    exact=judged["error"].count(),
-    chance=judged["p"].count(),
-    alpha=numbers.level(checks.ALPHA),
-    seeds=1 / checks.ALPHA,
-)
-
-# %%
+display(Markdown(checks.overall(judged)))
 caption = "Every check: what is known, what was seen, and what follows"
 html.table(checks.as_text(judged), caption, wrap=True)
 
 # %% [markdown]
 # ## Arrivals
+#
+# Every node receives Poisson packets, independently of the others and of all before. Counts of a
+# node in a slot tell the distribution; counts of a slot over all nodes also whether nodes depend on
+# each other, and counts of a node over many slots whether slots do. They come from event logs, one
+# per replication, since policies share its arrivals.
 
 # %%
 html.say(
-    "{verdicts} Every node receives Poisson packets, {rate:g} per mission slot on average. The "
-    "counts come from {n:,} event logs, one per replication, since policies share its arrivals.",
+    "{verdicts} There are {n:,} logs, and {rate:g} packets per node and slot on average.",
     verdicts=checks.on_topics(judged, checks.ARRIVALS),
     rate=space.arrival_rate,
     n=len(suite.realisations),
 )
-
-# %% [markdown]
-# Packets are independent of those at other nodes and of all before. Counts of a node in a slot tell
-# the distribution; counts of a slot over all nodes also whether nodes depend on each other, and
-# counts of a node over many slots whether slots do.
 
 # %%
 figures = [
@@ -89,6 +78,12 @@ html.gallery(figures)
 
 # %% [markdown]
 # ## The channel
+#
+# UAVs choose the node that they hear best, so what they collect is no fair sample of the channel.
+# Two ways lead around that. A lone UAV that hovers within reach of a single node has no choice: its
+# mean rate must be the integral of δ log<sub>2</sub>(1 + SNR) over all shadowing. And each of the
+# communications in the logs can be computed once more from the formula, with the shadowing that was
+# drawn in that communication slot for every node: which one is heard best, and what it gives.
 
 # %%
 html.say(
@@ -96,13 +91,6 @@ html.say(
     verdicts=checks.on_topics(judged, checks.CHANNEL),
     n=sum((log.events["event"] == "communication").sum() for log in suite.logs),
 )
-
-# %% [markdown]
-# UAVs choose the node that they hear best, so what they collect is no fair sample of the channel.
-# Two ways lead around that. A lone UAV that hovers within reach of a single node has no choice: its
-# mean rate must be the integral of δ log<sub>2</sub>(1 + SNR) over all shadowing. And each of the
-# communications in the logs can be computed once more from the formula, with the shadowing that was
-# drawn in that communication slot for every node: which one is heard best, and what it gives.
 
 # %%
 html.figure(
@@ -114,31 +102,27 @@ html.figure(
 
 # %% [markdown]
 # ## Conservation, batteries and engines
+#
+# Data are neither made nor lost. Event logs also hold every battery to its rules, slot by slot, and
+# add up to the records. Policies share the realisation of a replication. And missions of every
+# policy, spread over the study, were simulated again with SimPy.
 
 # %%
-topics = ("CONSERVATION", "ENERGY", "RECORDS", "REALISATIONS", "ENGINES")
 html.say(
-    "{verdicts} Data are neither made nor lost: not in the missions of {studies}, and not at any "
-    "node in {n:,} event logs.",
-    verdicts=checks.on_topics(judged, *(getattr(checks, topic) for topic in topics)),
+    "{verdicts} The missions are those of {studies}; {n:,} have event logs.",
+    verdicts=checks.on_topics(judged, *checks.BOOKKEEPING),
     studies=suite.names,
     n=len(suite.logs),
 )
 
 # %% [markdown]
-# The logs also hold every battery to its rules, slot by slot, and add up to the records. Policies
-# share the realisation of a replication. And missions of every policy, spread over the study, were
-# simulated again with SimPy.
-
-# %% [markdown]
 # ## The draws of a mission
+#
+# Every mission draws its parameters, uniformly and independently, and the initial data of every
+# node.
 
 # %%
-html.say(
-    "{verdicts} Every mission draws its parameters, uniformly and independently, and the initial "
-    "data of every node.",
-    verdicts=checks.on_topics(judged, checks.DRAWS),
-)
+Markdown(checks.on_topics(judged, checks.DRAWS))
 
 # %%
 figures = [
@@ -150,41 +134,35 @@ figures = [
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
 ]
-initial = suite.missions["initial"].to_numpy()
 
 # %%
 caption = (
     f"The bars should follow the curve, the density of a sum of {len(space.nodes)} uniform "
-    f"variables. n = {len(initial):,} missions."
+    f"variables. n = {len(suite.missions):,} missions."
 )
-if np.ptp(space.initial_data):
-    law, axis = closed_forms.initial_total(space), "data units, all nodes together"
-    figure = drawings.totals(initial, law, "Initial data of a mission", axis)
+if space.initial_data[0] < space.initial_data[1]:
+    figure = drawings.initial_data(suite.missions["initial"].to_numpy(), space)
     figures.append((figure, "Initial data per mission, and the density of their sum", caption))
 html.gallery(figures)
 
 # %% [markdown]
 # ## What intervals promise
+#
+# Of intervals that are each computed from a block of missions, about as many as their level says
+# should hold the mean of all. For Student's t it is a little more, since a block is itself a part
+# of all. Wilson's interval, for success, cannot keep to a level: a block has a whole number of
+# successes, so what its interval holds jumps with their share. How often it does is known exactly,
+# from the hypergeometric distribution, and that is what it is held to.
 
 # %%
 html.say(
-    "{verdicts} The {n:,} missions of {best} in blocks of {block:,}: of intervals at {level}, each "
-    "computed from a block, about that share should hold the mean of all.",
+    "{verdicts} Blocks are cut from the {n:,} missions of {best}.",
     verdicts=checks.on_topics(judged, checks.COVERAGE),
     n=len(suite.missions),
     best=suite.best,
-    block=block,
-    level=level,
 )
 
-# %% [markdown]
-# For Student's t it is a little more, since a block is itself a part of all. Wilson's interval, for
-# success, cannot keep to a level: a block has a whole number of successes, so what its interval
-# holds jumps with their share. How often it does is known exactly, from the hypergeometric
-# distribution, and that is what it is held to.
-
 # %%
-blocks = {name: suite.blocks(metric, block) for metric, name in METRICS.items()}
 figures = [
     (
         drawings.caterpillar(rows, name),
@@ -193,8 +171,8 @@ figures = [
         f"of all missions. Of all blocks {rows['holds'].sum():,} of {len(rows):,} hold it. "
         f"n = {block:,} missions per interval, at {level}.",
     )
-    for name, rows in blocks.items()
-    if len(rows)
+    for metric, name in METRICS.items()
+    if len(rows := suite.blocks(metric, block))
 ]
 html.gallery(figures)
 
@@ -206,8 +184,8 @@ html.gallery(figures)
 # number is read from the scenario and the manifests of the studies.
 
 # %%
-manifests = [study.manifest for study in suite.studies.values()]
-model = stress.describe(*manifests[:1], manifests[1:])
+others = [study.manifest for study in suite.others.values()]
+model = stress.describe(suite.study.manifest, others)
 display(Markdown("\n\n".join(model.sections[number] for number in "12")))
 html.figure(
     drawings.slot(*model.overview),
@@ -218,9 +196,7 @@ html.figure(
 
 # %%
 display(Markdown(model.sections["3"]))
-html.table(model.parameters, "All input parameters (3.3)", wrap=True)
-
-# %%
+display(html.table(model.parameters, "All input parameters (3.3)", wrap=True))
 Markdown("\n\n".join(model.sections[number] for number in "456"))
 
 # %% [markdown]

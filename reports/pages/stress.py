@@ -131,7 +131,7 @@ def _parameters(space: ScenarioSpace) -> pd.DataFrame:
 
 def _value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
-    value = _pads(space) if field == "pads" else getattr(space, field)
+    value: Any = _pads(space) if field == "pads" else getattr(space, field)
     if field == "nodes":
         return _cells(value)
     if field in SAMPLED or field == "initial_data":

@@ -71,13 +71,15 @@ def test_rates_stand_beside_their_curve() -> None:
     assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
 
 
-def test_totals_are_bars_below_their_density() -> None:
-    values = stats.norm(5, 2).rvs(4000, random_state=1)
-    figure = drawings.totals(values, stats.norm(5, 2), "Title", "units")
+def test_initial_data_are_bars_below_the_density_of_their_sum() -> None:
+    values = np.random.default_rng(1).uniform(5, 20, (4000, 25)).sum(axis=1)
+    figure = drawings.initial_data(values, SPACE)
     bars = figure.axes[0].patches
     assert sum(bar.get_height() * bar.get_width() for bar in bars) == pytest.approx(1)
     (curve,) = figure.axes[0].lines
-    assert curve.get_ydata().max() == pytest.approx(stats.norm(5, 2).pdf(5), rel=1e-2)
+    # Almost normal, with the variance of 25 uniform variables.
+    density = stats.norm(312.5, 15 * np.sqrt(25 / 12)).pdf(312.5)
+    assert curve.get_ydata().max() == pytest.approx(density, rel=0.01)
 
 
 def test_blocks_that_miss_the_mean_are_marked() -> None:

@@ -1,6 +1,5 @@
 """Communications of logs agree with the formula; changed ones do not."""
 
-
 import pandas as pd
 
 from analysis.verification import budgets, channel
