@@ -155,10 +155,10 @@ def overall(judged: pd.DataFrame) -> str:
         others = "; the others are inconclusive." if open_tests else "."
         verdict = f"**{len(_tests(judged, HOLDS))} of {n} checks hold**{others}"
     few = f" Too few observations for: {numbers.words(open_tests)}." if open_tests else ""
+    alarm = f"any of them fails for at most one seed in {1 / ALPHA:.0f}"
     return (
         f"{verdict}{few} {exact} are exact. {chance} are of chance, judged at "
-        f"{numbers.level(ALPHA)}: if all is as it should be, any of them fails for at most one seed "
-        f"in {1 / ALPHA:.0f}."
+        f"{numbers.level(ALPHA)}: if all is as it should be, {alarm}."
     )
 
 

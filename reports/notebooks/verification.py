@@ -39,8 +39,8 @@ band = f"the band below, which holds all dots of {level} of such figures."
 # %% [markdown]
 # ## What was checked
 #
-# An exact check fails if its error is above its bound, which is zero or what rounding can do. A check
-# of chance has a p-value, corrected by Holm for the number of these checks.
+# An exact check fails if its error is above its bound, which is zero or what rounding can do. A
+# check of chance has a p-value, corrected by Holm for the number of these checks.
 
 # %%
 display(Markdown(checks.overall(judged)))
@@ -108,12 +108,8 @@ html.figure(
 # policy, spread over the study, were simulated again with SimPy.
 
 # %%
-html.say(
-    "{verdicts} The missions are those of {studies}; {n:,} have event logs.",
-    verdicts=checks.on_topics(judged, *checks.BOOKKEEPING),
-    studies=suite.names,
-    n=len(suite.logs),
-)
+verdicts = checks.on_topics(judged, *checks.BOOKKEEPING)
+html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=suite.names)
 
 # %% [markdown]
 # ## The draws of a mission
@@ -136,13 +132,12 @@ figures = [
 ]
 
 # %%
-caption = (
-    f"The bars should follow the curve, the density of a sum of {len(space.nodes)} uniform "
-    f"variables. n = {len(suite.missions):,} missions."
-)
 if space.initial_data[0] < space.initial_data[1]:
-    figure = drawings.initial_data(suite.missions["initial"].to_numpy(), space)
-    figures.append((figure, "Initial data per mission, and the density of their sum", caption))
+    initial = suite.missions["initial"].to_numpy()
+    caption = "The bars should follow the curve, the density of a sum of uniform variables."
+    figure = drawings.initial_data(initial, space)
+    alt = "Initial data per mission, and the density of their sum"
+    figures.append((figure, alt, f"{caption} n = {len(initial):,} missions."))
 html.gallery(figures)
 
 # %% [markdown]
@@ -155,12 +150,8 @@ html.gallery(figures)
 # from the hypergeometric distribution, and that is what it is held to.
 
 # %%
-html.say(
-    "{verdicts} Blocks are cut from the {n:,} missions of {best}.",
-    verdicts=checks.on_topics(judged, checks.COVERAGE),
-    n=len(suite.missions),
-    best=suite.best,
-)
+verdicts = checks.on_topics(judged, checks.COVERAGE)
+html.say("{verdicts} Blocks are those of {best}.", verdicts=verdicts, best=suite.best)
 
 # %%
 figures = [
