@@ -32,7 +32,7 @@ def points(value: float, low: float, high: float) -> str:
     return f"{difference(value, 0)} [{ends[0]}, {ends[1]}]"
 
 
-def estimate(value: float, low: float, high: float, digits: int = 3) -> str:
+def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
     """An estimate and its interval as ``1.0123 [0.9868, 1.0378]``, with that many decimals."""
     middle, *ends = [minus(f"{number:.{digits}f}") for number in (value, low, high)]
     return f"{middle} [{ends[0]}, {ends[1]}]"

@@ -87,7 +87,7 @@ class Check(NamedTuple):
             digits: Decimals of the estimate as text.
         """
         ends = (estimate - _NORMAL * error, estimate + _NORMAL * error)
-        seen = numbers.estimate(estimate, *ends, digits=digits)
+        seen = numbers.decimals(estimate, *ends, digits=digits)
         p = float(2 * stats.norm.sf(abs(estimate - known) / error))
         return cls(topic, test, f"{known:g}", seen, n, p)
 

@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.names import parameter
-from analysis.numbers import estimate, minus
+from analysis.numbers import decimals, minus
 from analysis.stats.intervals import mean_interval
 from analysis.verification import closed_forms
 from analysis.verification.checks import ARRIVALS, DRAWS, Check
@@ -173,7 +173,7 @@ def _distribution_check(per: str, values: np.ndarray, law: Any, known: str) -> C
     test = f"Initial data per {per}: Kolmogorov-Smirnov"
     if not values.size:
         return Check(DRAWS, test, known, "", 0)
-    seen = f"mean {estimate(*mean_interval(values))}; known {law.mean():.3f}"
+    seen = f"mean {decimals(*mean_interval(values))}; known {law.mean():.3f}"
     return Check(DRAWS, test, known, seen, values.size, float(stats.kstest(values, law.cdf).pvalue))
 
 

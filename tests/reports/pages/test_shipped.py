@@ -24,8 +24,8 @@ from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
 pytestmark = pytest.mark.slow
 
-# Parameters of what would take long: missions of what-if, missions simulated again on verification.
-QUICK = {"missions": 40, "again": 4}
+# A parameter of what would take long: the missions of what-if.
+QUICK = {"missions": 40}
 # The width of the text on A4 [px], and the elements that reach beyond a width.
 A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
