@@ -9,10 +9,8 @@ in which order or by how many workers it was computed.
 """
 
 import json
-import re
 from collections import defaultdict
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -21,37 +19,20 @@ from urllib.parse import quote
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-import pyarrow.parquet as pq
 from filelock import FileLock, Timeout
 
+from analysis.results import parquet
 from analysis.results.chunks import Chunk, Part, gaps, name_of, short_hash
 from analysis.results.manifest import Cell, Manifest
+from analysis.results.rows import rows_of
 from analysis.study.study import Study
 from dess.errors import InputError
 from dess.files import replacing, writable
-from dess.record import MISSION_RECORD, UAV_RECORD, Records
-from dess.state import END_NAMES
+from dess.record import Records
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 LONG = 150  # characters of a policy in the name of a folder
 FOLDERS = ("missions", "uavs", "events", "failures")
-
-_NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
-_PARTS = b"dess.parts"  # the parquet metadata that says what a file holds, in its order
-_KEY = pa.dictionary(pa.int32(), pa.string())
-
-
-def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
-    assert record.fields is not None
-    return [(name, pa.from_numpy_dtype(kind[0])) for name, kind in record.fields.items()]
-
-
-# What the tables hold; ``cell`` is the key of the team and the scenario.
-MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
-UAVS = pa.schema(
-    [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
-)
-UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
 
 
 @dataclass(frozen=True)
@@ -173,15 +154,15 @@ class Store:
     def _scan(self) -> None:
         """Learn which missions are there, and which files are damaged."""
         for team in range(len(self.manifest.policies)):
-            uavs = self._by_id("uavs", team, UAVS)
-            for name, missions in self._by_id("missions", team, MISSIONS).items():
+            uavs = self._by_id("uavs", team, parquet.UAVS)
+            for name, missions in self._by_id("missions", team, parquet.MISSIONS).items():
                 if name in uavs:
                     self._enter(team, name, _Tables(missions, uavs[name]))
             for path in self._files("events", team):
-                if _read(path) is None:
+                if parquet.read(path) is None:
                     self._damaged.append(path)
                 else:
-                    self._logs[team, _id(path)] = path
+                    self._logs[team, parquet.content_hash(path)] = path
 
     def _by_id(self, kind: str, team: int, schema: pa.Schema) -> dict[str, pa.Table]:
         """The tables of a kind, by what they hold.
@@ -192,29 +173,29 @@ class Store:
         paths, contested = defaultdict(list), set()
         for path in self._files(kind, team):
             if (table := self._whole(path, schema)) is not None:
-                paths[_id(path)].append(path)
-                if not tables.setdefault(_id(path), table).equals(table):
-                    contested.add(_id(path))
+                paths[parquet.content_hash(path)].append(path)
+                if not tables.setdefault(parquet.content_hash(path), table).equals(table):
+                    contested.add(parquet.content_hash(path))
         self._damaged += [path for name in sorted(contested) for path in paths[name]]
         return {name: table for name, table in tables.items() if name not in contested}
 
     def _whole(self, path: Path, schema: pa.Schema) -> pa.Table | None:
         """What a file holds; if that is not what its name says, it is damaged."""
-        table = _read(path, schema)
-        if table is None or name_of(_rows(table)) != _id(path):
+        table = parquet.read(path, schema)
+        if table is None or name_of(parquet.parts_in(table)) != parquet.content_hash(path):
             self._damaged.append(path)
             return None
         return table
 
     def _enter(self, team: int, name: str, tables: "_Tables") -> None:
         self._tables[team, name] = tables
-        for key, start, stop in _rows(tables.missions):
+        for key, start, stop in parquet.parts_in(tables.missions):
             self._present[team, key].append(range(start, stop))
 
     def _files(self, kind: str, team: int) -> list[Path]:
         """The files of a kind that a run may have written."""
         files = self._partition(kind, team).glob("*.parquet")
-        return sorted(path for path in files if _NAME.fullmatch(path.name))
+        return sorted(path for path in files if parquet.NAME.fullmatch(path.name))
 
     def _partition(self, kind: str, team: int) -> Path:
         policy = quote(self.manifest.policies[team].policy, safe="")
@@ -251,43 +232,21 @@ class Store:
             [part.cell.key for part in chunk.parts],
             [len(part.replications) for part in chunk.parts],
         )
-        missions, uavs = _mission_table(cells, records), _uav_table(cells, records)
-        self._check(chunk, missions)
-        parts = {_PARTS: json.dumps(chunk.rows)}
-        tables = _Tables(*(t.replace_schema_metadata(parts) for t in (missions, uavs)))
-        # Missions last: a chunk is there when they are.
-        self._write("uavs", chunk.team, chunk.name, tables.uavs)
-        self._write("missions", chunk.team, chunk.name, tables.missions)
+        missions = parquet.mission_table(cells, records)
+        uavs = parquet.uav_table(cells, records)
+        parquet.check(missions, chunk, self.manifest.seed)
+        tables = _Tables(*(parquet.with_parts(t, chunk.rows) for t in (missions, uavs)))
+        # Missions last: a chunk is present when they are.
+        parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)
+        parquet.write(self._partition("missions", chunk.team), chunk.name, tables.missions)
         self._enter(chunk.team, chunk.name, tables)
         self._failure(chunk).unlink(missing_ok=True)
-
-    def _check(self, chunk: Chunk, missions: pa.Table) -> None:
-        """The door: what comes in is what was asked for, and has no holes."""
-        wanted = np.concatenate([part.replications for part in chunk.parts])
-        if not np.array_equal(missions["replication"], wanted):
-            raise ValueError("the records are not of the replications that were asked for")
-        if set(missions["seed"].to_pylist()) != {self.manifest.seed}:
-            raise ValueError(f"the records are not of seed {self.manifest.seed}")
-        for field in missions.schema:
-            column = missions[field.name]
-            if pa.types.is_floating(field.type) and not np.isfinite(column).all():
-                raise ValueError(f"the records have a {field.name} that is no number")
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
         """Keep the event log of a replication of a cell."""
         name = f"{cell.key}-{replication:06}"
-        self._logs[cell.team, name] = self._write("events", cell.team, name, pa.table(columns))
-
-    def _write(self, kind: str, team: int, name: str, table: pa.Table) -> Path:
-        sink = pa.BufferOutputStream()
-        pq.write_table(table, sink, compression="zstd")
-        content = sink.getvalue().to_pybytes()
-        path = self._partition(kind, team) / f"{name}-{short_hash(content)}.parquet"
-        with writable(path):
-            path.parent.mkdir(exist_ok=True)
-        with replacing(path) as temporary, writable(path):
-            temporary.write_bytes(content)
-        return path
+        folder = self._partition("events", cell.team)
+        self._logs[cell.team, name] = parquet.write(folder, name, pa.table(columns))
 
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Keep why a chunk could not be computed; its path."""
@@ -318,9 +277,9 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        tables, wanted = self._tables_with(parts), _wanted(parts)
-        missions, uavs = ([getattr(each, kind) for each in tables] for kind in _Tables._fields)
-        return _taken(_stacked(missions), wanted), _taken(_stacked(uavs), wanted)
+        tables = self._tables_with(parts)
+        missions = rows_of(parts, [chunk.missions for chunk in tables])
+        return missions, rows_of(parts, [chunk.uavs for chunk in tables])
 
     def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
         """The metrics of the missions of every part of one team.
@@ -328,17 +287,16 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        tables = self._tables_with(parts)
-        missions = _taken(_stacked([each.missions for each in tables]), _wanted(parts))
+        missions = rows_of(parts, [chunk.missions for chunk in self._tables_with(parts)])
         ends = np.cumsum([len(part.replications) for part in parts])
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
     def _tables_with(self, parts: Sequence[Part]) -> list[_Tables]:
-        """The tables of a team, all of whose parts are there."""
+        """The tables of a team, all of whose parts are present."""
         for part in parts:
-            here = self._present[part.cell.team, part.cell.key]
-            for gap in gaps(part.replications, here)[:1]:
+            present = self._present[part.cell.team, part.cell.key]
+            for gap in gaps(part.replications, present)[:1]:
                 raise InputError(self._incomplete(part, gap))
         team = parts[0].cell.team
         return [tables for (whose, _), tables in self._tables.items() if whose == team]
@@ -346,8 +304,8 @@ class Store:
     def _incomplete(self, part: Part, gap: range) -> str:
         team, values = part.cell.team, self.manifest.points[part.cell.point].values
         where = f" at {json.dumps(values)}" if values else ""
-        there = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
-        line = f"{self.folder}: incomplete, {there} missions of "
+        present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
+        line = f"{self.folder}: incomplete, {present} missions of "
         line += f"{self.manifest.policies[team].policy}{where}"
         if self._damaged:
             line += f" (damaged: {self._damaged[0]})"
@@ -357,51 +315,15 @@ class Store:
 
     @property
     def logged(self) -> list[tuple[Cell, int]]:
-        """The missions whose event logs are there."""
+        """The missions whose event logs are present."""
         cells = {(cell.team, cell.key): cell for cells in self.manifest.cells for cell in cells}
-        found = []
-        for team, name in self._logs:
-            key, _, replication = name.rpartition("-")
-            if (team, key) in cells:
-                found.append((cells[team, key], int(replication)))
-        return found
+        logs = [(team, *name.rpartition("-")) for team, name in self._logs]
+        return [(cells[t, key], int(number)) for t, key, _, number in logs if (t, key) in cells]
 
     def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
-        """The event log of a replication of a cell, if it is there."""
+        """The event log of a replication of a cell, if it is present."""
         path = self._logs.get((cell.team, f"{cell.key}-{replication:06}"))
-        return _read(path) if path else None
-
-
-def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
-    """A row per mission of the parts: its design point, cell and replication."""
-    lengths = [len(part.replications) for part in parts]
-    return pd.DataFrame(
-        {
-            "point": np.repeat([part.cell.point for part in parts], lengths),
-            "cell": np.repeat([part.cell.key for part in parts], lengths),
-            "replication": np.concatenate([part.replications for part in parts]),
-        }
-    )
-
-
-def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
-    """The rows of all tables."""
-    frame = pa.concat_tables(tables).unify_dictionaries().to_pandas().astype({"cell": str})
-    one = [name for name in ("cell", "replication", "uav") if name in frame]
-    if frame.duplicated(one).any():  # somebody may have put folders together
-        frame = frame.drop_duplicates()
-        if frame.duplicated(one).any():
-            raise InputError(
-                "results: two files have different records of a mission; allowed: one of them"
-            )
-    return frame
-
-
-def _taken(table: pd.DataFrame, wanted: pd.DataFrame) -> pd.DataFrame:
-    """The rows of a table that are wanted, in the order in which they are."""
-    by = ["cell", "replication"]
-    rows = wanted.merge(table, on=by, how="left", validate="m:m")
-    return rows[["point", *table.columns.drop("cell")]]
+        return parquet.read(path) if path else None
 
 
 def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
@@ -421,71 +343,9 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
                 )
             return manifest
     held = Manifest.read(path)
-    return held.extended_to(manifest, path, _missions_in(folder) if accept_code else None)
-
-
-def _missions_in(folder: Path) -> int:
-    """The number of missions in a folder, those of damaged files aside."""
-    count = 0
-    for path in folder.glob("missions/policy=*/*.parquet"):
-        with suppress(OSError, pa.ArrowException):
-            count += pq.read_metadata(path).num_rows
-    return count
+    return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
 
 
 def _is_ours(path: Path) -> bool:
     """Whether a run may have made it before the manifest was there."""
     return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")
-
-
-def _rows(table: pa.Table) -> list[tuple[str, int, int]]:
-    """The parts that a table holds."""
-    return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
-
-
-def _id(path: Path) -> str:
-    """What a file's name says of what it holds."""
-    return path.stem.rpartition("-")[0]
-
-
-def _read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
-    """A parquet file; nothing if it is damaged, or not of the schema.
-
-    Raises:
-        InputError: If it cannot be read.
-    """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; allowed: a file") from None
-    try:
-        if short_hash(content) != path.stem.rpartition("-")[2]:
-            return None
-        table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
-    except (OSError, pa.ArrowException):  # what pyarrow raises
-        return None
-    return table if schema is None or table.schema.equals(schema) else None
-
-
-def _mission_table(cells: np.ndarray, records: Records) -> pa.Table:
-    columns = {name: records.missions[name] for name in MISSION_RECORD.names or ()}
-    return _table({"cell": cells} | columns, MISSIONS)
-
-
-def _uav_table(cells: np.ndarray, records: Records) -> pa.Table:
-    present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
-    mission, uav = np.nonzero(present)
-    columns = {
-        "cell": cells[mission],
-        "replication": records.missions["replication"][mission],
-        "uav": uav,
-    }
-    columns |= {field: records.uavs[field][present] for field in UAV_RECORD.names or ()}
-    columns["end"] = np.array(END_NAMES)[columns["end"]]
-    return _table(columns, UAVS)
-
-
-def _table(columns: dict[str, np.ndarray], schema: pa.Schema) -> pa.Table:
-    arrays = {"cell": pa.array(columns.pop("cell")).dictionary_encode()}
-    arrays |= {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
-    return pa.table(arrays, schema=schema)

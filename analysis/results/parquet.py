@@ -1,0 +1,148 @@
+"""The parquet files of a results folder: records as tables, files named after their content.
+
+The name of a file, ``CONTENT-BYTES.parquet``, has two hashes: of the cells and replications that it
+holds, or the cell and replication of an event log, and of its bytes. So a damaged file is noticed.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from analysis.results.chunks import Chunk, short_hash
+from dess.errors import InputError
+from dess.files import replacing, writable
+from dess.record import MISSION_RECORD, UAV_RECORD, Records
+from dess.state import END_NAMES
+
+NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
+_PARTS = b"dess.parts"  # the metadata that says what a file holds, in its order
+_KEY = pa.dictionary(pa.int32(), pa.string())
+
+
+def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
+    assert record.fields is not None
+    return [(name, pa.from_numpy_dtype(kind[0])) for name, kind in record.fields.items()]
+
+
+# What the tables hold; ``cell`` is the key of the team and the scenario.
+MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
+UAVS = pa.schema(
+    [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
+)
+UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
+
+
+def mission_table(cells: np.ndarray, records: Records) -> pa.Table:
+    """The records of missions as a table.
+
+    Args:
+        cells: (n,) the key of the cell of every mission.
+        records: Of the n missions.
+    """
+    columns = {name: records.missions[name] for name in MISSION_RECORD.names or ()}
+    return _table({"cell": cells} | columns, MISSIONS)
+
+
+def uav_table(cells: np.ndarray, records: Records) -> pa.Table:
+    """The records of the UAVs of missions as a table, a row per UAV.
+
+    Args:
+        cells: (n,) the key of the cell of every mission.
+        records: Of the n missions.
+    """
+    present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
+    mission, uav = np.nonzero(present)
+    columns = {
+        "cell": cells[mission],
+        "replication": records.missions["replication"][mission],
+        "uav": uav,
+    }
+    columns |= {field: records.uavs[field][present] for field in UAV_RECORD.names or ()}
+    columns["end"] = np.array(END_NAMES)[columns["end"]]
+    return _table(columns, UAVS)
+
+
+def _table(columns: dict[str, np.ndarray], schema: pa.Schema) -> pa.Table:
+    arrays = {"cell": pa.array(columns.pop("cell")).dictionary_encode()}
+    arrays |= {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
+    return pa.table(arrays, schema=schema)
+
+
+def check(missions: pa.Table, chunk: Chunk, seed: int) -> None:
+    """Check replications, seed and finite values of missions before they are written.
+
+    Raises:
+        ValueError: If they are not those of the chunk.
+    """
+    wanted = np.concatenate([part.replications for part in chunk.parts])
+    if not np.array_equal(missions["replication"], wanted):
+        raise ValueError("the records are not of the replications that were asked for")
+    if set(missions["seed"].to_pylist()) != {seed}:
+        raise ValueError(f"the records are not of seed {seed}")
+    for field in missions.schema:
+        column = missions[field.name]
+        if pa.types.is_floating(field.type) and not np.isfinite(column).all():
+            raise ValueError(f"the records have a {field.name} that is no number")
+
+
+def with_parts(table: pa.Table, rows: Sequence[Sequence[Any]]) -> pa.Table:
+    """A table that says which parts it holds: the key, start and stop of each."""
+    return table.replace_schema_metadata({_PARTS: json.dumps(rows)})
+
+
+def parts_in(table: pa.Table) -> list[tuple[str, int, int]]:
+    """The parts that a table holds: the key, start and stop of each."""
+    return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
+
+
+def content_hash(path: Path) -> str:
+    """The part of a file's name that says what it holds."""
+    return path.stem.rpartition("-")[0]
+
+
+def write(folder: Path, name: str, table: pa.Table) -> Path:
+    """Write a table into a folder, whole or not at all; returns its file.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    content = sink.getvalue().to_pybytes()
+    path = folder / f"{name}-{short_hash(content)}.parquet"
+    with writable(path):
+        path.parent.mkdir(exist_ok=True)
+    with replacing(path) as temporary, writable(path):
+        temporary.write_bytes(content)
+    return path
+
+
+def read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
+    """Read a table; None if the file is damaged, or not of the schema.
+
+    Raises:
+        InputError: If it cannot be read.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}; allowed: a file") from None
+    try:
+        if short_hash(content) != path.stem.rpartition("-")[2]:
+            return None
+        table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
+    except (OSError, pa.ArrowException):  # what pyarrow raises
+        return None
+    return table if schema is None or table.schema.equals(schema) else None
+
+
+def missions_in(folder: Path) -> int:
+    """The number of missions in a results folder, those of damaged files aside."""
+    files = folder.glob("missions/policy=*/*.parquet")
+    return sum(len(table) for path in files if (table := read(path, MISSIONS)) is not None)
