@@ -1,31 +1,29 @@
-"""What if: a variation of a scenario beside its baseline, mission by mission on the same seas.
+"""What if: a variation of a scenario beside its baseline, in the same realisations.
 
 A question is a study of two design points, ``BASELINE`` and ``VARIATION``. Both have the same
 replications: initial data, arrivals, shadowing and all that is drawn are equal as far as the
-variation does not set them (common random numbers).
+variation does not set them (common random numbers):
+
+    results = ask(question({"uavs": 5}, baseline={"quota": 300}), "results")
+
+``questions.what_if_answer`` has the answer.
 """
 
 import json
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 import tomli_w
 from pydantic import ValidationError
-from scipy import stats
 
+from analysis import numbers
 from analysis.execution.runner import run_study
-from analysis.names import METRICS, PRODUCT
-from analysis.questions import summary as findings
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
-from analysis.stats.intervals import LEVEL, summary
-from analysis.stats.paired import compare
-from analysis.stats.verdict import INCONCLUSIVE
 from analysis.study.study import Study
 from dess import simulate_batch
 from dess.errors import InputError
@@ -36,23 +34,6 @@ NAME = "what-if"
 BASELINE, VARIATION = 0, 1  # the design points
 SIDES = ("baseline", "variation")
 
-# What an engineer wants to know beside the paper's metrics: means per mission.
-MEASURES = {
-    "slots": "Mission slots",
-    "collected": "Data collected",
-    "collected_per_uav": "Data collected per UAV",
-    "residual": "Data left",
-    "charging_per_uav": "Slots charging per UAV",
-    "waiting_per_uav": "Slots waiting per UAV",
-    "dry": "UAVs run dry in 100 missions",
-}
-
-HIGHER, LOWER = "higher", "lower"
-
-# Probability of telling a difference of the size that was seen, for ``missions_to_tell``.
-POWER = 0.8
-
-_MISSION = ["policy", "point", "replication"]
 _RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
 
 
@@ -60,7 +41,7 @@ class Change(NamedTuple):
     """A field that the variation changes, with its values in words."""
 
     field: str
-    description: str
+    meaning: str
     before: str
     after: str
 
@@ -80,7 +61,7 @@ def question(
         baseline: Fields of the scenario that are set in both, where ``settings`` does not.
         scenario: A shipped scenario, or a TOML file.
         policies: Teams, each compared with itself.
-        missions: How many of each, at least 2.
+        missions: Number of missions of each, at least 2.
         seed: Of the missions.
 
     Raises:
@@ -89,26 +70,19 @@ def question(
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
             raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
-    fixed, rows = dict(baseline or {}), dict(settings)
-    before = load_scenario(scenario, **fixed)
-    after = load_scenario(scenario, **fixed | rows)
-    if not rows:
-        allowed = ", ".join(ScenarioSpace.model_fields)
-        raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
-    for field in rows:
-        if _value(before, field) == _value(after, field):
-            raise InputError(
-                f"settings: {field} is {told(before, field)} in the baseline already; "
-                "allowed: another value"
-            )
+    fixed, changed = dict(baseline or {}), dict(settings)
+    _check_changes(
+        load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed
+    )
     if isinstance(missions, int) and missions < 2:
         raise InputError(f"missions: {missions} is too few; allowed: 2 or more")
+    before = {field: fixed[field] for field in changed if field in fixed}
     data = {
         "name": NAME,
         "description": "a variation beside its baseline, on the same missions",
         "scenario": str(scenario),
-        "set": {field: value for field, value in fixed.items() if field not in rows},
-        "design": {"kind": "table", "rows": [{f: fixed[f] for f in rows if f in fixed}, rows]},
+        "set": {field: value for field, value in fixed.items() if field not in changed},
+        "design": {"kind": "table", "rows": [before, changed]},
         "policies": policies,
         "missions": missions,
         "seed": seed,
@@ -120,14 +94,14 @@ def question(
 
 
 def key_of(study: Study) -> str:
-    """A hash of a question: of all that its records depend on, but not of how many there are.
+    """A hash of all that the records of a question depend on, but not of their number.
 
-    So the same question with more missions tops up what is there.
+    So the same question with more missions tops up the results folder.
     """
     manifest = Manifest.of(study)
-    asked = {name: value for name, value in manifest.study.items() if name != "missions"}
+    without_number = {name: v for name, v in manifest.study.items() if name != "missions"}
     cells = [cell.key for of_team in manifest.cells for cell in of_team]
-    return short_hash(json.dumps([asked, cells], sort_keys=True).encode())
+    return short_hash(json.dumps([without_number, cells], sort_keys=True).encode())
 
 
 def check_policy(study: Study, policy: str) -> None:
@@ -150,7 +124,7 @@ def ask(study: Study, folder: str | Path, workers: int = 1) -> Results:
         workers: Processes. Two or more take seconds to start, and pay for long runs only.
 
     Raises:
-        InputError: If a policy cannot fly in the scenario, before anything is written; if the
+        InputError: If a policy cannot act in the scenario, before anything is written; if the
             folder cannot be written or is in use.
         ChunkError: As of ``run_study``.
     """
@@ -163,11 +137,39 @@ def ask(study: Study, folder: str | Path, workers: int = 1) -> Results:
 def changes(results: Results) -> list[Change]:
     """What the variation changes, in the order of the settings."""
     before, after = (results.scenario(point) for point in (BASELINE, VARIATION))
-    fields = ScenarioSpace.model_fields
     return [
-        Change(field, fields[field].description or "", told(before, field), told(after, field))
+        Change(field, _meaning(field), in_words(before, field), in_words(after, field))
         for field in results.store.manifest.points[VARIATION].values
     ]
+
+
+def listed(results: Results) -> pd.DataFrame:
+    """``changes`` as a table to print."""
+    return pd.DataFrame(changes(results)).set_axis(
+        ["Field", "Meaning", "Baseline", "Variation"], axis="columns"
+    )
+
+
+def settings_of(results: Results) -> tuple[list[str], list[str]]:
+    """The changed fields with their values in the baseline and in the variation: ``uavs 3``."""
+    listed = changes(results)
+    before = [f"{change.field} {change.before}" for change in listed]
+    return before, [f"{change.field} {change.after}" for change in listed]
+
+
+def asked(results: Results) -> str:
+    """What a question asks: what is changed, what is set in both sides, and what is drawn."""
+    changed = [f"`{c.field}` = {c.after} instead of {c.before}" for c in changes(results)]
+    sentences = {"Set in both": shared(results), "Drawn by every mission": drawn(results)}
+    rest = [
+        f"{text}: {numbers.words([f'`{field}` {value}' for field, value in fields.items()])}."
+        for text, fields in sentences.items()
+        if fields
+    ]
+    scenario = results.store.manifest.study["scenario"]
+    return " ".join(
+        [f"What if a mission had {numbers.words(changed)}?\n\nScenario: **{scenario}**.", *rest]
+    )
 
 
 def drawn(results: Results) -> dict[str, str]:
@@ -175,125 +177,25 @@ def drawn(results: Results) -> dict[str, str]:
     changed = results.store.manifest.points[VARIATION].values
     space = results.scenario(BASELINE)
     ranges = {field: getattr(space, field) for field in _RANGES if field not in changed}
-    return {field: told(space, field) for field, (low, high) in ranges.items() if low < high}
+    return {field: in_words(space, field) for field, (low, high) in ranges.items() if low < high}
 
 
 def shared(results: Results) -> dict[str, str]:
     """The fields that are set in baseline and variation alike."""
     space = results.scenario(BASELINE)
-    return {field: told(space, field) for field in results.store.manifest.study["set"]}
+    return {field: in_words(space, field) for field in results.store.manifest.study["set"]}
 
 
-def told(space: ScenarioSpace, field: str) -> str:
+def in_words(space: ScenarioSpace, field: str) -> str:
     """The value of a field in words: ``3``, ``10 to 50`` of a range, ``25 cells`` of nodes."""
     value = _value(space, field)
     if field in _RANGES:
-        return " to ".join(dict.fromkeys(f"{end:g}" for end in value))
+        return numbers.span(value, "{:g}")
     if field == "nodes":
         return f"{len(value)} cells"
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value).strip("()")
-
-
-def missions_of(results: Results) -> pd.DataFrame:
-    """``results.missions`` with all of ``MEASURES``."""
-    uavs = results.uavs.assign(dry=100 * (results.uavs["end"] == "battery"))
-    sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "dry"]].sum()
-    missions = results.missions.join(sums, on=_MISSION)
-    return missions.assign(
-        collected_per_uav=missions["collected"] / missions["uavs"],
-        charging_per_uav=missions["slots_charging"] / missions["uavs"],
-        waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
-    )
-
-
-def means(results: Results) -> pd.DataFrame:
-    """Means with intervals: rows of ``analysis.summary`` by ``policy`` and ``point``."""
-    table = summary(results.missions, by=["policy", "point"])
-    return table[table["metric"].isin([*METRICS])].reset_index(drop=True)
-
-
-def answers(results: Results) -> pd.DataFrame:
-    """The variation against the baseline, mission by mission.
-
-    Returns:
-        A row per policy and metric (those of ``METRICS``, then of ``MEASURES``): ``policy``, the
-        means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval
-        stands by itself, at 95 %; that of Student or, for shares, as of ``stats.paired.paired``.
-    """
-    missions = missions_of(results)
-    metrics = [*METRICS, *MEASURES]
-    tables = []
-    for policy, own in missions.groupby("policy", sort=False):
-        table = compare(own, BASELINE, metrics, correction=None, of="point")
-        sides = own.groupby("point")[metrics].mean()
-        table.insert(0, "policy", policy)
-        table["before"] = table["metric"].map(sides.loc[BASELINE])
-        table["after"] = table["metric"].map(sides.loc[VARIATION])
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
-
-
-def verdict(answer: Any) -> str:
-    """What a row of ``answers`` says: by the whole interval, or that it cannot be told."""
-    # An interval without length says nothing of the spread: there the sign test decides.
-    known = answer.low < answer.high or answer.p <= 1 - LEVEL
-    if known and answer.low > 0:
-        return HIGHER
-    return LOWER if known and answer.high < 0 else INCONCLUSIVE
-
-
-def missions_to_tell(answer: Any, power: float = POWER) -> float:
-    """How many missions it takes to tell a difference of the size that a row of ``answers`` saw.
-
-    By the normal approximation, with the spread that was seen: both are estimates themselves.
-
-    Args:
-        answer: The row.
-        power: Probability that the interval of that many missions leaves out 0.
-
-    Returns:
-        The number; infinite if no difference was seen, or nothing of the spread.
-    """
-    if not answer.difference or answer.low == answer.high:
-        return np.inf
-    quantile = stats.norm.isf((1 - LEVEL) / 2)
-    half = (answer.high - answer.low) / 2 / abs(answer.difference)
-    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(power) / quantile)) ** 2))
-
-
-def differences(results: Results, policy: str, metric: str = PRODUCT) -> pd.Series:
-    """Variation - baseline of a metric of a policy, by replication."""
-    own = results.missions[results.missions["policy"] == policy]
-    sides = own.pivot(index="replication", columns="point", values=metric)
-    return sides[VARIATION] - sides[BASELINE]
-
-
-def best_policy(results: Results, point: int) -> str:
-    """The policy with the highest mean of collection ratio and communication on a side."""
-    missions = results.missions
-    return findings.best_policy(missions[missions["point"] == point])
-
-
-def typical(results: Results, policy: str) -> int:
-    """The replication whose difference in collection ratio and communication is the median.
-
-    Of an even number it is the lower one in the middle, of those alike the first.
-    """
-    ordered = differences(results, policy).sort_values(kind="stable")
-    middle = ordered.iloc[(len(ordered) - 1) // 2]
-    return int(ordered.index[ordered == middle][0])
-
-
-def worst(results: Results, policy: str) -> int:
-    """The replication with the lowest collection ratio and communication in the variation.
-
-    Of those alike it is the one that collected the smallest part, then the first.
-    """
-    own = results.missions.query("policy == @policy and point == @VARIATION")
-    ordered = own.sort_values([PRODUCT, "collection_ratio"], kind="stable")
-    return int(ordered["replication"].iloc[0])
 
 
 def command(results: Results) -> str:
@@ -317,6 +219,25 @@ def as_toml(results: Results) -> str:
     study = results.store.manifest.study
     names = ("scenario", "policies", "missions", "seed", "set", "design")
     return tomli_w.dumps({"name": "my-sweep"} | {n: study[n] for n in names if study[n] != {}})
+
+
+def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterable[str]) -> None:
+    """Refuse a variation that changes nothing, or sets a field to its value in the baseline."""
+    for field in changed:
+        if _value(before, field) == _value(after, field):
+            raise InputError(
+                f"settings: {field} is {in_words(before, field)} in the baseline already; "
+                "allowed: another value"
+            )
+    if not changed:
+        allowed = ", ".join(ScenarioSpace.model_fields)
+        raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
+
+
+def _meaning(field: str) -> str:
+    """What a field is, without the details of its description."""
+    description = ScenarioSpace.model_fields[field].description or ""
+    return description.partition(";")[0].partition(":")[0]
 
 
 def _assignments(values: Mapping[str, Any]) -> list[str]:

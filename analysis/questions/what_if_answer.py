@@ -1,0 +1,267 @@
+"""The answer to a what-if question: what the variation changes, mission by mission.
+
+results = ask(question({"uavs": 5}), folder)   # of questions.what_if
+table = answers(results)                       # a row per policy and metric
+verdict(table.iloc[0])                         # 'above': the variation has more
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis import numbers
+from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.questions import summary
+from analysis.questions.what_if import BASELINE, SIDES, VARIATION, settings_of
+from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
+from analysis.stats.paired import compare
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+
+# Means per mission beside the paper's metrics.
+MEASURES = {
+    "slots": "Mission slots",
+    "collected": "Data collected",
+    "collected_per_uav": "Data collected per UAV",
+    "residual": "Data left",
+    "charging_per_uav": "Slots charging per UAV",
+    "waiting_per_uav": "Slots waiting per UAV",
+    "depleted": "Depleted batteries in 100 missions",
+}
+
+# Probability of a significant difference of the size that was seen, for ``missions_needed``.
+POWER = 0.8
+
+_SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product"}
+_MARKS = {ABOVE: "▲", BELOW: "▼", INCONCLUSIVE: "≈"}
+_MISSION = ["policy", "point", "replication"]
+
+
+def missions_of(results: Results) -> pd.DataFrame:
+    """``results.missions`` with all of ``MEASURES``."""
+    uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
+    sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
+    missions = results.missions.join(sums, on=_MISSION)
+    return missions.assign(
+        collected_per_uav=missions["collected"] / missions["uavs"],
+        charging_per_uav=missions["slots_charging"] / missions["uavs"],
+        waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
+    )
+
+
+def means(results: Results) -> pd.DataFrame:
+    """Means with intervals: rows of ``analysis.summary`` by ``policy`` and ``point``."""
+    table = summary.means(results)
+    return table[table["metric"].isin([*METRICS])].reset_index(drop=True)
+
+
+def answers(results: Results) -> pd.DataFrame:
+    """The variation against the baseline, mission by mission.
+
+    Returns:
+        A row per policy and metric (those of ``METRICS``, then of ``MEASURES``): ``policy``, the
+        means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval
+        stands by itself, at 95 %; that of Student or, for shares, as of ``stats.paired.paired``.
+    """
+    missions = missions_of(results)
+    metrics = [*METRICS, *MEASURES]
+    tables = []
+    for policy, rows in missions.groupby("policy", sort=False):
+        table = compare(rows, BASELINE, metrics, correction=None, of="point")
+        sides = rows.groupby("point")[metrics].mean()
+        table.insert(0, "policy", policy)
+        table["before"] = table["metric"].map(sides.loc[BASELINE])
+        table["after"] = table["metric"].map(sides.loc[VARIATION])
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def verdict(answer: Any) -> str:
+    """Whether the variation is ``ABOVE`` or ``BELOW`` the baseline in a row of ``answers``.
+
+    The whole interval decides. An interval without length says nothing of the spread, so there the
+    sign test has to be significant as well.
+    """
+    known = answer.low < answer.high or answer.p <= 1 - LEVEL
+    return position(answer) if known else INCONCLUSIVE
+
+
+def missions_needed(answer: Any, power: float = POWER) -> float:
+    """How many missions show a difference of the size that a row of ``answers`` has.
+
+    By the normal approximation, with the spread that was seen: both are estimates themselves.
+
+    Args:
+        answer: The row.
+        power: Probability that the interval of that many missions leaves out 0.
+
+    Returns:
+        The number; infinite if there is no difference, or its spread is unknown.
+    """
+    if not answer.difference or answer.low == answer.high:
+        return np.inf
+    quantile = stats.norm.isf((1 - LEVEL) / 2)
+    half = (answer.high - answer.low) / 2 / abs(answer.difference)
+    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(power) / quantile)) ** 2))
+
+
+def differences(results: Results, policy: str, metric: str = PRODUCT) -> pd.Series:
+    """Variation - baseline of a metric of a policy, by replication."""
+    missions = results.missions[results.missions["policy"] == policy]
+    sides = missions.pivot(index="replication", columns="point", values=metric)
+    return sides[VARIATION] - sides[BASELINE]
+
+
+def best_policy(results: Results, point: int) -> str:
+    """The policy with the highest mean of collection ratio and communication on a side."""
+    missions = results.missions
+    return summary.best_policy(missions[missions["point"] == point])
+
+
+def typical(results: Results, policy: str) -> int:
+    """The replication whose difference in collection ratio and communication is the median.
+
+    Of an even number it is the lower one in the middle, of those alike the first.
+    """
+    ordered = differences(results, policy).sort_values(kind="stable")
+    middle = ordered.iloc[(len(ordered) - 1) // 2]
+    return int(ordered.index[ordered == middle][0])
+
+
+def worst(results: Results, policy: str) -> int:
+    """The replication with the lowest collection ratio and communication in the variation.
+
+    Of those alike it is the one that collected the smallest part, then the first.
+    """
+    missions = results.missions.query("policy == @policy and point == @VARIATION")
+    ordered = missions.sort_values([PRODUCT, RATIO], kind="stable")
+    return int(ordered["replication"].iloc[0])
+
+
+def conclusions(table: pd.DataFrame) -> str:
+    """What ``answers`` say of collection ratio and communication: a list, an item per policy."""
+    words = {
+        ABOVE: "is **higher** in the variation",
+        BELOW: "is **lower** in the variation",
+        INCONCLUSIVE: "is **inconclusive**",
+    }
+    return "\n".join(
+        f"- **{row.policy}**: collection ratio and communication {words[verdict(row)]}, by "
+        f"{change(row)} points: from {numbers.percent(row.before)} to "
+        f"{numbers.percent(row.after)}.{_missing(row) if verdict(row) == INCONCLUSIVE else ''}"
+        for row in table[table["metric"] == PRODUCT].itertuples()
+    )
+
+
+def _missing(answer: Any) -> str:
+    """How many missions would make an inconclusive answer a conclusive one."""
+    needed = missions_needed(answer)
+    if needed == np.inf:
+        return " How many missions would show a difference, these do not say."
+    return (
+        f" If the difference is as large as seen, some {float(f'{needed:.2g}'):,.0f} missions show "
+        f"it {100 * POWER:g} times in 100, instead of the {answer.n:,} here; these are kept, only "
+        "the others would be simulated."
+    )
+
+
+def best_of_side(results: Results, point: int) -> str:
+    """The best policy of a side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
+    policy, table = best_policy(results, point), means(results)
+    side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
+    mean = side.set_index("policy").loc[policy, ["mean", "low", "high"]]
+    return f"{policy}, {numbers.interval(*mean)}"
+
+
+def winners(results: Results) -> str:
+    """In what shares of the missions each policy has more, or less, in the variation."""
+    texts = []
+    for policy in results.policies:
+        change = differences(results, policy)
+        more, less = numbers.percent((change > 0).mean()), numbers.percent((change < 0).mean())
+        texts.append(f"{policy} has more in {more} of the missions and less in {less}")
+    return "; ".join(texts)
+
+
+def listed(table: pd.DataFrame, policy: str) -> pd.DataFrame:
+    """The rows of ``answers`` of a policy, as a table to print."""
+    lines = []
+    for row in table[table["policy"] == policy].itertuples():
+        write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
+        sides = [write(row.before), write(row.after)]
+        name, mark = (_SHORT | MEASURES)[row.metric], _MARKS[verdict(row)]
+        lines.append([name, *sides, f"{mark} {change(row)}{unit}"])
+    heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
+    return pd.DataFrame(lines, columns=heads)
+
+
+def pairing(table: pd.DataFrame) -> pd.DataFrame:
+    """What common random numbers gain in the rows of ``answers``, as a table to print."""
+    lines = []
+    for row in table[table["metric"].isin([*METRICS])].itertuples():
+        left = 1 - row.variance_reduction
+        narrower = numbers.percent(1 - left**0.5) if left < 1 else "none"
+        worth = f"{row.n / left:,.0f}" if left else "any number"
+        amounts = (_amount(row.correlation), numbers.percent(left), narrower, worth)
+        lines.append((row.policy, _SHORT[row.metric], *amounts))
+    heads = ["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"]
+    return pd.DataFrame(lines, columns=heads)
+
+
+def outcome(results: Results, policy: str, point: int, replication: int) -> str:
+    """What became of a mission, in a sentence."""
+    where = "policy == @policy and point == @point and replication == @replication"
+    (mission,) = results.missions.query(where).itertuples()
+    ends = results.uavs.query(where)["end"]
+    fates = {"battery": "deplete their battery", "truncated": "run out of time"}
+    failures = [
+        f"{(ends == end).sum()} of {len(ends)} UAVs {fate}"
+        for end, fate in fates.items()
+        if (ends == end).any()
+    ]
+    fate = f"but {numbers.words(failures)}: it counts 0" if failures else "all quotas filled"
+    return (
+        f"{SIDES[point].capitalize()} ({', '.join(settings_of(results)[point])}): collection ratio "
+        f"{numbers.percent(mission.collection_ratio)}, {fate}. {mission.slots} mission slots."
+    )
+
+
+def effect(results: Results, policy: str, replication: int) -> str:
+    """By how much the variation changes a mission, in a sentence."""
+    gap = numbers.difference(differences(results, policy)[replication], 0)
+    return (
+        f"Replication {replication} with **{policy}**: the variation changes collection ratio and "
+        f"communication by {gap} points."
+    )
+
+
+def commands(results: Results, policy: str, replication: int) -> list[str]:
+    """The commands that simulate a replication again, in the baseline and in the variation."""
+    points = (BASELINE, VARIATION)
+    return [
+        line
+        for point, side in zip(points, SIDES, strict=True)
+        for line in (f"# {side}", results.replay(policy, point, replication))
+    ]
+
+
+def change(answer: Any) -> str:
+    """The paired difference of a row of ``answers`` with its interval; short ones in more digits.
+
+    In percentage points for the paper's metrics.
+    """
+    ends = (answer.difference, answer.low, answer.high)
+    if answer.metric not in METRICS:
+        return _amount(*ends, sign="+")
+    if 0 < answer.high - answer.low < 0.01:
+        return _amount(*(100 * end for end in ends), sign="+")
+    return numbers.points(*ends)
+
+
+def _amount(value: float, *ends: float, sign: str = "") -> str:
+    """A number with two decimals, and its interval if it has a length."""
+    rounded = [round(number, 2) or 0.0 for number in (value, *ends)]  # no -0.00
+    texts = [numbers.minus(f"{number:{sign if number else ''}.2f}") for number in rounded]
+    return f"{texts[0]} [{', '.join(texts[1:])}]" if len({*ends}) > 1 else texts[0]
