@@ -5,6 +5,7 @@ table = answers(results)                       # a row per policy and metric
 verdict(table.iloc[0])                         # 'above': the variation has more
 """
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -175,14 +176,18 @@ def best_of_side(results: Results, point: int) -> str:
     return f"{policy}, {numbers.interval(*mean)}"
 
 
-def winners(results: Results) -> str:
-    """In what shares of the missions each policy has more, or less, in the variation."""
-    texts = []
-    for policy in results.policies:
-        change = differences(results, policy)
-        more, less = numbers.percent((change > 0).mean()), numbers.percent((change < 0).mean())
-        texts.append(f"{policy} has more in {more} of the missions and less in {less}")
-    return "; ".join(texts)
+def winners(changes: Mapping[str, pd.Series]) -> str:
+    """In what shares of the missions each policy has more, or less, in the variation.
+
+    Args:
+        changes: Per policy, as of ``differences``.
+    """
+    shares = {policy: [(gaps > 0).mean(), (gaps < 0).mean()] for policy, gaps in changes.items()}
+    return "; ".join(
+        f"{policy} has more in {numbers.percent(more)} of the missions and less in "
+        f"{numbers.percent(less)}"
+        for policy, (more, less) in shares.items()
+    )
 
 
 def listed(table: pd.DataFrame, policy: str) -> pd.DataFrame:

@@ -8,6 +8,8 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
+from analysis.questions import what_if
+from analysis.results.tables import Results
 from analysis.study.study import Study
 
 SCENARIO: dict[str, Any] = {
@@ -42,6 +44,19 @@ def small_study(folder: Path, **changes: Any) -> Study:
     path = folder / "trial.toml"
     path.write_text(tomli_w.dumps(values), "utf-8")
     return load_study(path, **changes)
+
+
+def asked(folder: Path, missions: int = 12, **changes: Any) -> Results:
+    """The answer to a question about the small scenario: six UAVs at a single pad, not two."""
+    values = {
+        "settings": {"uavs": 6, "pads": 1},
+        "baseline": {"uavs": 2},
+        "policies": ["random", "greedy"],
+        "seed": 3,
+        "scenario": write_scenario(folder),
+        "missions": missions,
+    }
+    return what_if.ask(what_if.question(**values | changes), folder)
 
 
 def grid(**values: Any) -> dict[str, Any]:
