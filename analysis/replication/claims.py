@@ -216,12 +216,12 @@ FIG_3 = Section("Fig. 3: transfer learning", "learning.html#fig-3", TRAININGS, [
     Claim(
         "With transfer learning, the reward is higher in all training steps",
         "Fig. 3a, Section V-B",
-        rules.throughout, partial(measures.end, metric="evaluation_reward", unit="reward"),
+        rules.throughout, partial(measures.final_lead, metric="evaluation_reward", unit="reward"),
     ),
     Claim(
         "With transfer learning, collection ratio and communication passes that without, and ends "
         "higher", "Fig. 3b, Section V-B",
-        rules.passes, partial(measures.end, metric=f"evaluation_{PRODUCT}", unit="points"),
+        rules.passes, partial(measures.final_lead, metric=f"evaluation_{PRODUCT}", unit="points"),
         Quantity(paper.CROSSING, unit="steps", name="crossing"),
     ),
     Claim(

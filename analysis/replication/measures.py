@@ -226,7 +226,7 @@ def setting(field: str, value: str) -> str:
 # Learning curves.
 
 
-def end(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
+def final_lead(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
     """By how much training with transfer learning ends above training without it."""
     transfer = evidence.transfer(metric)
     where = "ends below, or level"

@@ -3,30 +3,31 @@
 The paper: the learned policy of its Section V on a 32 x 32 map.
 """
 
+from analysis.names import PRODUCT, RATIO, SUCCESS
 from analysis.stats.intervals import Interval, wilson
 
 # Table IV: means over that many random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
 TABLE_IV = {
-    "success": 0.901,
-    "collection_ratio": 0.798,
-    "collection_ratio_and_communication": 0.719,
+    SUCCESS: 0.901,
+    RATIO: 0.798,
+    PRODUCT: 0.719,
 }
 
 # Fig. 4 (a), (b), (c) by number of UAVs: C_S 30, C_C 80, 12.5 data units per node, flying time 80.
 # Over how many missions is not said; the product is not printed.
 FIG_4 = {
-    1: {"success": 0.996, "collection_ratio": 0.634},
-    2: {"success": 0.996, "collection_ratio": 0.894},
-    3: {"success": 0.990, "collection_ratio": 0.938},
+    1: {SUCCESS: 0.996, RATIO: 0.634},
+    2: {SUCCESS: 0.996, RATIO: 0.894},
+    3: {SUCCESS: 0.990, RATIO: 0.938},
 }
 
 # Section V-D: means over that many missions with every parameter at its best value.
 SWEET_SPOT_MISSIONS = 300
 SWEET_SPOT = {
-    "success": 0.99,
-    "collection_ratio": 0.936,
-    "collection_ratio_and_communication": 0.93,
+    SUCCESS: 0.99,
+    RATIO: 0.936,
+    PRODUCT: 0.93,
 }
 
 # By the shipped study that does the same.

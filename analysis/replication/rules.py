@@ -14,7 +14,6 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from math import hypot
 
-import numpy as np
 import pandas as pd
 
 from analysis import numbers
@@ -22,7 +21,7 @@ from analysis.questions import main_effects
 from analysis.questions.learning import BAND, Transfer
 from analysis.questions.main_effects import Shape
 from analysis.replication.paper import CROSSING
-from analysis.stats.intervals import LEVEL, Interval
+from analysis.stats.intervals import Interval
 from analysis.stats.verdict import (
     ABOVE,
     BELOW,
@@ -34,6 +33,7 @@ from analysis.stats.verdict import (
     above,
     judged,
     position,
+    position_by_test,
 )
 from analysis.study.selection import Choice
 
@@ -200,10 +200,11 @@ divided = Rule(
 @rule(f"Holds if every other value is surely lower {_PAIRS}; does not hold if one is surely higher")
 def best(leads: pd.DataFrame) -> str:
     """Whether the metric is highest at a value."""
-    signs = np.sign(leads["difference"]).where(leads["p_adjusted"] <= 1 - LEVEL, 0)
-    if (signs < 0).any():
+    tests = zip(leads["difference"], leads["p_adjusted"], strict=True)
+    positions = {position_by_test(difference, p) for difference, p in tests}
+    if BELOW in positions:
         return REFUTED
-    return HOLDS if (signs > 0).all() else INCONCLUSIVE
+    return HOLDS if positions == {ABOVE} else INCONCLUSIVE
 
 
 lowest = Rule(

@@ -3,19 +3,20 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from analysis import load_study, run_study
-from analysis.names import METRICS, PRODUCT
+from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.replication import claims, paper
 from analysis.replication import scorecard as module
 from analysis.replication.rules import NO_RESULTS, VERDICTS
-from analysis.replication.scorecard import Row, departures, of_policy, scorecard
+from analysis.replication.scorecard import Finding, Row, departures, of_policy, scorecard
 from analysis.results.tables import Results
-from analysis.stats.intervals import Interval, summary
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
@@ -31,7 +32,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
     """Tiny results of all studies that are read."""
     folder = tmp_path_factory.mktemp("results")
     corners = grid(uavs=[1, 3], initial_data=[[5, 7.5], 10])
-    changes = {
+    changes: dict[str, dict[str, Any]] = {
         "table4": {"missions": 30},
         "fig4": {"missions": 4, "logged": 2},
         "fig5": {"missions": 3},
@@ -77,6 +78,11 @@ def row_of(rows: list[Row], words: str) -> Row:
     return row
 
 
+def learned(rows: list[Row], words: str) -> Finding:
+    """The finding by the best learned policy on the claim with these words."""
+    return row_of(rows, words).findings[0]
+
+
 def changed(results: Results, **values: object) -> Results:
     """The same missions of ddqn with other figures."""
     of_policy = results.missions["policy"] == "ddqn"
@@ -91,7 +97,7 @@ def with_uavs(results: Results, metric: str, values: dict[int, float]) -> Result
     return changed(results, **{metric: results.missions["uavs"].map(values)})
 
 
-def test_every_claim_is_told_whole(rows: list[Row]) -> None:
+def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row]) -> None:
     assert len(rows) >= 25
     assert len({row.claim.text for row in rows}) == len(rows)
     for row in rows:
@@ -141,7 +147,7 @@ def test_a_study_alone_is_judged_alone(
     assert judged
     for row in judged:
         if "point" not in row.rule or margin == 0.01:  # the margin is the sweet spot's
-            assert row.findings[0] == row_of(rows, row.claim.text).findings[0]
+            assert row.findings[0] == learned(rows, row.claim.text)
 
 
 def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
@@ -149,19 +155,44 @@ def test_the_margin_is_that_of_the_sweet_spot(rows: list[Row]) -> None:
     assert "within 1 point;" in row_of(scorecard({}, NONE), "All values of C_C").rule
 
 
-def test_printed_figures_are_beside_our_means(rows: list[Row], studies: dict[str, Results]) -> None:
-    own = studies["table4"].missions.query("policy == 'ddqn'")
-    means = summary(own).set_index("metric")
+def test_means_beside_printed_figures_are_those_of_the_parquet(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    """Student's t for means, Wilson's formula for the share of successes."""
+    missions = pd.read_parquet(studies["table4"].store.folder / "missions")
+    missions = missions[missions["policy"] == "ddqn"]
+    n, z = len(missions), stats.norm.ppf(0.975)
     for metric, name in METRICS.items():
-        row = row_of(rows, f"{name} over random")
-        assert row.claim.printed.value == paper.TABLE_IV[metric]
-        assert (row.claim.printed.low is not None) == (metric == "success")  # a share of missions
-        (ours,) = row.findings[0].quantities
-        assert [*ours.interval, ours.n] == means.loc[metric, ["mean", "low", "high", "n"]].tolist()
-    low, high = means.loc["collection_ratio", ["low", "high"]]
-    against = row_of(rows, "Collection ratio over random").findings[0].against
-    printed = paper.TABLE_IV["collection_ratio"]
-    assert against == ("above" if low > printed else "below" if high < printed else INCONCLUSIVE)
+        row, values = row_of(rows, f"{name} over random"), missions[metric].astype(float)
+        middle, half = values.mean(), stats.t.ppf(0.975, n - 1) * values.std() / np.sqrt(n)
+        if metric == SUCCESS:
+            share = values.mean()
+            middle = (share + z**2 / (2 * n)) / (1 + z**2 / n)
+            half = z / (1 + z**2 / n) * np.sqrt(share * (1 - share) / n + z**2 / (4 * n**2))
+        (quantity,), printed = row.findings[0].quantities, row.claim.printed
+        expected = values.mean(), middle - half, middle + half, n
+        assert quantity[:4] == pytest.approx(expected)
+        assert printed and printed.value == paper.TABLE_IV[metric]
+        assert (printed.low is not None) == (metric == SUCCESS)  # a share of missions
+        lies = {expected[1] > printed.value: "above", expected[2] < printed.value: "below"}
+        assert row.findings[0].against == lies.get(True, INCONCLUSIVE)
+
+
+def test_what_a_uav_changes_is_that_of_the_parquet(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    """Mission by mission, by Student's t."""
+    missions = pd.read_parquet(studies["fig4"].store.folder / "missions")
+    by_uavs = missions[missions["policy"] == "ddqn"].pivot(
+        index="replication", columns="uavs", values=RATIO
+    )
+    for words, uavs in (("dramatically", 2), ("further", 3)):
+        change = by_uavs[uavs] - by_uavs[uavs - 1]
+        low, high = stats.t.interval(0.95, len(change) - 1, change.mean(), stats.sem(change))
+        (quantity,) = learned(rows, words).quantities
+        assert quantity[:4] == pytest.approx((change.mean(), low, high, len(change)))
+    verdict = HOLDS if low > 0 else REFUTED if high < 0 else INCONCLUSIVE
+    assert learned(rows, "further").verdict == verdict
 
 
 @pytest.mark.parametrize(("ratio", "verdict"), [(0.9, HOLDS), (0.76, IN_PART), (0.5, REFUTED)])
@@ -170,8 +201,8 @@ def test_other_figures_turn_verdicts(
 ) -> None:
     table4 = changed(studies["table4"], success=1, collection_ratio=ratio)
     found = scorecard({"table4": table4}, NONE)
-    assert row_of(found, "Collection ratio over random").findings[0].verdict == verdict
-    assert row_of(found, "Successful communication over random").findings[0].verdict == HOLDS
+    assert learned(found, "Collection ratio over random").verdict == verdict
+    assert learned(found, "Successful communication over random").verdict == HOLDS
 
 
 def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
@@ -179,11 +210,11 @@ def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
     halves = studies["table4"].missions["replication"] % 2
     table4 = changed(studies["table4"], success=halves, collection_ratio=halves)
     found = scorecard({"table4": replace(table4, missions=table4.missions.head(60))}, NONE)
-    assert row_of(found, "Successful communication over").findings[0].verdict == REFUTED
+    assert learned(found, "Successful communication over").verdict == REFUTED
     wide = changed(studies["table4"], collection_ratio=halves * 0.4 + 0.6)
     few = wide.missions[wide.missions["replication"] < 6]
     found = scorecard({"table4": replace(wide, missions=few)}, NONE)
-    assert row_of(found, "Collection ratio over").findings[0].verdict == INCONCLUSIVE
+    assert learned(found, "Collection ratio over").verdict == INCONCLUSIVE
 
 
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
@@ -222,12 +253,13 @@ def test_what_one_more_uav_changes(
         [fig4.missions.assign(replication=fig4.missions["replication"] + 4 * k) for k in range(9)]
     )
     found = scorecard({"fig4": replace(fig4, missions=many)}, NONE)
-    assert row_of(found, "dramatically").findings[0].verdict == dramatic
-    assert row_of(found, "further").findings[0].verdict == further
-    assert row_of(found, "All else given").findings[0].verdict == best
-    change = row_of(found, "dramatically").findings[0].quantities[0]
+    assert learned(found, "dramatically").verdict == dramatic
+    assert learned(found, "further").verdict == further
+    assert learned(found, "All else given").verdict == best
+    change = learned(found, "dramatically").quantities[0]
     assert change.value == pytest.approx(ratios[2] - ratios[1])
-    assert row_of(found, "dramatically").claim.printed.value == pytest.approx(0.894 - 0.634)
+    printed = row_of(found, "dramatically").claim.printed
+    assert printed and printed.value == pytest.approx(0.894 - 0.634)
 
 
 def test_any_policy_is_judged_by_the_same_rules(
@@ -243,9 +275,9 @@ def test_any_policy_is_judged_by_the_same_rules(
 def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:
     means = studies["fig5"].missions.query("policy == 'ddqn'").groupby("point")
     product, ratio = means[PRODUCT].mean()[:3], means["collection_ratio"].mean()[:3]  # 1, 2, 3 UAVs
-    ahead = row_of(rows, "best with three UAVs").findings[0].quantities[0]
+    ahead = learned(rows, "best with three UAVs").quantities[0]
     assert ahead.value == pytest.approx(product[2] - max(product[:2]))
-    below = row_of(rows, "A lone UAV is an extreme").findings[0].quantities[0]
+    below = learned(rows, "A lone UAV is an extreme").quantities[0]
     assert below.value == pytest.approx(min(ratio[1:]) - ratio[0])
 
 
@@ -259,7 +291,7 @@ def test_the_sweet_spot_is_judged_by_its_check(
     assert row.findings[0].quantities[0].n == RULE["check"]
     choice = sweet.choice("ddqn")
     assert choice is not None
-    chosen = row_of(rows, "sweet spot is one of").findings[0].quantities[0]
+    chosen = learned(rows, "sweet spot is one of").quantities[0]
     assert chosen.value == sweet.store.manifest.points[choice.best].values["uavs"]
     unchecked = replace(sweet, checks=sweet.checks[:0])
     found = row_of(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
@@ -282,7 +314,7 @@ def test_claims_on_where_uavs_fly_are_counted_from_the_event_logs(
         return share.reindex(nodes.index).fillna(0) < 0.5
 
     def values(words: str) -> list[float]:
-        return [quantity.value for quantity in row_of(rows, words).findings[0].quantities]
+        return [quantity.value for quantity in learned(rows, words).quantities]
 
     charges = [(log["event"] == "charge_start").sum() == 1 for log in logs[0]]
     assert values("charges once") == [np.mean(charges)]
@@ -362,17 +394,11 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
         for name, design in designs.items()
     }
     found = scorecard(others, NONE)
-    assert row_of(found, "dramatically").findings[0].verdict == NO_RESULTS
-    assert row_of(found, "best with three UAVs").findings[0].verdict == NO_RESULTS
-    assert row_of(found, "two sectors").findings[0].verdict in VERDICTS
+    assert learned(found, "dramatically").verdict == NO_RESULTS
+    assert learned(found, "best with three UAVs").verdict == NO_RESULTS
+    assert learned(found, "two sectors").verdict in VERDICTS
     small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
     assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
-
-
-def test_what_the_paper_names(rows: list[Row]) -> None:
-    assert "15–17.5" in row_of(rows, "More initial data").claim.text
-    crossing = row_of(rows, "passes that without").claim.printed
-    assert crossing and crossing.interval == Interval(*3 * [paper.CROSSING])
 
 
 def test_what_of_the_paper_s_network_is_ours() -> None:
