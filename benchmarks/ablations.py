@@ -1,7 +1,9 @@
-"""What each step of the batch engine's speed buys: the engine without it, measured in turn.
+"""Ablation of the batch engine: its speed without each of its optimisations.
 
-Every variant is a copy of the packages in which one line is changed. All give the same records.
-Run it with ``python benchmarks/ablations.py``; the table goes into docs/performance.md.
+Every variant is a copy of the packages with one line changed. All give the same records. The table
+goes into docs/performance.md.
+
+    python benchmarks/ablations.py
 """
 
 import shutil
@@ -14,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 ROUNDS = 3
 
-# What is taken away: file, line, what stands there instead.
+# Variant -> changes: file, line, replacement.
 VARIANTS = {
     "as it is": (),
     "no pruning: every node with data is drawn": (
@@ -40,15 +42,15 @@ TIMED = """
 import sys, time
 sys.path.insert(0, ".")
 import numpy as np, policies
-from benchmarks.replay import Recorder, Replay
+from benchmarks.recorded import Recorded, Recorder
 from dess import load_scenario, simulate_batch
 scenario, missions = load_scenario("paper"), 600
 recorder = Recorder(policies.load("greedy"), missions, scenario.max_slots, scenario.uavs[1])
 simulate_batch(scenario, recorder, 5, missions)
-replay, best = Replay(recorder.actions), float("inf")
+recorded, best = Recorded(recorder.actions), float("inf")
 for _ in range(4):
     start = time.perf_counter()
-    records = simulate_batch(scenario, replay, 5, missions).missions
+    records = simulate_batch(scenario, recorded, 5, missions).missions
     best = min(best, time.perf_counter() - start)
 print(1e9 * best / records["uav_slots"].sum(), records.tobytes().__hash__())
 """

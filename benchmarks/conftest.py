@@ -1,4 +1,4 @@
-"""The missions that the benchmarks fly, and the table that they end with."""
+"""The missions that the benchmarks run, and the table that they end with."""
 
 from typing import NamedTuple
 
@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import policies
-from benchmarks.replay import Recorder
+from benchmarks.recorded import Recorder
 from dess import load_scenario, simulate_batch
 from dess.scenario import ScenarioSpace
 
 SEED, MISSIONS = 5, 2000
 
 
-class Flown(NamedTuple):
-    """Missions of greedy on the paper's scenario: what was done, and how much it was."""
+class RecordedMissions(NamedTuple):
+    """Missions of greedy on the paper's scenario: the actions and the number of UAV-slots."""
 
     scenario: ScenarioSpace
     actions: np.ndarray
@@ -22,11 +22,11 @@ class Flown(NamedTuple):
 
 
 @pytest.fixture(scope="session")
-def flown() -> Flown:
+def recorded() -> RecordedMissions:
     scenario = load_scenario("paper")
     recorder = Recorder(policies.load("greedy"), MISSIONS, scenario.max_slots, scenario.uavs[1])
     records = simulate_batch(scenario, recorder, SEED, MISSIONS)
-    return Flown(scenario, recorder.actions, int(records.missions["uav_slots"].sum()))
+    return RecordedMissions(scenario, recorder.actions, int(records.missions["uav_slots"].sum()))
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -1,7 +1,7 @@
-"""The floor under any engine: the time of the draws that missions need, and nothing else.
+"""A lower bound of the time of any engine: the random draws that missions need.
 
-A deviate is needed if its node could still win, given that deviates are bounded: without it nobody
-can know which node is best. A block is needed if one of its words is.
+A deviate is needed if its node could still be the best, given that deviates are bounded. A block is
+needed if one of its words is.
 """
 
 import math
@@ -42,8 +42,8 @@ def needed_draws(
 
 
 @kernel
-def _count(mission, uavs, residual, actions, nodes, path_loss, order, means, batches, search):
-    """Fly one mission and count."""
+def _count(mission, uavs, residual, actions, nodes, mean_snr, order, means, batches, search):
+    """Simulate one mission and count."""
     arrivals = np.empty(len(nodes), np.int64)
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
     blocks = deviates = 0
@@ -57,7 +57,7 @@ def _count(mission, uavs, residual, actions, nodes, path_loss, order, means, bat
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
             rules.communicate(
-                mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+                mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
             )
             for i in range(mission.uavs):
                 if not uavs[i].active or uavs[i].charging or uavs[i].served < 0:

@@ -1,6 +1,13 @@
 """Discrete-event simulation of UAV data harvesting with charging at sea.
 
-Names load on first use, so that importing the package costs nothing.
+    import dess, policies
+
+    scenario = dess.load_scenario("paper", uavs=3)
+    record = dess.simulate(scenario, policies.load("greedy"), seed=1)
+    records = dess.simulate_batch(scenario, policies.load("greedy"), seed=1, replications=1000)
+    records.missions["success"].mean()
+
+Names are imported on first use, so that ``import dess`` is fast.
 """
 
 from importlib import import_module, metadata

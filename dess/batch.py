@@ -1,8 +1,11 @@
 """The batch engine: many missions advance slot by slot in compiled code over ``rules.py``.
 
-A batch has a fixed number of places. A finished mission makes room for the next one, so the batch
-stays full. The policies are asked once per slot for all rows that must act. What a mission does
-never depends on the others: B missions in a batch equal B single ones, in any order and grouping.
+    records = simulate_batch(load_scenario("paper"), policies.load("greedy"), 1, range(1000))
+    records.missions["collection_ratio"].mean()
+
+A batch has a fixed number of places; when a mission ends, the next one takes its place. The
+policies decide once per slot for all UAVs of the batch. Missions are independent: their records
+do not depend on the order or the grouping.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +30,7 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
-BATCH_SIZE = 256  # missions in flight: enough to hide Python's share, few enough for the cache
+BATCH_SIZE = 256  # many enough to make Python's share small, few enough for the cache
 
 
 def simulate_batch(
@@ -47,8 +50,8 @@ def simulate_batch(
         policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
         seed: Seed of all missions.
         replications: Their replication numbers, or how many, counted from 0.
-        workers: Threads; the compiled code runs beside Python.
-        batch_size: Missions in flight per thread.
+        workers: Threads; the compiled code does not hold Python's lock.
+        batch_size: Missions in progress per thread.
         progress: Called with the number of missions finished since its last call.
 
     Returns:
@@ -57,7 +60,7 @@ def simulate_batch(
 
     Raises:
         InputError: If the seed or a replication is out of range.
-        ValueError: If a policy returns something that is no action.
+        ValueError: If a policy does not return actions.
     """
     numbers = _numbers(replications)
     for number in (numbers.min(), numbers.max()) if len(numbers) else ():
@@ -96,7 +99,7 @@ def simulate_batch(
             try:
                 for future in [pool.submit(run, *task) for task in tasks]:
                     future.result()
-            finally:  # an error or Ctrl-C here ends the other threads too
+            finally:  # after an error or Ctrl-C the other threads stop too
                 stop.set()
     return records
 
@@ -112,7 +115,7 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
 
 
 def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
-    """The indices of the scenarios, grouped by what a batch must have in common."""
+    """The indices of the scenarios, grouped by the constants that a batch must share."""
 
     def key(index: int) -> tuple:
         s = spaces[index]
@@ -134,7 +137,7 @@ class _Batch:
         self.uavs = int(self.ranges[:, 0, 1].max())
 
     def run(self, jobs, which, numbers, records, progress, stop) -> None:
-        """Simulate the missions ``jobs`` and write their records, until told to stop."""
+        """Simulate the missions ``jobs`` and write their records, until ``stop`` is set."""
         size, nodes = min(self.batch_size, len(jobs)), len(self.world.nodes)
         state = empty_state(size, self.uavs, nodes)
         scratch = empty_scratch(self.uavs, nodes)
@@ -143,14 +146,14 @@ class _Batch:
         source = (self.constants, self.ranges, which, numbers, jobs)
         for b in range(size):
             _next_mission(b, job_of, queue, source, state)
-        # Telling costs time that all threads share: a hundred times will do.
-        told, step = 0, max(1, len(jobs) // 100)
+        # Reporting takes time that all threads share: a hundred reports suffice.
+        reported, step = 0, max(1, len(jobs) // 100)
         while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
             _advance(job_of, queue, source, state, self.world, scratch, records)
-            if progress and (queue[1] >= told + step or queue[1] == len(jobs)):
-                progress(int(queue[1]) - told)
-                told = int(queue[1])
+            if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
+                progress(int(queue[1]) - reported)
+                reported = int(queue[1])
 
 
 @kernel
@@ -172,8 +175,8 @@ def _next_mission(b, job_of, queue, source, state):
 
 @kernel
 def _advance(job_of, queue, source, state, world, scratch, records):
-    """One mission slot of every mission; finished missions leave their record and make room."""
-    nodes, path_loss, order, means = world
+    """Advance every mission by one slot; a mission that ends is recorded and replaced."""
+    nodes, mean_snr, order, means = world
     batches, search = scratch
     missions, uavs, residual = state
     arrivals = np.empty(len(nodes), np.int64)
@@ -182,7 +185,7 @@ def _advance(job_of, queue, source, state, world, scratch, records):
             continue
         mission, team, data = missions[b], uavs[b], residual[b]
         rules.advance(
-            mission, team, data, arrivals, nodes, path_loss, order, means, batches, search
+            mission, team, data, arrivals, nodes, mean_snr, order, means, batches, search
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]

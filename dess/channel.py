@@ -1,8 +1,8 @@
-"""The channel: what all missions of a world share, and which node a UAV hears best (eq. 9-11).
+"""The channel: mean SNR, shadowing and the search for the best node of a UAV (eq. 9-11).
 
-The mean SNR is a table: for each step that leads to a cell, all nodes in falling order of it.
-Shadowing is drawn for those nodes alone that can still win: deviates are bounded, so the search
-ends at the first batch of nodes whose means lie too far below the best value so far.
+The mean SNR comes from a table: for each step, the nodes in descending order of mean SNR. Shadowing
+is drawn only for nodes that can still be the best: deviates are bounded, so the search ends at the
+first batch of nodes whose means lie too far below the best value so far.
 """
 
 import math
@@ -29,7 +29,7 @@ BATCH = np.dtype(
         ("node", np.int64, _BATCH),
         ("mean", np.float64, (GROUP, _BATCH)),  # mean SNR per communication slot [dB]
         ("words", np.uint64, (GROUP, _BATCH)),  # shadowing words per communication slot
-        ("snr", np.float64, (GROUP, _BATCH)),  # SNR [dB], or a bound of it far out in the tail
+        ("snr", np.float64, (GROUP, _BATCH)),  # SNR [dB], or an upper bound in the tails
         ("top", np.int64, GROUP),  # place of the highest SNR per communication slot
         ("rest", np.float64),  # highest mean SNR in the slot of all nodes behind these [dB]
     ]
@@ -37,21 +37,21 @@ BATCH = np.dtype(
 
 
 class World(NamedTuple):
-    """What all missions of a batch share: the nodes and the tables of the channel.
+    """The nodes and the tables of the channel, shared by all missions of a batch.
 
-    A step is an action and the cell that it leads to; its row is filled when a UAV first makes it.
+    A step is an action and the cell that it leads to; its row is computed when first needed.
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
-        path_loss: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
+        mean_snr: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
             and ``b / m`` cells along the other: the lattice of all positions a UAV can serve from.
-        order: (5 * M * M, K + 1) per step the nodes by falling mean SNR, its highest in the slot;
-            last whether the row is filled.
+        order: (5 * M * M, K + 1) per step the nodes in descending order of their highest mean
+            SNR in the slot; the last column tells whether the row is filled.
         means: (5 * M * M, K, m) per step their mean SNR per communication slot [dB].
     """
 
     nodes: np.ndarray
-    path_loss: np.ndarray
+    mean_snr: np.ndarray
     order: np.ndarray
     means: np.ndarray
 
@@ -62,8 +62,8 @@ class Scratch(NamedTuple):
     Attributes:
         batches: (I, C) ``BATCH`` records: the nodes tried for each UAV, eight at a time.
         search: (I, 4) per UAV the batches drawn, the rank behind them, the row of its step, and
-            the nodes in a batch, always eight. The compiled code reads that number, since the
-            compiler makes vector code of no loop that it knows to be so short.
+            the nodes in a batch, always eight. The compiled code reads that number at run time,
+            since the compiler does not vectorise a loop that it knows to be so short.
     """
 
     batches: np.ndarray
@@ -83,7 +83,7 @@ def empty_scratch(uavs: int, nodes: int) -> Scratch:
 def world_of(scenario: ScenarioSpace) -> World:
     """The nodes of a scenario and the tables of its channel (eq. 10, in dB).
 
-    Every thread has tables of its own, since it fills them as it goes.
+    Every thread has its own tables, since it fills them row by row.
     """
     return _world_of(scenario, get_ident())
 
@@ -96,16 +96,16 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     horizontal = scenario.cell_size * np.hypot(coarse, fine)
     distance = np.hypot(horizontal, scenario.altitude)
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
-    path_loss = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
+    mean_snr = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
     nodes, steps = np.array(scenario.nodes, np.int64), 5 * grid * grid
-    # Memory is taken page by page as the rows are filled.
+    # The operating system allocates memory page by page as the rows are filled.
     order = np.zeros((steps, len(nodes) + 1), np.int16)
-    return World(nodes, path_loss, order, np.zeros((steps, len(nodes), m)))
+    return World(nodes, mean_snr, order, np.zeros((steps, len(nodes), m)))
 
 
 @kernel
-def _fill_row(u, row, nodes, path_loss, order, means):
-    """Fill the row of a step: its nodes by falling mean SNR (ties: lower index), their means."""
+def _fill_row(u, row, nodes, mean_snr, order, means):
+    """Fill the row of a step: nodes by descending mean SNR (ties: lower index), and the means."""
     count, m = means.shape[1:]
     step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
     value = np.empty((count, m))
@@ -114,7 +114,7 @@ def _fill_row(u, row, nodes, path_loss, order, means):
         dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
         fine, coarse = (m * dx, dy) if along_x else (m * dy, dx)
         for n in range(m):  # short of the cell by the communication slots that are left
-            value[k, n] = path_loss[abs(coarse), abs(fine - (m - 1 - n) * step)]
+            value[k, n] = mean_snr[abs(coarse), abs(fine - (m - 1 - n) * step)]
             high[k] = max(high[k], value[k, n])
     ranking = np.argsort(-high, kind="mergesort")
     for rank in range(count):
@@ -124,20 +124,20 @@ def _fill_row(u, row, nodes, path_loss, order, means):
 
 
 @inlined
-def open_group(mission, i, u, nodes, path_loss, order, means, search):
-    """Begin a group of communication slots for UAV ``i``: nothing is drawn."""
+def open_group(mission, i, u, nodes, mean_snr, order, means, search):
+    """Begin a group of communication slots for UAV ``i``: no shadowing is drawn yet."""
     row = (u.executed * mission.grid + u.y) * mission.grid + u.x
     search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
     if order[row, mission.nodes] == 0:
-        _fill_row(u, row, nodes, path_loss, order, means)
+        _fill_row(u, row, nodes, mean_snr, order, means)
 
 
 @inlined
 def best_node(mission, i, residual, order, means, batches, search, n):
     """Highest SNR [dB] of UAV ``i`` among the nodes with data, and its node; -1 without any.
 
-    On a tie the node with the lowest index wins. The arrays of ``World`` and ``Scratch`` come one
-    by one: the reference counts of tuples of them cost more than the search itself.
+    On a tie the node with the lowest index wins. The arrays of ``World`` and ``Scratch`` are passed
+    one by one: reference counting of tuples would cost more than the search itself.
 
     Args:
         mission: ``MISSION`` record.
@@ -155,7 +155,7 @@ def best_node(mission, i, residual, order, means, batches, search, n):
         if count == search[i, DRAWN]:
             rank, row = search[i, RANK], search[i, ROW]
             search[i, DRAWN] += 1
-            search[i, RANK] = _enter(mission, residual, order, means, row, rank, group, batch)
+            search[i, RANK] = _fill_batch(mission, residual, order, means, row, rank, group, batch)
             _draw(mission, group * 65536 + i, batch, search[i, WIDTH])
         snr, k = _best_of_batch(mission, residual, batch, word, search[i, WIDTH])
         if snr > best or (snr == best and k < node):
@@ -166,8 +166,8 @@ def best_node(mission, i, residual, order, means, batches, search, n):
 
 
 @inlined
-def _enter(mission, residual, order, means, row, rank, group, batch):
-    """Enter nodes of a row from a rank on; the rank behind them."""
+def _fill_batch(mission, residual, order, means, row, rank, group, batch):
+    """Put the next nodes of a row, from a rank on, into a batch; returns the rank behind them."""
     node, mean = batch.node, batch.mean
     first, count = group * GROUP, min(GROUP, mission.communication_slots - group * GROUP)
     place = 0
@@ -190,7 +190,7 @@ def _enter(mission, residual, order, means, row, rank, group, batch):
 
 @inlined
 def _draw(mission, substream, batch, width):
-    """Draw the shadowing of a batch: the SNR of its nodes [dB], or a bound far out in the tail."""
+    """Draw the shadowing of a batch: the SNR of its nodes [dB], or a bound in the tails."""
     words, mean, snr = batch.words, batch.mean, batch.snr
     streams.blocks(
         mission.seed, mission.replication, streams.SHADOWING, substream, mission.slot,
@@ -206,8 +206,8 @@ def _draw(mission, substream, batch, width):
 
 @inlined
 def _best_of_batch(mission, residual, batch, word, width):
-    """Highest SNR [dB] in a batch, and its node; -1 without any that has data."""
-    exact = 0  # places whose bound has given way to the true value, as bits
+    """Highest SNR [dB] in a batch, and its node; -1 if no node of it has data."""
+    exact = 0  # places whose bound has been replaced by the exact value, as bits
     while True:
         place = batch.top[word]
         node, snr = batch.node[place], batch.snr[word, place]
@@ -227,7 +227,7 @@ def _best_of_batch(mission, residual, batch, word, width):
 
 @inlined
 def _top(node, snr, word, width):
-    """Place of the highest SNR in a communication slot, of the lowest node on a tie."""
+    """Place of the highest SNR in a communication slot; the lowest node on a tie."""
     best = snr[word, 0]
     for place in range(1, _BATCH):
         value = snr[word, place]

@@ -1,5 +1,5 @@
-"""The one exception that bad input raises."""
+"""The exception that invalid input raises."""
 
 
 class InputError(ValueError):
-    """Input that the user can mend: one line saying where, what, and what is allowed."""
+    """Invalid input; one line that names the place, the problem and the allowed values."""

@@ -1,4 +1,9 @@
-"""TOML files by name or path, and files that are written whole or not at all."""
+"""Reading TOML files by name or path, and writing files atomically.
+
+where, values = Shipped("scenario", "dess", "scenarios").load("paper")
+with replacing(Path("table.json")) as temporary:
+    temporary.write_text(text)
+"""
 
 import os
 import tomllib
@@ -12,12 +17,12 @@ from dess.errors import InputError
 
 
 class Shipped(NamedTuple):
-    """A folder of TOML files that come with a package, known by their names.
+    """A folder of TOML files in a package, loaded by name.
 
     Attributes:
-        kind: What one of them is, as messages call it: ``scenario``.
-        package: The package that they come with.
-        folder: Their folder in it.
+        kind: The word for one of the files in messages, such as ``scenario``.
+        package: The package that contains the folder.
+        folder: The folder.
     """
 
     kind: str
@@ -30,13 +35,13 @@ class Shipped(NamedTuple):
         return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
 
     def load(self, name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
-        """The content of a shipped file, by its name, or of any TOML file, by its path.
+        """Read a shipped file by its name, or any TOML file by its path.
 
         Returns:
-            Where it was read, for messages, and what was read.
+            The name or path, for messages, and the content.
 
         Raises:
-            InputError: If there is no such file, it cannot be read, or it is not TOML.
+            InputError: If the file does not exist, cannot be read or is not TOML.
         """
         text = str(name_or_path)
         if text in self.names():
@@ -53,10 +58,10 @@ class Shipped(NamedTuple):
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """TOML text as a dictionary.
+    """Parse TOML text that was read from ``where``.
 
     Raises:
-        InputError: If the text is no TOML; ``where`` says where it came from.
+        InputError: If the text is not TOML.
     """
     try:
         return tomllib.loads(text)
@@ -66,10 +71,10 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary file beside ``path`` that takes its place at the end; it goes if that fails.
+    """Give a temporary file that replaces ``path`` at the end; on an error it is deleted.
 
     Raises:
-        InputError: At once, if no file can be written there.
+        InputError: Before anything else, if no file can be written there.
     """
     if path.is_dir():
         raise InputError(f"{path}: is a folder; allowed: a file")
@@ -86,10 +91,10 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writable(path: Path) -> Iterator[None]:
-    """Say in one line that a path cannot be written, where the system says so.
+    """Turn an ``OSError`` of writing to ``path`` into a one-line message.
 
     Raises:
-        InputError: In place of an ``OSError``.
+        InputError: In place of the ``OSError``.
     """
     try:
         yield

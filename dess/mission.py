@@ -1,8 +1,21 @@
 """The SimPy model: one mission as processes and events.
 
-This module owns time. The mission clock opens each mission slot, fires the communication slots at
+This module owns time. The mission clock opens each mission slot, runs the communication slots at
 t + n/m and the arrivals at its end; one process per UAV asks for a charging pad and gives it back;
 the charging zone is a monitored ``simpy.Resource``. Every consequence is a call of ``rules.py``.
+
+    record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
+    record.success, record.collection_ratio, record.events.columns()
+
+Several things happen at the start of a slot, at the same simulation time. SimPy processes the
+events of one time in the order in which they were scheduled, so a timeout of zero
+(``_after_due_events``) resumes the clock only when everything already scheduled for this time is
+done. That fixes the order inside a slot; ``docs/model.md`` has a drawing of it:
+
+1. the UAVs have given back the pads of the slot before;
+2. the policies decide, the safety controller resolves, ``slot_opens`` resumes the UAVs;
+3. the UAVs have asked for pads, left the queue or given back theirs;
+4. the pads given back are granted to the next UAVs in the queue, and charging starts.
 """
 
 from collections.abc import Generator, Sequence
@@ -40,7 +53,7 @@ def simulate(
     """Simulate one mission with the SimPy model.
 
     Args:
-        scenario: The scenario, or the space that the replication draws its own from.
+        scenario: The scenario, or the space from which the replication draws its parameters.
         policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
         seed: Seed of the study.
         replication: Number of the replication.
@@ -48,28 +61,28 @@ def simulate(
 
     Raises:
         InputError: If the seed or the replication is out of range.
-        ValueError: If a policy returns something that is no action.
+        ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)
     log = EventLog() if events else None
-    return Mission(spaces_of([scenario])[0], team_of(policy), seed, replication, log).run()
+    return MissionModel(spaces_of([scenario])[0], team_of(policy), seed, replication, log).run()
 
 
 class ChargingZone(simpy.Resource):
-    """The charging pads of the zone, granted first come first served; every step is logged."""
+    """The charging pads of the zone, granted first come first served, with a log of their use."""
 
     def __init__(self, env: simpy.Environment, pads: int, log: EventLog | None):
         super().__init__(env, capacity=pads)
         self._log = log
 
-    def record(self, event: str, time: float, i: int, u: np.void) -> None:
+    def log_event(self, event: str, time: float, i: int, u: np.void) -> None:
         """Log ``charge_request``, ``charge_start`` or ``charge_end`` of UAV ``i``."""
         if self._log is not None:
             self._log.add(time, event, i, -1, u["battery"], u["x"], u["y"])
 
 
-class Mission:
-    """One mission: its clock, its UAVs and its charging zone."""
+class MissionModel:
+    """The processes of one mission: its clock and its UAVs, around the charging zone."""
 
     def __init__(
         self,
@@ -107,20 +120,18 @@ class Mission:
         return MissionRecord(records.missions[0], records.uavs[0], self.log)
 
     def _clock(self) -> Process:
-        """Open the mission slots, fire their communication slots, close them."""
+        """Open every mission slot, run its communication slots and close it."""
         env, mission, uavs = self.env, self.mission, self.uavs
         m = int(mission["communication_slots"])
         while mission["active"] > 0:
             start = int(mission["slot"])
-            yield env.timeout(
-                0
-            )  # the UAVs wait for the slot, those done have given back their pads
+            yield _after_due_events(env)  # the UAVs have given back the pads of the last slot
             decide(self.team, self.state, self.world)
             rules.resolve(mission, uavs)
             opened, self.slot_opens = self.slot_opens, env.event()
             opened.succeed()
-            yield env.timeout(0)  # the UAVs have asked for pads or left
-            yield env.timeout(0)  # pads that were given up went to the next in the queue
+            yield _after_due_events(env)  # the UAVs have asked for pads or given them back
+            yield _after_due_events(env)  # free pads are granted to the next in the queue
             self._start_charging()
             rules.spend(mission, uavs)
             self._log_moves()
@@ -133,12 +144,12 @@ class Mission:
             self._settle()
             ended, self.slot_ends = self.slot_ends, env.event()
             ended.succeed()
-        yield env.timeout(0)  # the last UAV gives its pad back
+        yield _after_due_events(env)  # the last UAV has given back its pad
 
     def _uav(self, i: int) -> Process:
-        """A UAV asks for a pad when it may charge, and gives it back when it is done or leaves.
+        """Ask for a pad when UAV ``i`` may charge; give it back when it is charged or leaves.
 
-        All UAVs wait for the same two events of a slot, so they always act in index order.
+        All UAVs wait for the same two events of a slot, so they act in index order.
         """
         u = self.uavs[i]
         while u["active"]:
@@ -148,7 +159,7 @@ class Mission:
             elif self.pads[i] is None:
                 self.pads[i] = self.zone.request()
                 u["pad_request"] = self.mission["slot"]
-                self.zone.record("charge_request", float(self.mission["slot"]), i, u)
+                self.zone.log_event("charge_request", float(self.mission["slot"]), i, u)
             yield self.slot_ends
             if u["pad_request"] < 0:  # charged, or out of the mission
                 self._give_back(i)
@@ -165,12 +176,12 @@ class Mission:
             pad.cancel()
 
     def _start_charging(self) -> None:
-        """UAVs that were granted a pad by now charge in this slot."""
+        """Let the UAVs that have been granted a pad charge in this slot."""
         for i in self.fleet:
             pad, u = self.pads[i], self.uavs[i]
             if pad is not None and pad.triggered and not u["charging"]:
                 u["charging"] = True
-                self.zone.record("charge_start", float(self.mission["slot"]), i, u)
+                self.zone.log_event("charge_start", float(self.mission["slot"]), i, u)
 
     def _settle(self) -> None:
         """Close the slot; log the charging sessions and the UAVs that ended with it."""
@@ -182,7 +193,7 @@ class Mission:
         for i in self.fleet:
             was, u = before[i], self.uavs[i]
             if was["charging"] and not u["charging"]:
-                self.zone.record("charge_end", time, i, u)
+                self.zone.log_event("charge_end", time, i, u)
             if was["active"] and u["end"] == QUOTA:
                 self.log.add(time, "quota_filled", i, -1, u["communications"], u["x"], u["y"])
             if was["active"] and u["end"] == BATTERY:
@@ -226,3 +237,8 @@ class Mission:
         for k in np.nonzero(self.arrivals)[0].tolist():
             x, y = self.world.nodes[k]
             self.log.add(time, "arrival", -1, k, self.arrivals[k], x, y)
+
+
+def _after_due_events(env: simpy.Environment) -> simpy.Timeout:
+    """An event that SimPy processes after all events already scheduled for the present time."""
+    return env.timeout(0)

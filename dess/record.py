@@ -1,6 +1,6 @@
-"""What a mission leaves: one row of metrics, one row per UAV and, if asked, the event log."""
+"""The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,6 +44,16 @@ UAV_RECORD = np.dtype(
     ]
 )
 
+# Columns of the event log, and the types of their arrays.
+_EVENT_COLUMNS = {
+    "time": np.float64,
+    "event": object,
+    "uav": np.int64,
+    "node": np.int64,
+    "value": np.float64,
+    "x": np.float64,
+    "y": np.float64,
+}
 EVENT_NAMES = (
     "mission_start",
     "move",
@@ -100,7 +110,7 @@ def write_record(mission, uavs, residual, record, uav_records):
         if u.end != QUOTA:
             record.success = 0
     total = record.initial + record.arrived
-    # Rounding may lift a sea harvested to the last unit above 1; an empty sea is fully harvested.
+    # Rounding may lift the ratio above 1; without any data it is 1.
     record.collection_ratio = min(record.collected / total, 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
 
@@ -110,9 +120,8 @@ def empty_records(missions: int, uavs: int) -> Records:
     return Records(np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD))
 
 
-@dataclass
 class EventLog:
-    """The events of one mission as columns, in the order in which they happened.
+    """The events of one mission, in the order in which they happened.
 
     ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per
     node (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering
@@ -123,50 +132,34 @@ class EventLog:
     -1 where an event has none.
     """
 
-    time: list[float] = field(default_factory=list)
-    event: list[str] = field(default_factory=list)
-    uav: list[int] = field(default_factory=list)
-    node: list[int] = field(default_factory=list)
-    value: list[float] = field(default_factory=list)
-    x: list[float] = field(default_factory=list)
-    y: list[float] = field(default_factory=list)
+    def __init__(self) -> None:
+        self._rows: list[tuple] = []
 
     def add(
         self, time: float, event: str, uav: int, node: int, value: float, x: float, y: float
     ) -> None:
         """Append one event at ``time`` [mission slots] and position ``x, y`` [cells]."""
-        self.time.append(time)
-        self.event.append(event)
-        self.uav.append(uav)
-        self.node.append(node)
-        self.value.append(value)
-        self.x.append(x)
-        self.y.append(y)
+        self._rows.append((time, event, uav, node, value, x, y))
 
     def __len__(self) -> int:
-        return len(self.time)
+        return len(self._rows)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""
         return {
-            "time": np.array(self.time, np.float64),
-            "event": np.array(self.event, object),
-            "uav": np.array(self.uav, np.int64),
-            "node": np.array(self.node, np.int64),
-            "value": np.array(self.value, np.float64),
-            "x": np.array(self.x, np.float64),
-            "y": np.array(self.y, np.float64),
+            name: np.array([row[index] for row in self._rows], dtype)
+            for index, (name, dtype) in enumerate(_EVENT_COLUMNS.items())
         }
 
 
 @dataclass(frozen=True)
 class MissionRecord:
-    """What one mission left.
+    """The record of one mission; its metrics are attributes too, as in ``record.success``.
 
     Attributes:
         metrics: ``MISSION_RECORD`` scalar.
         uavs: (I,) ``UAV_RECORD`` array.
-        events: The event log, if it was asked for.
+        events: The event log, or None.
     """
 
     metrics: np.void
@@ -179,7 +172,7 @@ class MissionRecord:
         raise AttributeError(name)
 
     def uav_rows(self) -> list[dict[str, Any]]:
-        """Per UAV its quota count, battery, charging slots and how its mission ended."""
+        """Per UAV the quota count, battery, charging slots and how its mission ended."""
         return [
             {
                 "quota": int(u["quota"]),

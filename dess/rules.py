@@ -1,10 +1,15 @@
-"""The consequences: what one mission slot does to one mission.
+"""The rules of the model: what one mission slot does to one mission.
 
-Compiled functions on one mission's arrays, shared by both engines: no engine, no random generator
-object, no globals. A slot is, in this order (Section III-C): ``resolve`` (the UAVs act, the
-safety controller resolves), the grant of charging pads (the engine's: a SimPy resource, or
-``grant_pads``), ``spend`` (energy), ``communicate`` for each communication slot, ``arrive`` (new
-data) and ``settle`` (rewards and operational status).
+Compiled functions that change the arrays of one mission in place. Both engines and the environments
+call them; they know no engine, no random generator object and no global state. The order of a slot
+(Section III-C), as the batch engine runs it in ``advance``:
+
+    resolve(mission, uavs)               # moves, safety controller
+    grant_pads(mission, uavs)            # the SimPy engine has a simpy.Resource instead
+    spend(mission, uavs)                 # energy
+    communicate(mission, uavs, ..., n)   # for each communication slot n = 1..m
+    arrive(mission, residual, arrivals)  # new data
+    settle(mission, uavs)                # rewards, operational status
 """
 
 import math
@@ -25,9 +30,38 @@ from dess.state import (
 )
 
 
+@inlined
+def on_grid(mission, x, y):
+    """Whether cell ``x, y`` is on the grid."""
+    return 0 <= x < mission.grid and 0 <= y < mission.grid
+
+
+@inlined
+def in_zone(mission, x, y):
+    """Whether cell ``x, y`` is in the start and charging zone."""
+    return (
+        mission.zone_x <= x < mission.zone_x + mission.zone_width
+        and mission.zone_y <= y < mission.zone_y + mission.zone_height
+    )
+
+
+@inlined
+def zone_cell(mission, number):
+    """``x, y`` of cell ``number`` of the zone, counted row by row from its north-west corner."""
+    x = mission.zone_x + number % mission.zone_width
+    y = mission.zone_y + number // mission.zone_width
+    return x, y
+
+
+@inlined
+def zone_number(mission, x, y):
+    """The number of cell ``x, y`` of the zone: the inverse of ``zone_cell``."""
+    return (y - mission.zone_y) * mission.zone_width + x - mission.zone_x
+
+
 @kernel
 def launch(mission, ranges, uavs, residual):
-    """Start a mission: parameters, start cells and initial data, all drawn.
+    """Start a mission: draw its parameters, start cells and initial data.
 
     Args:
         mission: ``MISSION`` record with its seed, replication and constants set.
@@ -53,7 +87,7 @@ def launch(mission, ranges, uavs, residual):
 
 @kernel
 def _launch_uavs(mission, uavs):
-    """Distinct start cells of the zone, drawn one after another from those that are left."""
+    """Draw distinct start cells in the zone, without replacement."""
     cells = mission.zone_width * mission.zone_height
     left = np.arange(cells)
     for i in range(len(uavs)):
@@ -71,14 +105,14 @@ def _launch_uavs(mission, uavs):
             words = streams.block(mission.seed, mission.replication, streams.START, 0, 0, i)
             pick = streams.integer(words[0], i, cells - 1)
             left[i], left[pick] = left[pick], left[i]
-            u.x = u.from_x = mission.zone_x + left[i] % mission.zone_width
-            u.y = u.from_y = mission.zone_y + left[i] // mission.zone_width
-            _judge_latch(mission, u)  # slot 0 is judged like any other
+            u.x, u.y = zone_cell(mission, left[i])
+            u.from_x, u.from_y = u.x, u.y
+            _update_latch(mission, u)  # slot 0 is no exception
 
 
 @inlined
-def _judge_latch(mission, u):
-    """Charging latch iota (eq. 3), judged on the battery at the start of a slot."""
+def _update_latch(mission, u):
+    """Set or clear the charging latch iota (eq. 3) by the battery at the start of a slot."""
     if u.battery <= mission.charge_start:
         u.latch = True
     if u.battery >= mission.charge_complete:
@@ -104,14 +138,14 @@ def resolve(mission, uavs):
         u.executed = u.action
         u.x += STEP_X[u.action]
         u.y += STEP_Y[u.action]
-        if not (0 <= u.x < mission.grid and 0 <= u.y < mission.grid):
+        if not on_grid(mission, u.x, u.y):
             _cancel(u)
     if count == 1:
         return
     changed = True
     while changed:
         changed = False
-        # Mark first, cancel after: a round judges all moves on the same picture.
+        # Mark all collisions first, then cancel, so that the order of the UAVs does not matter.
         for i in range(count):
             u = uavs[i]
             if u.active and u.executed != HOVER:
@@ -149,25 +183,20 @@ def _cancel(u):
 
 @inlined
 def may_charge(mission, u):
-    """Charging condition (eq. 4): active, in the zone, latched, hovering of its own will.
+    """Charging condition (eq. 4): active, in the zone, latched, and Hover was the chosen action.
 
-    A move that the safety controller cancelled is no wish to charge.
+    A move that the safety controller turned into Hover does not start charging.
     """
-    return (
-        u.active
-        and u.latch
-        and u.action == HOVER
-        and mission.zone_x <= u.x < mission.zone_x + mission.zone_width
-        and mission.zone_y <= u.y < mission.zone_y + mission.zone_height
-    )
+    return u.active and u.latch and u.action == HOVER and in_zone(mission, u.x, u.y)
 
 
 @inlined
 def grant_pads(mission, uavs):
     """Grant free charging pads, first come first served, ties in the order of the UAVs.
 
-    The compiled twin of the SimPy resource: who meets the charging condition asks for a pad or goes
-    on asking, who no longer meets it leaves the queue, who has a pad keeps it until charged.
+    The compiled equivalent of the SimPy resource: a UAV that meets the charging condition requests
+    a pad or stays in the queue, one that no longer meets it leaves the queue, and one that has a
+    pad keeps it until it is charged.
     """
     free = mission.pads
     waiting = 0
@@ -211,13 +240,13 @@ def spend(mission, uavs):
 
 @inlined
 def communicate(
-    mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+    mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
 ):  # fmt: skip
     """Communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
-    among those with residual data, the lowest index on a tie. What was served stands in ``served``
-    and ``amount`` of each UAV. After the mission's arrays come those of ``World`` and ``Scratch``.
+    among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
+    UAV are set. The arguments after ``residual`` are the arrays of ``World`` and ``Scratch``.
     """
     for i in range(mission.uavs):
         u = uavs[i]
@@ -225,7 +254,7 @@ def communicate(
         if not u.active or u.charging:
             continue
         if (n - 1) % channel.GROUP == 0:
-            channel.open_group(mission, i, u, nodes, path_loss, order, means, search)
+            channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
@@ -240,7 +269,7 @@ def communicate(
 
 @inlined
 def arrive(mission, residual, arrivals):
-    """New data of one slot (eq. 12): Poisson packets per node, left in ``arrivals``."""
+    """Add the new data of one slot (eq. 12): Poisson packets per node, kept in ``arrivals``."""
     none = math.exp(-mission.arrival_rate)
     for k in range(0, mission.nodes, 4):
         words = streams.block(
@@ -256,15 +285,15 @@ def arrive(mission, residual, arrivals):
 
 @inlined
 def reward_terms(mission, u, charged):
-    """The parts of the reward of an active UAV's slot (eq. 14-18), once its ``end`` is known.
+    """The terms of the reward of an active UAV in a slot (eq. 14-18), after its ``end`` is set.
 
     Args:
         mission: ``MISSION`` record.
         u: ``UAV`` record.
-        charged: Whether it charged in the slot.
+        charged: Whether the UAV charged in the slot.
 
     Returns:
-        The terms for data, step, overruled, charging, quota and depleted, to be added in order.
+        The terms data, step, overruled, charging, quota and depleted, to be summed in this order.
     """
     return (
         mission.reward_data * mission.slot_collected,
@@ -278,7 +307,7 @@ def reward_terms(mission, u, charged):
 
 @inlined
 def settle(mission, uavs):
-    """Rewards (eq. 14-18) and operational status (eq. 6, 7) at the end of a slot."""
+    """Set rewards (eq. 14-18) and operational status (eq. 6, 7) at the end of a slot."""
     mission.collected += mission.slot_collected
     mission.slot += 1
     for i in range(mission.uavs):
@@ -301,20 +330,20 @@ def settle(mission, uavs):
         if u.battery >= mission.charge_complete or not u.active:
             u.charging = False
             u.pad_request = -1
-        _judge_latch(mission, u)
+        _update_latch(mission, u)
 
 
 @kernel
 def advance(
-    mission, uavs, residual, arrivals, nodes, path_loss, order, means, batches, search
+    mission, uavs, residual, arrivals, nodes, mean_snr, order, means, batches, search
 ):  # fmt: skip
-    """One whole mission slot, the actions being entered; the order of Section III-C."""
+    """Run one mission slot with the actions in ``uavs``, in the order of Section III-C."""
     resolve(mission, uavs)
     grant_pads(mission, uavs)
     spend(mission, uavs)
     for n in range(1, mission.communication_slots + 1):
         communicate(
-            mission, uavs, residual, nodes, path_loss, order, means, batches, search, n
+            mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)

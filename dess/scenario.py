@@ -1,4 +1,9 @@
-"""Scenarios: every constant of the model, and the ranges that a mission draws its own from."""
+"""Scenarios: all constants of the model, and the ranges from which missions draw parameters.
+
+space = load_scenario("paper", uavs=3)             # Table II, with three UAVs
+space = ScenarioSpace.of(space, quota=200)         # the same with another quota
+scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
+"""
 
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -29,17 +34,17 @@ SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 # Entries of the table of the channel (dess.channel): 8 GiB if every step of it were ever made.
 _CHANNEL_LIMIT = 2**30
 
-# What pydantic says, in words of its own, where a pair or a list of cells is wanted.
+# Pydantic's error types for a malformed pair or list of cells; a clearer message replaces theirs.
 _WRONG_FORM = ("tuple_type", "missing", "too_long")
 
-# An integer as such: neither 2.0 nor true nor "2" is taken for one.
+# A strict integer: 2.0, true and "2" are refused.
 Integer = Annotated[int, Field(strict=True)]
-# A finite number; an integer will do.
+# A finite number, integer or not.
 Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _Constants(BaseModel):
-    """What a scenario and a space of scenarios have in common: all that is not sampled."""
+    """The constants that are never sampled: the common base of both kinds of scenario."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -195,10 +200,10 @@ IntegerRange = tuple[Integer, Integer]
 
 
 class ScenarioSpace(_Constants):
-    """The ranges that a mission's scenario is drawn from (Table II), both ends included.
+    """The ranges from which a mission draws its parameters (Table II), both ends included.
 
-    A single value is a range of one. A range that is narrowed or fixed does not change the draws
-    of the others.
+    A single value is a range of one. Narrowing or fixing one range does not change the draws of
+    the other parameters.
     """
 
     uavs: IntegerRange = Field((1, 3), description="number of UAVs (I): an integer or [low, high]")
@@ -259,12 +264,12 @@ def scenario_names() -> list[str]:
 def validation_line(
     error: ValidationError, where: str, model: type[BaseModel] | None = None
 ) -> str:
-    """The first complaint of pydantic as one line: where, key, what, and what is allowed.
+    """The first error of pydantic as one line: place, key, problem and allowed values.
 
     Args:
-        error: The complaints.
-        where: What was read.
-        model: Whose fields are allowed; scenarios are known without.
+        error: The errors.
+        where: Name or path of the input.
+        model: The model whose fields are allowed; not needed for scenarios.
     """
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"])
@@ -293,12 +298,12 @@ def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> An
 
 
 def _tuples(value: Any) -> Any:
-    """Lists, as TOML gives them, to tuples, at any depth."""
+    """Convert lists, as TOML has them, to tuples at any depth."""
     return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _check_ranges(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
-    """The rules between sampled parameters, which every combination must keep (eq. 1)."""
+    """Check the limits of the sampled parameters and the constraints between them (eq. 1)."""
     limits = {
         "uavs": (1, min(zone_cells, 64), "cells of the zone, at most 64"),
         "flying_time": (1, 100, "battery capacity"),

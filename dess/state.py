@@ -1,4 +1,9 @@
-"""The state of B missions x I UAVs x K nodes as plain arrays; one mission is B = 1."""
+"""The state of B missions with up to I UAVs and K nodes, as plain arrays; one mission is B = 1.
+
+state = empty_state(1, space.uavs[1], len(space.nodes))
+state.missions[:] = constants_of(space)
+state.uavs[0, 0]["battery"], state.residual[0]
+"""
 
 from collections.abc import Sequence
 from operator import index
@@ -69,7 +74,7 @@ MISSION = np.dtype(
     ]
 )
 
-# One UAV: its state, and what happened to it in the present slot.
+# One UAV: its state and the outcome of the present slot.
 UAV = np.dtype(
     [
         ("x", np.int64),

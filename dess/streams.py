@@ -1,12 +1,15 @@
 """All randomness, as a pure function of its coordinates.
 
 Every exogenous draw is a function of ``(seed, replication, stream, slot, sub-slot, UAV, node)``
-through the counter-based generator Philox 4x32-10 (Salmon et al., SC'11). Nothing is
-remembered between draws, so a replication alone equals the same one inside any sweep, two
-policies meet the same sea, and no draw is made that is not needed.
+through the counter-based generator Philox 4x32-10 (Salmon et al., SC'11). There is no state
+between draws: a replication is the same alone and inside any sweep, two policies on one replication
+have common random numbers, and draws that are not needed are not made.
+
+    words = block(np.uint64(seed), replication, ARRIVAL, 0, slot, node // 4)
+    count = poisson(words[node % 4], 0.02)
 
 One Philox block is four 32-bit words. The seed is the key; the counter words are ``index``,
-``slot``, ``stream`` with its substreams, and ``replication``.
+``slot``, ``stream`` with its substream, and ``replication``.
 """
 
 import math
@@ -15,7 +18,7 @@ import numpy as np
 
 from dess.compiled import kernel
 
-# Streams: the purpose of a draw. Each is a separate, never overlapping part of the counter space.
+# Streams: the purpose of a draw. They are disjoint parts of the counter space.
 PARAMETERS = 0  # the sampled parameters of a mission's scenario
 START = 1  # start cells
 INITIAL_DATA = 2  # initial data per node

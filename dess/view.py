@@ -1,4 +1,8 @@
-"""What the UAVs that must act may know, and how their actions enter the state."""
+"""The policies' view of the state, and how their actions enter it.
+
+view = View(state, world, mission, uav)   # one row per UAV that must act
+view.own["battery"], view.residual, view.legal
+"""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -8,17 +12,18 @@ import numpy as np
 
 from dess.channel import World
 from dess.compiled import kernel
+from dess.rules import on_grid
 from dess.state import HOVER, STEP_X, STEP_Y, State
 
 
 class View:
-    """What the UAVs that must act may know; one row per UAV, in however many missions.
+    """What a policy may use to decide: one row per UAV that must act, over any number of missions.
 
     Policies read it and never write to it. R rows, K nodes, I UAVs in the largest mission.
 
     Attributes:
         state: The arrays of the batch that the rows belong to.
-        world: The nodes and the path loss table.
+        world: nodes and the tables of the channel.
         mission: (R,) index of each row's mission in ``state``.
         uav: (R,) index of each row's UAV in its mission.
     """
@@ -51,23 +56,22 @@ class View:
 
     @cached_property
     def legal(self) -> np.ndarray:
-        """(R, 5) mask of the legal actions: those that stay on the grid; Hover is always legal."""
+        """(R, 5) mask of the legal actions: those that stay on the grid, and Hover."""
         return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)
 
 
 @kernel
 def legal_actions(missions, uavs, rows_mission, rows_uav):
-    """(R, 5) mask of the actions that stay on the grid; a charging UAV has Hover alone."""
+    """(R, 5) mask of the actions that stay on the grid; only Hover for a charging UAV."""
     legal = np.zeros((len(rows_mission), 5), np.bool_)
     for row in range(len(rows_mission)):
         b = rows_mission[row]
-        own = uavs[b, rows_uav[row]]
+        u = uavs[b, rows_uav[row]]
         legal[row, HOVER] = True
-        if own.charging:
-            continue
-        for action in range(4):
-            x, y = own.x + STEP_X[action], own.y + STEP_Y[action]
-            legal[row, action] = 0 <= x < missions[b].grid and 0 <= y < missions[b].grid
+        if not u.charging:
+            for action in range(4):
+                x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+                legal[row, action] = on_grid(missions[b], x, y)
     return legal
 
 
@@ -75,7 +79,7 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
 def acting_rows(missions, uavs, parties, party):
     """(R,) mission and (R,) UAV index of the UAVs that must act: active and not charging.
 
-    Of a team with ``parties`` policies only the UAVs of policy ``party``: UAV i has policy
+    Only the UAVs of policy number ``party`` in a team of ``parties`` policies: UAV i has policy
     ``i % parties``.
     """
     rows_mission = np.empty(uavs.size, np.int64)
@@ -104,15 +108,15 @@ def team_of(policy: Any) -> list[Any]:
 
 
 def decide(team: Sequence[Any], state: State, world: World) -> None:
-    """Ask the policies of a team for the actions of all UAVs that must act, and enter them.
+    """Write the actions that the policies of a team choose into the state.
 
-    UAV i follows ``team[i % len(team)]``. All are asked before any action is entered: nobody sees
-    what a teammate has just decided.
+    UAV i has policy ``team[i % len(team)]``. All policies decide before any action is written, so
+    that none sees the decision of a teammate in the same slot.
 
     Raises:
-        ValueError: If what a policy returns is no action for every row.
+        ValueError: If a policy does not return one action per row.
     """
-    orders = []
+    decisions = []
     for party, policy in enumerate(team):
         mission, uav = acting_rows(state.missions, state.uavs, len(team), party)
         if len(mission):
@@ -122,14 +126,14 @@ def decide(team: Sequence[Any], state: State, world: World) -> None:
                     f"policy {policy.name}: act must return {len(mission)} integers, "
                     f"not {actions.dtype} of shape {actions.shape}"
                 )
-            orders.append((policy, mission, uav, actions))
-    for policy, mission, uav, actions in orders:
-        if not _enter(state.uavs, mission, uav, actions):
+            decisions.append((policy, mission, uav, actions))
+    for policy, mission, uav, actions in decisions:
+        if not _write_actions(state.uavs, mission, uav, actions):
             raise ValueError(f"policy {policy.name}: act must return actions 0..4")
 
 
 @kernel
-def _enter(uavs, mission, uav, actions):
+def _write_actions(uavs, mission, uav, actions):
     for row in range(len(mission)):
         action = np.int64(actions[row])
         if not 0 <= action <= 4:

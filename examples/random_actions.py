@@ -1,4 +1,4 @@
-"""Steps the environment through one mission with random legal actions and prints totals."""
+"""Run one mission of the environment with random legal actions and print totals."""
 
 import dess
 

@@ -1,4 +1,9 @@
-"""Who decides: heuristics, the return guard, and policies from outside packages."""
+"""Policies: heuristics, the return guard, the learned policy, and those of other packages.
+
+policy = policies.load("greedy")      # by name, or the folder of a trained policy
+team = policies.load_team("ddqn,tour")
+actions = policy.act(view)
+"""
 
 from policies.registry import load, load_team, names
 

@@ -1,4 +1,11 @@
-"""What a policy is, and what it sees."""
+"""The policy protocol: a name and ``act``, which chooses actions for many UAVs at once.
+
+class Hover:
+    name = "hover"
+
+    def act(self, view: View) -> np.ndarray:
+        return np.full(len(view), 4)
+"""
 
 from typing import Protocol, runtime_checkable
 
@@ -11,10 +18,10 @@ __all__ = ["Policy", "View"]
 
 @runtime_checkable
 class Policy(Protocol):
-    """Decides for a batch of UAVs at once and remembers nothing between calls.
+    """Chooses actions for a batch of UAVs at once and keeps no state between calls.
 
     Attributes:
-        name: The name that results carry.
+        name: The name under which results are stored.
     """
 
     name: str
@@ -23,7 +30,7 @@ class Policy(Protocol):
         """Choose an action for every row of the view.
 
         Args:
-            view: What the R UAVs that must act may know, in however many missions.
+            view: The state of the R UAVs that must act, over any number of missions.
 
         Returns:
             (R,) integers: 0 north, 1 east, 2 south, 3 west, 4 hover.

@@ -1,18 +1,23 @@
-"""The return guard: which moves keep the charger reachable in time, crowding included.
+"""The return guard: which actions keep the charger reachable in time, teammates included.
 
-Compiled functions on one mission's arrays. A UAV that cannot fill its quota on the battery it has
-must be able to reach a free zone cell of its own, a few slots early if teammates may be in its way.
+    mask = guard(view)                                   # (R, 5), at least one action per row
+    actions = np.where(mask, values, -np.inf).argmax(1)
+
+A UAV that cannot fill its quota on its present battery must be able to reach a free zone cell of
+its own, with a margin of some slots for teammates in its way. ``docs/policies.md`` describes the
+rules; below are compiled functions on one mission's arrays.
 """
 
 import numpy as np
 
 from dess.compiled import inlined, kernel
+from dess.rules import in_zone, on_grid, zone_cell, zone_number
 from dess.state import STEP_X, STEP_Y
 from dess.view import View
 
-# Slots in hand on the way home: per active teammate, since each may cost a detour.
+# Margin on the way home per active teammate, since each may cost a detour [slots].
 MARGIN_PER_TEAMMATE = 2
-# Slots in hand for the quota when the sea is nearly empty and communication slots may be lost.
+# Margin for the quota when little data is left and communication slots may be lost [slots].
 SCARCE_SLOTS = 6
 
 
@@ -27,11 +32,11 @@ def slots_needed(mission, u):
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota on its battery; ``data`` is all residual data.
 
-    With little data left a communication slot may find no node to serve: then some in hand. Where
-    flying costs no battery, nobody must charge.
+    With little data left, communication slots may find no node to serve, so a margin is added.
+    Where flying costs no battery, no UAV must charge.
     """
     needed = slots_needed(mission, u)
-    # What a UAV takes beside an average node; below it per needed slot the sea is nearly empty.
+    # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
     return u.battery < mission.flight_cost * needed
@@ -39,18 +44,13 @@ def must_charge(mission, u, data):
 
 @inlined
 def is_parked(mission, u):
-    """Whether an active UAV in the zone is charging or about to: an obstacle to the others."""
-    return (
-        u.active
-        and u.latch
-        and mission.zone_x <= u.x < mission.zone_x + mission.zone_width
-        and mission.zone_y <= u.y < mission.zone_y + mission.zone_height
-    )
+    """Whether an active UAV in the zone charges or is about to: an obstacle for the others."""
+    return u.active and u.latch and in_zone(mission, u.x, u.y)
 
 
 @inlined
 def path_length(mission, uavs, i, x, y, to_x, to_y):
-    """Slots of UAV ``i`` from cell to cell, with the detour around a teammate parked between."""
+    """Slots of UAV ``i`` from cell to cell, with the detour around a parked teammate between."""
     length = abs(x - to_x) + abs(y - to_y)
     if x == to_x or y == to_y:
         for j in range(mission.uavs):
@@ -64,10 +64,10 @@ def path_length(mission, uavs, i, x, y, to_x, to_y):
 
 @kernel
 def parking_cell(mission, uavs, i, taken):
-    """The zone cell where UAV ``i`` will charge: the nearest one that no teammate has or chooses.
+    """The zone cell where UAV ``i`` will charge: the nearest that no teammate has or chooses.
 
-    Teammates in the zone have their cells. The others choose one after another, the lowest battery
-    first (ties in index order), so no two UAVs head for the same cell.
+    Teammates in the zone keep their cells. The others choose one after another, the lowest battery
+    first (ties in index order), so that no two UAVs head for the same cell.
 
     Args:
         mission: ``MISSION`` record.
@@ -76,19 +76,17 @@ def parking_cell(mission, uavs, i, taken):
         taken: (zone cells,) working memory.
 
     Returns:
-        x, y and the slots it takes to get there; its own cell if all are taken.
+        x, y and the slots to get to it; the UAV's own cell if all are taken.
     """
-    width, cells = mission.zone_width, mission.zone_width * mission.zone_height
-    me = uavs[i]
-    taken[:cells] = False
+    u = uavs[i]
+    taken[: mission.zone_width * mission.zone_height] = False
     for j in range(mission.uavs):
-        if j != i and uavs[j].active:
-            zone_x, zone_y = uavs[j].x - mission.zone_x, uavs[j].y - mission.zone_y
-            if 0 <= zone_x < width and 0 <= zone_y < mission.zone_height:
-                taken[zone_y * width + zone_x] = True
+        o = uavs[j]
+        if j != i and o.active and in_zone(mission, o.x, o.y):
+            taken[zone_number(mission, o.x, o.y)] = True
     last_battery, last = -1, -1
     while True:
-        # the next one to choose
+        # the next UAV to choose
         chooser = -1
         for j in range(mission.uavs):
             o = uavs[j]
@@ -105,9 +103,9 @@ def parking_cell(mission, uavs, i, taken):
             continue
         x, y, slots = _nearest_free(mission, uavs, chooser, taken)
         if chooser == i:
-            return (me.x, me.y, 0) if slots < 0 else (x, y, slots)
+            return (u.x, u.y, 0) if slots < 0 else (x, y, slots)
         if slots >= 0:
-            taken[(y - mission.zone_y) * width + x - mission.zone_x] = True
+            taken[zone_number(mission, x, y)] = True
 
 
 @inlined
@@ -116,8 +114,7 @@ def _nearest_free(mission, uavs, i, taken):
     u = uavs[i]
     best_x, best_y, best = -1, -1, -1
     for cell in range(mission.zone_width * mission.zone_height):
-        x = mission.zone_x + cell % mission.zone_width
-        y = mission.zone_y + cell // mission.zone_width
+        x, y = zone_cell(mission, cell)
         if taken[cell] and not (u.x == x and u.y == y):
             continue
         slots = path_length(mission, uavs, i, u.x, u.y, x, y)
@@ -128,7 +125,7 @@ def _nearest_free(mission, uavs, i, taken):
 
 @inlined
 def margin(mission):
-    """Slots to keep in hand on the way home for the teammates that may stand in it."""
+    """Margin on the way home for teammates that may be in the way [slots]."""
     return MARGIN_PER_TEAMMATE * (mission.active - 1)
 
 
@@ -159,34 +156,33 @@ def contest(mission, uavs, i, x, y):
 
 @kernel
 def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
-    """Which actions keep the charger of UAV ``i`` reachable in time.
+    """Find the actions that keep the charger of UAV ``i`` reachable in time.
 
-    Without any such action those are left that come nearest to the charger, but for cells that a
-    teammate with the right of way may take: to let it pass, the margin may be used.
-    Cells off the grid and cells of parked teammates are never safe. A UAV that has just been
-    overruled leaves such contested cells to the teammates as well: two that both insist would
-    block each other until one runs dry.
+    If there is none, the actions that lead nearest to the charger are safe, except into cells that
+    a teammate with the right of way may take; the margin may be used to let it pass. Cells off the
+    grid and cells of parked teammates are never safe. A UAV that has just been overruled avoids
+    contested cells too: two UAVs that both insist would block each other until the battery of one
+    is depleted.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
-        charge: Whether it must charge; without, every legal action is safe.
+        charge: Whether the UAV must charge; if not, every legal action is safe.
         home_x, home_y: Its parking cell.
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
-    late = np.zeros(5, np.int64)  # slots by which the charger would be reached too late
+    late = np.zeros(5, np.int64)  # slots by which the charger is reached too late
     contested = np.empty(5, np.int64)
     least = 1_000_000
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        safe[action] = 0 <= x < mission.grid and 0 <= y < mission.grid
         contested[action] = contest(mission, uavs, i, x, y)
-        safe[action] = safe[action] and contested[action] < 3
+        safe[action] = on_grid(mission, x, y) and contested[action] < 3
         if safe[action] and charge:
             home = path_length(mission, uavs, i, x, y, home_x, home_y)
-            # One slot is for the charging slot itself: the battery must not be empty by then.
+            # One slot is the charging slot itself; the battery must not be depleted before it.
             late[action] = max(home + 1 + margin(mission) - (u.battery - 1), 0)
             least = min(least, late[action])
     clear = safe & (contested < 2)
@@ -194,7 +190,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
     if (nearest & clear).any() and (late[nearest].any() or u.overruled):
         safe[:] = nearest & clear
     elif late[nearest].any() and clear.any():
-        # to wait or step aside until the teammate has passed is what the margin is for
+        # the margin is there to wait or step aside until the teammate has passed
         wait = clear & (late <= margin(mission))
         safe[:] = wait if wait.any() else nearest
     else:
@@ -217,9 +213,9 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav):
 
 
 def guard(view: View) -> np.ndarray:
-    """(R, 5) mask of the actions from which the charger is still reached in time.
+    """(R, 5) mask of the actions after which the charger is still reached in time.
 
-    Every row has at least one. Policies of any kind can restrict their choice to it.
+    Every row has at least one action. Any policy can restrict its choice to the mask.
     """
     state = view.state
     return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav)

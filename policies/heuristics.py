@@ -1,7 +1,8 @@
-"""Heuristic policies: where to go next. The way there is the same for all, under the return guard.
+"""Heuristic policies under the return guard: random, nearest, greedy and tour.
 
-Each policy chooses a goal; ``_step`` takes the safe action that brings the UAV nearer and keeps
-clear of teammates. Everything is a compiled function of one mission's arrays.
+Each policy chooses a goal (``_goal``). ``_step``, the same for all, takes the safe action
+that brings the UAV nearer to the goal and avoids teammates. Compiled functions of one mission's
+arrays.
 """
 
 from functools import lru_cache
@@ -24,10 +25,10 @@ from policies.guard import (
 
 _RANDOM, _NEAREST, _GREEDY, _TOUR = range(4)
 
-# A node is worth a visit with this share of the mean initial data; below, what has newly arrived
-# would send the UAVs to and fro.
+# A node is worth a visit with at least this share of the mean initial data; otherwise single new
+# packets would send the UAVs back and forth.
 _WORTH = 0.25
-# Greedy: weight of a node that a teammate is nearer to, and slots added to every distance.
+# Weight of a node to which a teammate is nearer (greedy), and slots added to every distance.
 _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
 # Cost, in slots, of a step into a cell by how it is contested (policies.guard.contest).
@@ -35,7 +36,7 @@ _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 
 class _Heuristic:
-    """A policy that is a compiled function."""
+    """A policy given by a compiled function."""
 
     name: str
     _kind: int
@@ -71,14 +72,14 @@ class Nearest(_Heuristic):
 
 
 class Greedy(_Heuristic):
-    """The most residual data for the distance; nodes nearer to a teammate count less."""
+    """The node with the most residual data per slot of distance, less if a teammate is nearer."""
 
     name = "greedy"
     _kind = _GREEDY
 
 
 class Tour(_Heuristic):
-    """A fixed circuit through the nodes, split among the UAVs into stretches of equal length."""
+    """A fixed circuit through the nodes, split into equal stretches, one per UAV."""
 
     name = "tour"
     _kind = _TOUR
@@ -110,7 +111,7 @@ def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_u
 
 @kernel
 def _random_action(mission, team, i, safe):
-    """A random safe move clear of teammates; Hover if there is none."""
+    """A random safe move into an uncontested cell; Hover if there is none."""
     u = team[i]
     choices = np.zeros(4, np.bool_)
     for action in range(4):
@@ -129,7 +130,7 @@ def _random_action(mission, team, i, safe):
 
 @inlined
 def _step(mission, team, i, safe, goal_x, goal_y):
-    """The safe action that brings UAV ``i`` nearest to its goal, clear of teammates."""
+    """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
     best, least = HOVER, 1e18
     for action in range(5):
@@ -145,7 +146,7 @@ def _step(mission, team, i, safe, goal_x, goal_y):
 
 @inlined
 def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
-    """The node that UAV ``i`` makes for: the best of those in reach, -1 without any."""
+    """The goal of UAV ``i``: the best node in reach, -1 if there is none."""
     u = team[i]
     reach = u.battery - 1 - margin(mission) if charge else slots_needed(mission, u)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
@@ -185,7 +186,7 @@ def _teammate_is_nearer(mission, team, i, x, y, slots):
 
 @inlined
 def _circuit_position(mission, i, position):
-    """Steps along the circuit from where the stretch of UAV ``i`` begins."""
+    """Position on the circuit, counted from the begin of the stretch of UAV ``i``."""
     begin = i * mission.nodes // mission.uavs
     return (position - begin) % mission.nodes
 

@@ -1,4 +1,7 @@
-"""From names to policies; outside packages add theirs by the entry point ``dess.policies``."""
+"""Policies by name. Other packages register theirs under the entry point ``dess.policies``.
+
+load("greedy"), load("ddqn"), load("runs/my-training"), load_team("greedy,tour")
+"""
 
 import json
 import os
@@ -11,7 +14,7 @@ from policies.base import Policy
 
 GROUP = "dess.policies"
 
-# Name -> (where it is, what it does).
+# Name -> (module and class, description).
 SHIPPED = {
     "random": ("policies.heuristics:Random", "a random safe move, clear of teammates"),
     "nearest": ("policies.heuristics:Nearest", "the nearest node with enough data"),
@@ -19,7 +22,7 @@ SHIPPED = {
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
 }
 
-# One folder per trained policy, and what tells what it is.
+# One folder per trained policy, and the file that describes it.
 TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
 
 
@@ -35,17 +38,17 @@ def trained_names() -> list[str]:
 
 
 def descriptions() -> dict[str, str]:
-    """What every policy does, by name, in the order of ``names``; none of them is loaded."""
+    """The descriptions of all policies, in the order of ``names``; no policy is loaded."""
     known = {name: description for name, (_, description) in SHIPPED.items()}
     known |= {name: _description(TRAINED / name) for name in trained_names()}
     return {name: known.get(name, "of another package") for name in names()}
 
 
 def load(name: str | Path) -> Policy:
-    """The policy of that name, or the trained one in that folder, which has that of its config.
+    """Load a policy by its name, or the trained policy of a folder, named by its config.
 
     Raises:
-        InputError: If there is no such policy, or it cannot be loaded.
+        InputError: If the policy does not exist or cannot be loaded.
     """
     folder, name = Path(name), str(name)
     if name in SHIPPED:
@@ -54,9 +57,9 @@ def load(name: str | Path) -> Policy:
     shipped = name in trained_names()
     if shipped:
         folder = TRAINED / name
-    # Without a name it would be the working folder.
+    # An empty name would be the working folder.
     if name and os.path.exists(folder / CONFIG):
-        from policies.ddqn.checkpoint import load_policy  # brings torch
+        from policies.ddqn.checkpoint import load_policy  # imports torch
 
         policy = load_policy(folder)
         if shipped:
@@ -70,7 +73,7 @@ def load(name: str | Path) -> Policy:
         )
     try:
         policy = outside[name].load()()
-    except Exception as error:  # somebody else's code: whatever it raises, say whose it was
+    except Exception as error:  # code of another package may raise anything; name the package
         raise InputError(
             f"policy: {name} of {outside[name].value} cannot be loaded: {error}"
         ) from error
@@ -80,7 +83,7 @@ def load(name: str | Path) -> Policy:
 
 
 def load_team(text: str) -> list[Policy]:
-    """The policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
+    """Load the policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
 
     Raises:
         InputError: If one of them is unknown.
@@ -93,7 +96,7 @@ def _outside() -> dict[str, EntryPoint]:
 
 
 def _description(folder: Path) -> str:
-    """What the config of a trained policy says that it is for, or of what it is a repetition."""
+    """The description in the config of a trained policy, or the policy that it repeats."""
     training = json.loads((folder / CONFIG).read_text("utf-8"))["training"]
     if training.get("name", folder.name) == folder.name:
         return training["description"]

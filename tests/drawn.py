@@ -1,5 +1,6 @@
 """What the tests draw: scenarios off the paper's, and policies that stress them."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,27 @@ class Recorder:
         slots = view.constants["slot"]
         for slot, uav, action in zip(slots, view.uav, actions, strict=True):
             self.asked[int(slot), int(uav)] = int(action)
+        return actions
+
+
+class Checked:
+    """Another policy whose decisions are checked: they are allowed, and independent of other rows.
+
+    ``allowed(view)`` is the mask of the allowed actions.
+    """
+
+    def __init__(self, policy: Any, allowed: Callable[[View], np.ndarray]):
+        self.policy, self.name, self.allowed = policy, policy.name, allowed
+
+    def act(self, view: View) -> np.ndarray:
+        before = [array.tobytes() for array in view.state]
+        actions = self.policy.act(view)
+        assert [array.tobytes() for array in view.state] == before
+        assert self.allowed(view)[np.arange(len(view)), actions].all()
+        backwards = View(view.state, view.world, view.mission[::-1].copy(), view.uav[::-1].copy())
+        assert self.policy.act(backwards).tolist() == actions[::-1].tolist()
+        last = View(view.state, view.world, view.mission[-1:], view.uav[-1:])
+        assert self.policy.act(last).tolist() == [actions[-1]]
         return actions
 
 

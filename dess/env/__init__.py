@@ -1,10 +1,15 @@
-"""Environments for learners, over the rules that both engines use.
+"""Environments for reinforcement learning, over the rules that both engines use.
 
-``parallel_env`` is a PettingZoo ``ParallelEnv`` of one mission, ``batch_env`` the vectorised form
-that steps many. Both count replications: mission r of seed s is the one that ``dess.simulate``
-runs for them, and the same actions lead to the same record, bit for bit.
+    env = dess.parallel_env(dess.load_scenario("paper"))   # PettingZoo: one mission
+    observations, infos = env.reset(seed=1)
+    observations, rewards, terminated, truncated, infos = env.step(actions)
 
-An observation is the vector that ``dess.env.observation`` lays out, with a mask of the legal
-actions; an action is 0 north, 1 east, 2 south, 3 west, 4 hover. A move off the grid is one that
-the safety controller overrules. A UAV that charges hovers, whatever was asked, without a penalty.
+    envs = dess.batch_env(dess.load_scenario("paper"), num_envs=256)   # Gymnasium: many missions
+
+Both count replications: mission r of seed s is that of ``dess.simulate``, and the same actions give
+the same record, bit for bit.
+
+An observation is the vector of ``dess.env.observation`` with a mask of the legal actions; an action
+is 0 north, 1 east, 2 south, 3 west, 4 hover. The safety controller overrules a move off the grid.
+A charging UAV hovers, whatever its action, without a penalty.
 """

@@ -1,4 +1,9 @@
-"""``batch_env``: many missions in lockstep, after Gymnasium's vector environments."""
+"""``batch_env``: many missions in lockstep, after Gymnasium's vector environments.
+
+env = batch_env(load_scenario("paper"), num_envs=256, seed=1)
+observations, info = env.reset()
+observations, rewards, terminated, truncated, info = env.step(actions)   # (256, I) actions
+"""
 
 from typing import Any
 
@@ -15,11 +20,11 @@ from dess.view import View, acting_rows
 
 
 def batch_env(scenario: Scenario | ScenarioSpace, num_envs: int, seed: int = 0) -> "BatchEnv":
-    """An environment of many missions that step together.
+    """An environment of many missions that advance together.
 
     Args:
-        scenario: The scenario, or the space that each mission draws its own from.
-        num_envs: Missions under way (N).
+        scenario: The scenario, or the space from which each mission draws its parameters.
+        num_envs: Missions in progress (N).
         seed: Seed of the missions until ``reset`` is given another.
 
     Raises:
@@ -31,9 +36,9 @@ def batch_env(scenario: Scenario | ScenarioSpace, num_envs: int, seed: int = 0) 
 class BatchEnv:
     """N missions in lockstep, after the conventions of Gymnasium's vector environments.
 
-    Arrays are (N, I, ...): mission, then UAV; I is the largest fleet of the scenario. A mission
-    with fewer UAVs has absent ones, and a UAV that has ended stays inactive until its mission is
-    over: ``info["active"]`` (N, I) says who acts next. The actions of the others are ignored.
+    Arrays are (N, I, ...): mission, then UAV; I is the largest fleet of the scenario. In a mission
+    with fewer UAVs the others are absent, and a UAV that has ended stays inactive until its mission
+    ends: ``info["active"]`` (N, I) tells which UAVs act next. Other actions are ignored.
 
     An environment is reset in the same step (``metadata["autoreset_mode"]``): when the last UAV of
     its mission ends, it starts the next mission and returns that mission's first observation.
@@ -46,9 +51,9 @@ class BatchEnv:
     whatever N is, and a mission depends on its number and the actions of its UAVs alone.
 
     Attributes:
-        num_envs: Missions under way (N).
-        state: The arrays of the missions under way, to be read only.
-        world: The nodes and the path loss table.
+        num_envs: Missions in progress (N).
+        state: The arrays of the missions in progress, to be read only.
+        world: nodes and the tables of the channel.
         single_observation_space: The space of one UAV's observation.
         single_action_space: The space of one UAV's action.
         action_space: The space of all actions (N, I).
@@ -71,7 +76,7 @@ class BatchEnv:
         """Start a new mission in every environment.
 
         Args:
-            seed: Start over with replication 0 of this seed; without it, the numbering goes on.
+            seed: Start again at replication 0 of this seed; without it, the numbering continues.
 
         Returns:
             Observations, and info with ``active`` (N, I) and ``replication`` (N,).
@@ -87,17 +92,17 @@ class BatchEnv:
     def step(
         self, actions: np.ndarray
     ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """One mission slot of every mission.
+        """Run one mission slot of every mission.
 
         Args:
             actions: (N, I) integers 0..4.
 
         Returns:
             Observations; rewards, terminated and truncated (N, I), the last two true in the step
-            in which the UAV ends; and info: of the slot the other arrays of ``stepper.Outcome``, of
-            which ``acted`` tells the rows that are transitions, of the missions now under way
-            ``active`` (N, I) and ``replication`` (N,), and of those that are over ``final_obs``,
-            ``_final_obs`` and ``final_records``.
+            in which the UAV ends; and info. Info has the other arrays of ``stepper.Outcome`` (the
+            rows with ``acted`` are transitions), ``active`` (N, I) and ``replication`` (N,) of the
+            missions now in progress, and ``final_obs``, ``_final_obs`` and ``final_records`` of
+            those that ended.
 
         Raises:
             InputError: If ``reset`` was not called first, or the actions are not allowed.
@@ -117,13 +122,13 @@ class BatchEnv:
         return observations, rewards, terminated, truncated, info | self._present()
 
     def view(self) -> View:
-        """What the UAVs that must act see, as a policy is shown it."""
+        """The view for policies: a row per UAV that must act."""
         return View(
             self.state, self.world, *acting_rows(self.state.missions, self.state.uavs, 1, 0)
         )
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing: no resources are held."""
 
     def _observe(self, environments: np.ndarray) -> Observation:
         return observe(self.state, environments, self._components)

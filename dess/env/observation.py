@@ -1,4 +1,4 @@
-"""What a learner is told of a UAV: one vector of float32, and its mask of legal actions."""
+"""The observation of a UAV for learners: a float32 vector and the mask of legal actions."""
 
 import numpy as np
 from gymnasium import spaces
@@ -33,9 +33,9 @@ _MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 once it 
 def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
-    Positions and distances are in units of the grid's last index; the battery, C_S and C_C of
-    100; communications of the quota; the slot of ``max_slots``; residual data of the high end of
-    ``initial_data``. Of a UAV that has ended, its last state is told; of an absent one, zeros.
+    Positions and distances are divided by the grid's last index; battery, C_S and C_C by 100;
+    communications by the quota; the slot by ``max_slots``; residual data by the high end of
+    ``initial_data``. A UAV that has ended keeps its last state; an absent one has zeros.
     """
     space = spaces_of([scenario])[0]
     nodes = [f"residual_{k}" for k in range(len(space.nodes))]
@@ -44,13 +44,13 @@ def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
 
 
 def observation_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
-    """The least and the greatest values (F,) of an observation."""
+    """The lowest and the highest values (F,) of an observation."""
     names = observation_names(scenario)
     low, high = np.zeros(len(names), np.float32), np.ones(len(names), np.float32)
     for index, name in enumerate(names):
         if name.endswith(("dx", "dy")):
             low[index] = -1.0
-        elif name.startswith("residual"):  # new data arrives without a bound
+        elif name.startswith("residual"):  # arrivals are not bounded
             high[index] = np.inf
     return low, high
 
@@ -71,8 +71,8 @@ def observe(state: State, environments: np.ndarray, components: int) -> dict[str
         components: Length of an observation (F).
 
     Returns:
-        ``observation`` (N, I, F) of float32 and ``action_mask`` (N, I, 5) of int8; the mask of a
-        UAV that does not act has Hover alone.
+        ``observation`` (N, I, F) of float32 and ``action_mask`` (N, I, 5) of int8; only Hover is
+        set for a UAV that does not act.
     """
     vector = np.zeros((*state.uavs.shape, components), np.float32)
     mask = np.zeros((*state.uavs.shape, len(ACTION_NAMES)), np.int8)
@@ -133,7 +133,7 @@ def _observe_uav(mission, uavs, i, residual, out):
 
 @kernel
 def _quota_share(mission, u):
-    """Communications as a share of the quota; the last slot may have overshot it."""
+    """Communications as a share of the quota, at most 1: the last slot may exceed the quota."""
     return min(u.communications / mission.quota, 1.0)
 
 

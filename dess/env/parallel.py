@@ -1,4 +1,11 @@
-"""``parallel_env``: one mission as a PettingZoo ``ParallelEnv``."""
+"""``parallel_env``: one mission as a PettingZoo ``ParallelEnv``.
+
+env = parallel_env(load_scenario("paper"), seed=1)
+observations, _ = env.reset()
+while env.agents:
+    actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+    observations, rewards, terminated, truncated, infos = env.step(actions)
+"""
 
 from typing import Any
 
@@ -27,7 +34,7 @@ def parallel_env(
     """A PettingZoo environment of one mission.
 
     Args:
-        scenario: The scenario, or the space that each episode draws its own from.
+        scenario: The scenario, or the space from which each episode draws its parameters.
         seed: Seed of the episodes until ``reset`` is given another.
         render_mode: None or ``"rgb_array"``.
 
@@ -41,12 +48,12 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
     """One mission as a PettingZoo ``ParallelEnv``; each UAV is an agent, ``uav_0`` the first.
 
     ``reset(seed=s)`` starts replication 0 of seed s and each further ``reset()`` the next
-    replication, so a seed repeats whole sequences of episodes. ``options={"replication": r}`` goes
-    to replication r.
+    replication, so a seed gives a reproducible sequence of episodes. ``options={"replication": r}``
+    starts replication r.
 
-    A UAV that ends reports ``terminated`` (quota or battery) or ``truncated`` (``max_slots``) in
-    that step and is out of ``agents`` from then on. The ``possible_agents`` are the largest fleet
-    of the scenario; ``reset`` puts those of the episode into ``agents``.
+    A UAV that ends has ``terminated`` (quota or battery) or ``truncated`` (``max_slots``) in that
+    step and is removed from ``agents``. ``possible_agents`` is the largest fleet of the scenario;
+    ``reset`` sets ``agents`` to the fleet of the episode.
 
     ``info`` holds, per agent: ``reward_terms`` (their sum is the reward), ``collected`` and
     ``team_collected`` (data units of the slot), ``end`` (``active``, ``quota``, ``battery`` or
@@ -87,7 +94,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         """Start the next episode.
 
         Args:
-            seed: Start over with replication 0 of this seed.
+            seed: Start again at replication 0 of this seed.
             options: ``{"replication": r}`` starts replication r; other keys are ignored.
 
         Raises:
@@ -134,7 +141,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         return self._observe()["observation"].ravel()
 
     def record(self) -> MissionRecord:
-        """The record of the episode, as far as it has come."""
+        """The record of the episode, finished or not."""
         records = self._stepper.records(self._stepper.indices)
         return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
 
@@ -146,14 +153,14 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         return observe(self._stepper.state, self._stepper.indices, self._components)
 
     def _observations(self) -> dict[str, Observation]:
-        """Of the agents that are acting or have just acted."""
-        every = self._observe()
+        """The observations of the agents that act or acted in this step."""
+        arrays = self._observe()
         rows = [self.possible_agents.index(agent) for agent in self.agents]
-        return {self.possible_agents[i]: {key: every[key][0, i] for key in every} for i in rows}
+        return {self.possible_agents[i]: {key: arrays[key][0, i] for key in arrays} for i in rows}
 
 
 def _info(out: Outcome, i: int) -> dict[str, Any]:
-    """What a step did to UAV ``i`` of a single mission, in plain Python."""
+    """The outcome of a step for UAV ``i`` of a single mission, as plain values."""
     return {
         "reward_terms": dict(zip(REWARD_TERMS, out.reward_terms[0, i].tolist(), strict=True)),
         "collected": float(out.collected[0, i]),

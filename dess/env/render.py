@@ -1,4 +1,4 @@
-"""A picture of one mission as it stands, for the environment's ``render``."""
+"""A picture of the present state of one mission, for the environment's ``render``."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ _CELL = 16  # pixels
 _SEA, _LINES, _ZONE = (233, 241, 247), (212, 224, 234), (190, 205, 190)
 _NO_DATA, _FULL = np.array((255, 255, 255)), np.array((31, 78, 121))
 _IDLE, _CHARGING = (255, 255, 255), (0, 0, 0)
-# Colours that the colour-blind tell apart, after Okabe and Ito.
+# Colours for colour-blind readers, after Okabe and Ito.
 _FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
 

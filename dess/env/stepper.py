@@ -1,4 +1,9 @@
-"""Missions under way that are steered from outside, one per environment."""
+"""Missions that advance slot by slot with actions given from outside, one per environment.
+
+stepper = MissionStepper(space, num_envs=4, seed=1)
+stepper.launch(stepper.indices)    # replications 0 to 3
+outcome = stepper.step(actions)    # (4, I) actions
+"""
 
 from typing import Any, NamedTuple
 
@@ -20,21 +25,21 @@ from dess.state import (
     spaces_of,
 )
 
-# The parts of a reward, as ``rules.reward_terms`` gives them.
+# The terms of a reward, in the order of ``rules.reward_terms``.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted")
 
 
 class Outcome(NamedTuple):
-    """What one mission slot did, per mission (N,) and per UAV (N, I).
+    """The outcome of one mission slot, per mission (N,) and per UAV (N, I).
 
     Attributes:
         acted: (N, I) whether the UAV was active in the slot.
-        reward: (N, I) of the slot; 0 if it was not.
-        reward_terms: (N, I, 6) its parts, in the order of ``REWARD_TERMS``.
+        reward: (N, I) of the slot; 0 for an inactive UAV.
+        reward_terms: (N, I, 6) its terms, in the order of ``REWARD_TERMS``.
         end: (N, I) how the UAV's mission ended, an index of ``state.END_NAMES``.
-        terminated: (N, I) whether it ended in this slot, by its quota or its battery.
-        truncated: (N, I) whether it ended in this slot, by ``max_slots``.
-        overruled: (N, I) whether the safety controller overruled it.
+        terminated: (N, I) whether the UAV ended in this slot, by its quota or its battery.
+        truncated: (N, I) whether the UAV ended in this slot, by ``max_slots``.
+        overruled: (N, I) whether the safety controller overruled the UAV.
         collected: (N, I) data that the UAV collected in the slot [data units].
         team_collected: (N,) data that its team collected.
     """
@@ -51,12 +56,12 @@ class Outcome(NamedTuple):
 
 
 class MissionStepper:
-    """N missions of one scenario under way.
+    """N missions of one scenario in progress.
 
     Attributes:
-        space: The space that each mission draws its scenario from.
+        space: The space from which each mission draws its parameters.
         state: The arrays of the missions.
-        world: The nodes and the path loss table.
+        world: nodes and the tables of the channel.
         indices: (N,) the indices 0 to N - 1 of the environments.
     """
 
@@ -89,13 +94,13 @@ class MissionStepper:
         self._constants["seed"], self._next = seed, replication
 
     def launch(self, environments: np.ndarray) -> None:
-        """Put the next replications into these environments, in this order."""
+        """Start the next replications in these environments, in this order."""
         check_seed(self.seed, self._next + len(environments) - 1)
         _launch(environments, self._next, self._constants, self._ranges, self.state)
         self._next += len(environments)
 
     def step(self, actions: np.ndarray) -> Outcome:
-        """One mission slot of every environment; (N, I) actions 0..4, read of the UAVs that act."""
+        """Run one slot of every environment; (N, I) actions 0..4, ignored where no UAV acts."""
         shape = self.state.uavs.shape
         outcome = Outcome(
             acted=np.empty(shape, np.bool_),
@@ -112,7 +117,7 @@ class MissionStepper:
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:
-        """The records of these environments' missions, as far as they have come."""
+        """The records of the missions in these environments, finished or not."""
         records = empty_records(len(environments), self.state.uavs.shape[1])
         for row, b in enumerate(environments):
             mission, uavs, residual = (part[b] for part in self.state)
@@ -133,8 +138,8 @@ def _launch(environments, first, constants, ranges, state):
 
 @kernel
 def _step(state, world, scratch, actions, out):
-    """One mission slot of every mission; what it did goes into an ``Outcome``."""
-    nodes, path_loss, order, means = world
+    """Run one slot of every mission and write the ``Outcome``."""
+    nodes, mean_snr, order, means = world
     batches, search = scratch
     fleet = state.uavs.shape[1]
     arrivals = np.empty(len(world.nodes), np.int64)
@@ -148,7 +153,7 @@ def _step(state, world, scratch, actions, out):
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
             mission, uavs, state.residual[b], arrivals,
-            nodes, path_loss, order, means, batches, search,
+            nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
         out.team_collected[b] = mission.slot_collected
         for i in range(fleet):
@@ -168,10 +173,10 @@ def _step(state, world, scratch, actions, out):
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """Actions as an integer array of that shape.
+    """Check actions and return them as an integer array.
 
     Raises:
-        InputError: If they are none.
+        InputError: If they are not integers 0..4 of that shape.
     """
     array = np.asarray(actions)
     if array.dtype.kind not in "iu" or array.shape != shape:

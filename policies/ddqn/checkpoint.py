@@ -1,8 +1,8 @@
-"""Files of the learner: trained policies, and trainings under way. Nothing is ever unpickled.
+"""Files of the learner: trained policies and checkpoints of trainings. Nothing is unpickled.
 
-A policy is a folder with ``model.safetensors`` (the weights) and ``config.json`` (what they are the
-weights of). A training under way is one file, ``checkpoint.safetensors``: all arrays, and in its
-header, as JSON, all that is no array.
+A policy is a folder with ``model.safetensors`` (the weights) and ``config.json`` (their
+description). A checkpoint is one file, ``checkpoint.safetensors``, with all arrays of a training
+and, in its header as JSON, everything else.
 """
 
 import copy
@@ -39,14 +39,14 @@ def save_policy(
     space: ScenarioSpace,
     run: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a trained policy into a folder: the weights, then what they are the weights of.
+    """Write a trained policy into a folder: the weights, then their description.
 
     Args:
         folder: The folder.
-        weights: Of the network.
-        config: What they were trained by.
-        space: The missions that they were trained on.
-        run: How the training went: for readers, not for ``load_policy``.
+        weights: The weights of the network.
+        config: The settings of the training.
+        space: The scenario space of the training.
+        run: Facts about the training for readers; ``load_policy`` ignores them.
     """
     folder.mkdir(parents=True, exist_ok=True)
     tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
@@ -55,7 +55,7 @@ def save_policy(
         "format": FORMAT,
         "name": config.name,
         "observation_version": OBSERVATIONS[config.observation].version,
-        "layout": _plain(layout_of(space)),
+        "layout": _layout_values(layout_of(space)),
         "training": config.model_dump(mode="json"),
         "run": dict(run or {}),
     }
@@ -64,10 +64,10 @@ def save_policy(
 
 
 def load_policy(folder: Path) -> DDQN:
-    """The policy of a folder that ``save_policy`` wrote.
+    """Load a policy that ``save_policy`` wrote.
 
-    It looks at close decisions in double precision, so that an action does not depend on how many
-    are taken together.
+    Close decisions are computed in double precision, so that an action does not depend on the
+    number of rows that are decided together.
 
     Raises:
         InputError: If a file is missing, damaged, of another version or of another shape.
@@ -84,9 +84,9 @@ def load_policy(folder: Path) -> DDQN:
         raise InputError(f"{where}: format {version!r} is unknown; allowed: {FORMAT}")
     config = config_of(training, str(where))
     observation, network = build(config, layout)
-    _same_observation(content.get("observation_version"), observation, where)
+    _require_version(content.get("observation_version"), observation, where)
     tensors, _ = _read(folder / MODEL)
-    _fit(tensors, network.state_dict(), folder / MODEL)
+    _require_weights(tensors, network.state_dict(), folder / MODEL)
     network.load_state_dict(tensors)
     policy = DDQN(config.name, observation, network, config.guard, layout)
     policy.exact = copy.deepcopy(network).double()
@@ -96,7 +96,7 @@ def load_policy(folder: Path) -> DDQN:
 
 
 def save_training(path: Path, training: Training) -> None:
-    """Write all that a training needs to go on exactly as if it had not been stopped."""
+    """Write a checkpoint from which a training continues as if it had not been stopped."""
     learner = training.learner
     tensors: Tensors = {"random.torch": torch.get_rng_state()}
     tensors["early"] = torch.from_numpy(training.early)
@@ -129,9 +129,9 @@ def save_training(path: Path, training: Training) -> None:
 
 
 def load_training(path: Path, config: TrainingConfig, device: torch.device) -> Training:
-    """The training of a file that ``save_training`` wrote.
+    """Load a training from a checkpoint that ``save_training`` wrote.
 
-    Without the replay memory in the file the memory is filled anew, by the policy as it is.
+    If the checkpoint has no replay memory, the present policy fills it again.
 
     Raises:
         InputError: If the file is missing, damaged, of another version or of another config.
@@ -139,22 +139,23 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
     tensors, metadata = _read(path)
     try:
         header = json.loads(metadata["dess"])
-        version, theirs = header["format"], header.get("config", {})
+        version, saved = header["format"], header.get("config", {})
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise InputError(f"{path}: no checkpoint of a training: {error!r}") from None
     if version != FORMAT:
         raise InputError(f"{path}: format {version!r} is unknown; allowed: {FORMAT}")
     training = Training(config, device)
-    ours = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
-    theirs = config_of(theirs, str(path)).model_dump(mode="json")
-    theirs |= {"scenario": header.get("scenario")}
-    if other := [key for key in ours if ours[key] != theirs[key]]:
+    settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
+    saved = config_of(saved, str(path)).model_dump(mode="json")
+    saved |= {"scenario": header.get("scenario")}
+    if different := [key for key in settings if settings[key] != saved[key]]:
         raise InputError(
-            f"{path}: of another config ({', '.join(other)} differ); allowed: the one it began with"
+            f"{path}: of another config ({', '.join(different)} differ); "
+            "allowed: the one it began with"
         )
-    _same_observation(header.get("observation_version"), training.observation, path)
+    _require_version(header.get("observation_version"), training.observation, path)
     for name, network in _networks(training).items():
-        _fit(_part(tensors, name), network, path)
+        _require_weights(_part(tensors, name), network, path)
     try:
         _restore(training, tensors, header)
     except (LookupError, ValueError, TypeError, RuntimeError) as error:
@@ -163,7 +164,7 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
 
 
 def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> None:
-    """Put a new training where the saved one was."""
+    """Restore the state of a saved training in a new one."""
     training.restore(header["progress"])
     learner = training.learner
     with torch.no_grad():
@@ -197,7 +198,7 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
 
 
 def _digest(tensors: Tensors, use: list[Any]) -> str:
-    """A hash of weights and of what they are used with."""
+    """A hash of the weights and of the settings ``use`` that they are used with."""
     digest = hashlib.sha256(json.dumps(use).encode())
     for name in sorted(tensors):
         digest.update(name.encode() + b"\0" + tensors[name].numpy().tobytes())
@@ -225,19 +226,19 @@ def _read(path: Path) -> tuple[Tensors, dict[str, str]]:
         raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
 
 
-def _fit(tensors: Tensors, wanted: Tensors, path: Path) -> None:
-    """Refuse weights that are not those of the network."""
+def _require_weights(tensors: Tensors, wanted: Tensors, path: Path) -> None:
+    """Raise an error if the tensors are not weights of the network."""
     for name in sorted(tensors.keys() ^ wanted.keys()):
         problem = "is missing" if name in wanted else "is one too many"
         raise InputError(f"{path}: {name} {problem}; allowed: the weights of the config's network")
     for name, value in wanted.items():
-        found, allowed = _form(tensors[name]), _form(value)
-        if found != allowed:
-            raise InputError(f"{path}: {name} is {found}; allowed: {allowed}, as the config says")
+        actual, allowed = _form(tensors[name]), _form(value)
+        if actual != allowed:
+            raise InputError(f"{path}: {name} is {actual}; allowed: {allowed}, as the config says")
 
 
-def _same_observation(version: Any, observation: Any, path: Path) -> None:
-    """Refuse weights that have learned from observations of another meaning."""
+def _require_version(version: Any, observation: Any, path: Path) -> None:
+    """Raise an error if the weights were trained on another version of the observation."""
     if version != observation.version:
         raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
 
@@ -248,7 +249,7 @@ def _form(tensor: torch.Tensor) -> str:
 
 
 def _part(tensors: Tensors, name: str) -> Tensors:
-    """The tensors whose names begin with ``name.``, without that."""
+    """The tensors whose names begin with ``name.``, without that prefix."""
     prefix = name + "."
     return {
         key.removeprefix(prefix): value for key, value in tensors.items() if key.startswith(prefix)
@@ -256,7 +257,7 @@ def _part(tensors: Tensors, name: str) -> Tensors:
 
 
 def _bytes(array: np.ndarray) -> torch.Tensor:
-    """Any array, structured ones too, as bytes."""
+    """Any array, structured or not, as bytes."""
     return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
 
 
@@ -264,7 +265,7 @@ def _array(content: torch.Tensor, dtype: np.dtype) -> np.ndarray:
     return np.frombuffer(content.numpy().tobytes(), dtype).copy()
 
 
-def _plain(layout: Layout) -> dict[str, Any]:
+def _layout_values(layout: Layout) -> dict[str, Any]:
     return {
         "grid": layout.grid,
         "zone": layout.zone.tolist(),
@@ -273,11 +274,11 @@ def _plain(layout: Layout) -> dict[str, Any]:
 
 
 def _layout(values: dict[str, Any]) -> Layout:
-    return layout_of(ScenarioSpace.of(uavs=1, **values))  # which knows what fits together
+    return layout_of(ScenarioSpace.of(uavs=1, **values))  # validates the values
 
 
 def replace(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write a file of a training whole or not at all.
+    """Write a file of a training atomically.
 
     Raises:
         InputError: If it cannot be written.

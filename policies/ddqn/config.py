@@ -1,4 +1,8 @@
-"""What a training is told: every setting, documented where it is declared."""
+"""The settings of a training, documented where they are declared.
+
+config = load_config("quick", seed=2)      # shipped, or the path of a TOML file
+config.num_envs, config.n_step, config.phases[0].ticks
+"""
 
 import hashlib
 import json
@@ -20,7 +24,7 @@ from dess.scenario import load_scenario, validation_line
 
 _CONFIGS = Shipped("config", "policies.ddqn", "configs")
 
-# Training missions have this seed + that of the training.
+# Seed of training missions: this plus the seed of the training.
 MISSION_SEED = 500_000_000
 
 Count = Annotated[int, Field(strict=True, ge=1)]
@@ -35,7 +39,7 @@ class _Settings(BaseModel):
 class Phase(_Settings):
     """One phase of Algorithm 1."""
 
-    name: str = Field(description="what curves and files call it")
+    name: str = Field(description="name in curves and files")
     ticks: Count = Field(description="mission slots of every environment")
     battery: StrictBool = Field(True, description="whether flying costs battery (line 7, 19)")
     epsilon: tuple[Share, Share] = Field(
@@ -54,14 +58,14 @@ class TrainingConfig(_Settings):
     """All settings of a training."""
 
     name: str = Field(description="name of the policy")
-    description: str = Field("", description="what it is for")
+    description: str = Field("", description="purpose of the policy")
     scenario: str = Field("paper", description="scenario that missions are drawn from")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
         1, description="of the training: weights, exploration, missions"
     )
 
     observation: Literal["vector", "nodes", "maps"] = Field(
-        "vector", description="(b), (b) with a row per node, or the paper's (a)"
+        "vector", description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a)"
     )
     hidden: tuple[Count, ...] = Field(
         (512, 512), description="units of the dueling network's layers; maps have the paper's"
@@ -70,13 +74,13 @@ class TrainingConfig(_Settings):
         "float32", description="of the hidden layers while training"
     )
 
-    guard: StrictBool = Field(True, description="whether the return guard masks the actions")
+    guard: StrictBool = Field(True, description="whether the return guard masks actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
     )
     early_returns: Share = Field(
         0.0,
-        description="share of UAVs that come home, in training, as soon as they may charge there",
+        description="share of UAVs that return, in training, as soon as they may charge",
     )
     phases: tuple[Phase, ...] = Field(
         min_length=1, max_length=8, description="of Algorithm 1, in order"
@@ -92,7 +96,7 @@ class TrainingConfig(_Settings):
     n_step: Count = Field(5, description="n of the n-step return")
     discount: Rate = Field(0.99, description="gamma per slot")
     reward_scale: float = Field(0.05, gt=0.0, description="factor of all rewards")
-    loss: Literal["huber", "mse"] = Field("huber", description="of the difference to the target")
+    loss: Literal["huber", "mse"] = Field("huber", description="loss function")
     gradient_norm: float = Field(10.0, gt=0.0, description="to which gradients are clipped")
     target_rate: Rate = Field(0.005, description="tau of the soft target update (eq. 28)")
     average_rate: Rate = Field(
@@ -107,8 +111,8 @@ class TrainingConfig(_Settings):
     )
     window: Count = Field(3, description="evaluations in the moving average that selects")
     checkpoint_replay: StrictBool = Field(
-        True, description="whether checkpoints hold the replay memory; without, a resumed run is "
-        "another one than an uninterrupted run"
+        True, description="whether checkpoints hold the replay memory; if not, a resumed training "
+        "differs from an uninterrupted one"
     )  # fmt: skip
 
     @model_validator(mode="after")
@@ -143,7 +147,7 @@ def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig
     """A shipped config by name, or one from a TOML file.
 
     Raises:
-        InputError: If there is no such config, or it or its scenario is not valid.
+        InputError: If the config does not exist, or it or its scenario is not valid.
     """
     where, values = _CONFIGS.load(name_or_path)
     config = config_of(values | overrides, where)
@@ -155,10 +159,10 @@ def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig
 
 
 def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
-    """A config of plain values. Its scenario need not be here: a trained policy does without.
+    """Validate plain values, read from ``where``; the scenario's file need not exist.
 
     Raises:
-        InputError: If it is not valid; ``where`` says where the values came from.
+        InputError: If the values are not valid.
     """
     try:
         return TrainingConfig.model_validate(values)
@@ -170,6 +174,6 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
 
 
 def learner_of(config: TrainingConfig) -> str:
-    """What trainings that differ in their seed alone share: the name, and a hash of all else."""
+    """An identifier that trainings share if they differ only in the seed: name and hash."""
     settings = config.model_dump(mode="json", exclude={"seed", "description"})
     return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"

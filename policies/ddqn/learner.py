@@ -1,4 +1,4 @@
-"""The double DQN update (eq. 26-29) on a page."""
+"""The double DQN update (eq. 26-29): Q-target, loss, optimizer step, soft target update."""
 
 import copy
 from typing import Any
@@ -19,14 +19,14 @@ def double_dqn_target(
     target: torch.Tensor,
     allowed: torch.Tensor,
 ) -> torch.Tensor:
-    """The target value (eq. 29) with masked actions and n-step returns.
+    """The Q-target (eq. 29) with masked actions and n-step returns.
 
     Args:
         reward: (B,) discounted sum of the rewards until the later state.
         discount: (B,) factor of the later state's value; 0 after termination.
-        online: (B, A) values of the later state by the online network: they choose.
-        target: (B, A) by the target network: they judge.
-        allowed: (B, A) mask of the actions of the later state.
+        online: (B, A) Q-values of the later state by the online network, which select the action.
+        target: (B, A) Q-values by the target network, which evaluate it.
+        allowed: (B, A) mask of the actions allowed in the later state.
 
     Returns:
         (B,) target values.
@@ -45,11 +45,11 @@ class Learner:
     """Networks and optimizer.
 
     Attributes:
-        online: The network that learns.
-        target: The one that judges, a slow copy.
-        average: A still slower copy, the one that is evaluated and kept; None without.
+        online: The network that is trained.
+        target: The target network, a slow copy.
+        average: A still slower copy that is evaluated and saved; None if ``average_rate`` is 1.
         optimizer: Adam.
-        device: Where they are.
+        device: The device of all of them.
     """
 
     def __init__(
@@ -62,11 +62,11 @@ class Learner:
         self.restart()
 
     def restart(self) -> None:
-        """Forget what the optimizer has gathered."""
+        """Reset the optimizer."""
         self.optimizer = torch.optim.Adam(self.online.parameters(), fused=True)
 
     @property
-    def best_guess(self) -> nn.Module:
+    def evaluated(self) -> nn.Module:
         """The network to evaluate: the slow average, without one the online network."""
         return self.online if self.average is None else self.average
 
@@ -77,7 +77,7 @@ class Learner:
         return network(*self._observe(states, missions, uavs))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
-        """One gradient step on a minibatch; what it was like, as scalars still on the device."""
+        """One gradient step on a minibatch; returns loss, mean Q-value and gradient norm."""
         settings = self.settings
         allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
         reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
@@ -85,12 +85,12 @@ class Learner:
         action = torch.from_numpy(batch.action).to(self.device)
         with torch.no_grad():
             later = self._observe(batch.state, batch.later, batch.uav)
-            goal = double_dqn_target(
+            q_target = double_dqn_target(
                 reward, discount, self.online(*later), self.target(*later), allowed
             )
         values = self.values(self.online, batch.state, batch.rows, batch.uav)
         chosen = values.gather(1, action[:, None]).squeeze(1)
-        loss = _LOSSES[settings.loss](chosen, goal)
+        loss = _LOSSES[settings.loss](chosen, q_target)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)

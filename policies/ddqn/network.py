@@ -1,8 +1,10 @@
-"""The networks that value the five actions of a UAV: the paper's, and a dueling one on a vector.
+"""The Q-networks: the paper's on maps, a dueling one on a vector, and one with a row per node.
 
-All weights are float32. With ``precision`` bfloat16 the hidden layers compute in bfloat16 while
-training, by autocast; the last layers, and all of them in evaluation mode, compute as their
-weights are.
+    values = DuelingNetwork(inputs=454, hidden=(512, 512))(vector)     # (R, 5)
+
+All weights are float32. With ``precision`` bfloat16 the hidden layers compute in bfloat16 during
+training, by autocast; the output layers, and all layers in evaluation mode, compute in the type of
+the weights.
 """
 
 from collections.abc import Sequence
@@ -15,15 +17,15 @@ from dess.state import ACTION_NAMES
 
 ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5
-NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # map of which two convolutions leave something
+NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # width of a map that two convolutions reduce to one cell
 DENSE = (256, 256, 256)
 
 
 class PaperNetwork(nn.Module):
     """The paper's network: convolutions on both maps, then dense layers (Section VI-A).
 
-    Two convolutions (16 kernels of 5 x 5, no padding) on the local and, with weights of their own,
-    on the global map; three dense layers of 256 on what they give and the own flying time.
+    Two convolutions (16 kernels of 5 x 5, no padding) on the local map and two, with other weights,
+    on the global map; then three dense layers of 256 on their outputs and the own flying time.
     """
 
     def __init__(
@@ -91,7 +93,7 @@ class DuelingNetwork(nn.Module):
 
 
 class NodeNetwork(nn.Module):
-    """A dueling network that looks at every node alike, then at what is most and usual of all."""
+    """A dueling network with the same layers for every node, then max- and mean-pooled."""
 
     def __init__(
         self,
@@ -103,8 +105,8 @@ class NodeNetwork(nn.Module):
 
         Args:
             shapes: Shapes of one row of the vector and of the nodes (``Nodes.shapes``).
-            hidden: Widths: of what is known of a node, of the own vector, then of the layers on
-                both.
+            hidden: Widths of the layers on a node, of the layer on the vector, then of the joint
+                layers.
             precision: Of the hidden layers, float32 or bfloat16.
         """
         super().__init__()
@@ -123,8 +125,8 @@ class NodeNetwork(nn.Module):
     def forward(self, vector: Tensor, nodes: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, F) and nodes (R, K, features)."""
         with _hidden_precision(self, self.precision, vector):
-            each = self.nodes(torch.relu(self.node(nodes) + self.context(vector)[:, None]))
-            pooled = [self.own(vector), each.amax(1), each.mean(1)]
+            per_node = self.nodes(torch.relu(self.node(nodes) + self.context(vector)[:, None]))
+            pooled = [self.own(vector), per_node.amax(1), per_node.mean(1)]
             hidden = self.hidden(torch.cat([part.to(pooled[0].dtype) for part in pooled], 1))
         hidden = hidden.to(self.value.weight.dtype)
         advantage = self.advantage(hidden)
@@ -148,7 +150,7 @@ def _convolutions(channels: int) -> nn.Sequential:
 
 
 def _convolved(width: int) -> int:
-    """What two convolutions without padding leave of a width."""
+    """The width after two convolutions without padding."""
     return width - 2 * (KERNEL_SIZE - 1)
 
 

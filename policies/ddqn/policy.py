@@ -1,4 +1,4 @@
-"""The learned policy: the allowed action of the highest value (eq. 25)."""
+"""The learned policy: the allowed action with the highest Q-value (eq. 25)."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -11,9 +11,9 @@ from dess.errors import InputError
 from dess.view import View
 from policies.ddqn.observations.states import Layout, masks, snapshot
 
-# The rounding of sums depends on how many rows are evaluated together, and must decide nothing:
-# where the two best values are closer than this, they are computed again in double precision and
-# told apart by that many decimals.
+# The rounding of sums depends on the number of rows evaluated together and must not affect actions:
+# if the two best values differ by less than CLOSE, they are computed again in double precision and
+# rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-3, 9
 
 
@@ -21,15 +21,14 @@ class DDQN:
     """A network as a policy.
 
     Attributes:
-        name: The name that results carry.
-        observation: What the network is told: ``encode(snapshots, missions, uavs)``.
-        network: Values of the five actions.
-        exact: The same network in double precision, for close decisions; None while weights change.
-        guarded: Whether it chooses among the actions of the return guard only.
-        layout: The grid, zone and nodes that it has learned.
-        weights: A hash of the weights, for whoever keeps results; empty while they change.
-        learner: What tells trainings apart that differ in more than their seed; empty before one
-            has ended.
+        name: The name under which results are stored.
+        observation: The network's input: ``encode(snapshots, missions, uavs)``.
+        network: Q-values of the five actions.
+        exact: The same network in double precision, for close decisions; None during training.
+        guarded: Whether the return guard masks the actions.
+        layout: The grid, zone and nodes of the training.
+        weights: A hash of the weights, stored with results; empty during training.
+        learner: An identifier of the training's settings but for the seed; empty during training.
     """
 
     exact: nn.Module | None = None
@@ -47,9 +46,9 @@ class DDQN:
         """(R,) actions for the rows of the view.
 
         Raises:
-            InputError: If the missions have another grid, zone or nodes than it has learned.
+            InputError: If the missions have another grid, zone or nodes than the training.
         """
-        self._check(view)
+        self._require_layout(view)
         states = snapshot(view.state, self.guarded)
         allowed = masks(states, view.mission, view.uav)
         parts = self.observation.encode(states, view.mission, view.uav)
@@ -62,7 +61,7 @@ class DDQN:
                 values[close] = np.where(allowed[close], exact, -np.inf)
         return values.argmax(1)
 
-    def _check(self, view: View) -> None:
+    def _require_layout(self, view: View) -> None:
         missions = view.state.missions[np.unique(view.mission)]
         learned = (self.layout.grid, *self.layout.zone)
         for field, value in zip(_PLACE, learned, strict=True):

@@ -17,14 +17,14 @@ class Batch(NamedTuple):
     """A minibatch of B n-step transitions.
 
     Attributes:
-        state: Snapshots whose missions ``rows`` are the states; ``later`` those after n slots or
-            at the end of the UAV's mission.
+        state: The snapshots to which ``rows`` (the states) and ``later`` (the states after n slots
+            or at the end of the UAV's mission) refer.
         rows: (B,) missions of ``state``.
         later: (B,) missions of ``state``.
         uav: (B,) index of the UAV.
         action: (B,) its action.
-        reward: (B,) float32, discounted sum of its rewards in between.
-        discount: (B,) float32, factor of the value of the later state; 0 if the UAV terminated.
+        reward: (B,) float32, discounted sum of its rewards until the later state.
+        discount: (B,) float32, factor of the later state's value; 0 if the UAV terminated.
     """
 
     state: Snapshots
@@ -41,8 +41,8 @@ class ReplayMemory:
 
     Attributes:
         capacity: T [mission slots per environment].
-        count: Slots added since the beginning; the last ``capacity`` of them are there.
-        arrays: Name -> array, all that the memory consists of.
+        count: Slots added so far; the last ``capacity`` of them are stored.
+        arrays: The arrays of the memory by name.
     """
 
     def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
@@ -65,7 +65,7 @@ class ReplayMemory:
 
     @staticmethod
     def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
-        """Memory that such a ring takes [bytes]."""
+        """The size of such a memory [bytes]."""
         one = ReplayMemory(1, 1, uavs, nodes)
         return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
@@ -90,9 +90,9 @@ class ReplayMemory:
     def sample(
         self, size: int, n_step: int, discount: float, generator: np.random.Generator
     ) -> Batch:
-        """Draw transitions uniformly, with replacement, among those whose later state is there.
+        """Draw transitions uniformly, with replacement, among those whose later state is stored.
 
-        The last slot of a mission that was cut short is none of them.
+        The last slot of a truncated mission is excluded.
 
         Args:
             size: Transitions (B).
@@ -101,8 +101,8 @@ class ReplayMemory:
             generator: Source of the draw.
 
         Raises:
-            ValueError: If fewer than ``n_step + 1`` slots have been added, or in none of them a UAV
-                has done anything that can be learned from.
+            ValueError: If fewer than ``n_step + 1`` slots have been added, or none of them holds a
+                transition.
         """
         newest = self.count - 1
         oldest = max(0, self.count - self.capacity)
@@ -120,7 +120,7 @@ class ReplayMemory:
             good = self._acted[row, uav] & ~self._truncated[row, uav]
             keep = np.nonzero(good)[0][:missing]
             if not len(keep) and len(rows) > 1000:
-                raise ValueError("no transition in memory that can be learned from")
+                raise ValueError("no transition in memory")
             rows.append(row[keep])
             uavs.append(uav[keep])
             missing -= len(keep)
@@ -140,10 +140,10 @@ class ReplayMemory:
 def _returns(
     rows, uavs, n_step, discount, num_envs, rewards, terminated, truncated, later, total, factor
 ):
-    """n-step returns: they end where the UAV's mission does.
+    """n-step returns, which end with the UAV's mission.
 
-    Truncation is no termination: the return ends before the slot that was cut, with the value of
-    the last state in which the UAV still had a choice.
+    Truncation is not termination: the return ends before the truncated slot, with the value of the
+    last state in which the UAV chose an action.
     """
     size = len(rewards)
     for b in range(len(rows)):

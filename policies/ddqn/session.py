@@ -1,6 +1,8 @@
-"""A training as a folder: config, checkpoint, curves and the best policy so far.
+"""A training session in a folder: checkpoint, learning curves and the best policy so far.
 
-The folder is one that ``policies.load`` takes, from the first evaluation on.
+training = train(load_config("quick"), Path("runs/quick"))
+training = train(load_config("quick"), Path("runs/quick"), resume=True)
+policy = policies.load("runs/quick")       # from the first evaluation on
 """
 
 import signal
@@ -16,6 +18,7 @@ import torch
 
 import dess
 from dess.errors import InputError
+from dess.files import writable
 from dess.scenario import load_scenario
 from policies.ddqn.checkpoint import (
     CHECKPOINT,
@@ -37,10 +40,10 @@ _TAGS = {name: "losses" for name in ("loss", "gradient_norm", "value")}
 
 
 def device_of(name: str) -> torch.device:
-    """The device called ``auto`` (CUDA where there is one), ``cpu`` or ``cuda``.
+    """The device ``auto`` (CUDA if available), ``cpu`` or ``cuda``.
 
     Raises:
-        InputError: If the name is unknown, or there is no CUDA device.
+        InputError: If the name is unknown, or ``cuda`` is not available.
     """
     if name not in ("auto", "cpu", "cuda"):
         raise InputError(f"device: {name!r} is unknown; allowed: auto, cpu, cuda")
@@ -50,7 +53,7 @@ def device_of(name: str) -> torch.device:
 
 
 def memory_of(config: TrainingConfig) -> int:
-    """What the replay memory of a config takes [bytes]."""
+    """The size of the replay memory of a config [bytes]."""
     space = load_scenario(config.scenario)
     return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
 
@@ -64,26 +67,26 @@ def train(
     announce: Callable[[int], None] | None = None,
     progress: Callable[[Training, int], None] | None = None,
 ) -> Training:
-    """Train into a folder, or go on with the training that it holds.
+    """Train into a folder, or resume the training in it.
 
-    Ctrl-C and SIGTERM end it after the tick under way; then the returned training is not ``done``,
-    and the folder holds all that is needed to resume it exactly.
+    Ctrl-C and SIGTERM end the session after the present tick. The returned training is then not
+    ``done``, and the folder has everything to resume it exactly.
 
     Args:
         config: The settings.
         out: The folder.
-        resume: Whether to go on with its training.
+        resume: Whether to resume the training in the folder.
         device: ``auto``, ``cpu`` or ``cuda``.
-        announce: Called before anything large is made, with what the replay memory takes [bytes].
+        announce: Called before any large allocation with the size of the replay memory [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
     Returns:
-        The training as it ended.
+        The training at the end of the session.
 
     Raises:
-        InputError: If the folder holds a training and is not to be resumed, or holds none to
-            resume, or one of another config; if it holds a policy alone, or cannot be written; if
-            the machine's memory is too small.
+        InputError: If ``resume`` is not set and the folder has a training or a policy; if it is set
+            and the folder has no training, or one of another config; if the folder cannot be
+            written; if the machine's memory is too small.
     """
     path, place = out / CHECKPOINT, device_of(device)
     if path.exists() and not resume:
@@ -102,11 +105,8 @@ def train(
             "machine; allowed: fewer environments or slots"
         ) from error
     if not resume:
-        try:
+        with writable(out):
             out.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            reason = error.strerror or error
-            raise InputError(f"{out}: cannot be written: {reason}; allowed: a folder") from None
         save_training(path, training)
     with _stop_signal() as stopped, _tensorboard(out / EVENTS, training) as show:
         saved = time.monotonic()
@@ -128,7 +128,7 @@ def train(
 
 
 def _save_results(out: Path, training: Training) -> None:
-    """Write the best policy so far and the curves."""
+    """Write the best policy so far and the learning curves."""
     cuda = training.device.type == "cuda"
     run = {
         "dess": dess.__version__,
@@ -149,26 +149,26 @@ def _save_results(out: Path, training: Training) -> None:
 
 @contextmanager
 def _stop_signal() -> Iterator[Callable[[], bool]]:
-    """Take SIGINT and SIGTERM as a wish to stop after the tick; the second one stops at once."""
-    wishes: list[int] = []
+    """Let SIGINT and SIGTERM stop the session after the tick; a second signal stops it at once."""
+    received: list[int] = []
 
-    def wish(number: int, frame: Any) -> None:
-        wishes.append(number)
-        if len(wishes) > 1:
+    def receive(number: int, frame: Any) -> None:
+        received.append(number)
+        if len(received) > 1:
             raise KeyboardInterrupt
 
-    kinds = (signal.SIGINT, signal.SIGTERM)
-    before = {kind: signal.signal(kind, wish) for kind in kinds}
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    handlers = {number: signal.signal(number, receive) for number in numbers}
     try:
-        yield lambda: bool(wishes)
+        yield lambda: bool(received)
     finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
 def _tensorboard(folder: Path, training: Training) -> Iterator[Callable[[dict[str, Any]], None]]:
-    """Show the rows of the curve in TensorBoard, if it is installed."""
+    """Write the rows of the curve for TensorBoard, if it is installed."""
     try:
         from torch.utils.tensorboard import SummaryWriter
     except ImportError:

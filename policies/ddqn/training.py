@@ -46,7 +46,7 @@ METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", 
 MISSIONS_PER_PHASE = 2**28
 OBSERVATIONS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
-# What of a training is a plain value.
+# The attributes of a training that are plain values.
 _PROGRESS = (
     "tick",
     "updates",
@@ -60,7 +60,7 @@ _PROGRESS = (
 
 
 def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
-    """The observation and a new network of a config, for missions over a layout."""
+    """The observation and a new network of a config, for missions with a layout."""
     precision = getattr(torch, config.precision)
     if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
         raise InputError(
@@ -75,13 +75,13 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
 
 
 class Training:
-    """A training under way, from its first tick to its last.
+    """A training in progress, from its first tick to its last.
 
     Attributes:
         config: Its settings.
         learner: Networks and optimizer.
         tick: Ticks done, over all phases.
-        curve: One row per evaluation: where the training stood, and how good it was.
+        curve: One row per evaluation: progress, metrics and losses.
     """
 
     def __init__(self, config: TrainingConfig, device: torch.device):
@@ -123,8 +123,8 @@ class Training:
         epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
         if self.replay.count == 0:
             for _ in range(self.config.learning_starts):
-                self._fly(1.0 if self.tick == 0 else epsilon)
-        self._fly(epsilon)
+                self._collect(1.0 if self.tick == 0 else epsilon)
+        self._collect(epsilon)
         for _ in range(self.config.updates):
             batch = self.replay.sample(
                 self.config.batch, self.config.n_step, self.config.discount, self.generator
@@ -153,17 +153,17 @@ class Training:
         return DDQN(config.name, self.observation, network, config.guard, self.layout)
 
     def progress(self) -> dict[str, Any]:
-        """Where the training stands, as plain values."""
+        """The progress of the training, as plain values."""
         return {name: getattr(self, name) for name in _PROGRESS}
 
     def restore(self, progress: dict[str, Any]) -> None:
-        """Go to where ``progress()`` was taken; arrays and random states are not part of it."""
+        """Restore what ``progress()`` returned; arrays and random states are restored elsewhere."""
         self._enter_phase(progress["phase_index"])
         for name in _PROGRESS:
             setattr(self, name, progress[name])
 
     def _enter_phase(self, index: int) -> None:
-        """Begin a phase: its missions, an empty memory, a new optimizer, no best weights yet."""
+        """Begin a phase: new missions, an empty replay memory, a new optimizer, no scores."""
         self.phase_index, self.phase_start = index, self.tick
         config = self.config
         cost = 1 if self.phase.battery else 0
@@ -179,7 +179,7 @@ class Training:
         self.best_score: float | None = None
 
     def _launch(self, environments: np.ndarray) -> None:
-        """Start new missions, some of them in the zone on a low battery; who returns early?"""
+        """Start new missions, some with a low battery; draw the UAVs that return early."""
         self.stepper.launch(environments)
         draws = self.generator.random((len(environments), self.early.shape[1]))
         self.early[environments] = draws < self.config.early_returns
@@ -188,10 +188,10 @@ class Training:
                 self.generator.random(len(environments)) < self.config.low_battery_starts
             ]
             draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
-            _run_low(*self.stepper.state, low, draws)
+            _lower_batteries(*self.stepper.state, low, draws)
 
-    def _fly(self, epsilon: float) -> None:
-        """One slot of all environments under the exploring policy; remember it."""
+    def _collect(self, epsilon: float) -> None:
+        """Run one slot of all environments under the exploring policy and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
         states = snapshot(state, self.config.guard)
@@ -215,24 +215,24 @@ class Training:
         """Epsilon-greedy or softmax actions among the allowed ones."""
         allowed = masks(states, missions, uavs)
         noise = self.generator.random(allowed.shape)
-        chance = np.where(allowed, noise, -1.0).argmax(1)
+        random = np.where(allowed, noise, -1.0).argmax(1)
         if epsilon >= 1.0:
-            return chance
+            return random
         with torch.no_grad():
             learner = self.learner
             values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
-        if self.phase.temperature > 0.0:  # the Gumbel trick draws from the softmax
+        if self.phase.temperature > 0.0:  # Gumbel noise samples from the softmax
             values = values / self.phase.temperature - np.log(-np.log(noise))
         choice = np.where(allowed, values, -np.inf).argmax(1)
         if self.config.early_returns > 0.0:
             homeward = allowed & self._homeward(states, missions, uavs)
             choice = np.where(homeward.any(1), np.where(homeward, noise, -1.0).argmax(1), choice)
-        return np.where(self.generator.random(len(choice)) < epsilon, chance, choice)
+        return np.where(self.generator.random(len(choice)) < epsilon, random, choice)
 
     def _homeward(self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
-        """(R, 5) mask of the actions of those on an early return, who come home with C_S left.
+        """(R, 5) mask of the actions of UAVs that return early, so as to arrive with C_S left.
 
-        They lead nearer to the zone; in it, once it may charge, a UAV hovers.
+        The actions lead nearer to the zone; in the zone a latched UAV hovers.
         """
         rows, layout = states.uavs[missions, uavs], self.layout
         cells = rows[:, [X, Y]].astype(np.int64)
@@ -245,14 +245,14 @@ class Training:
         return nearer & due[:, None]
 
     def _evaluate(self) -> None:
-        """Fly the missions that select the weights; keep the best by moving average."""
-        config, network = self.config, self.learner.best_guess
+        """Simulate the selection missions; keep the weights with the best moving average."""
+        config, network = self.config, self.learner.evaluated
         policy = self._as_policy(network)
         records = simulate_batch(
             self.phase_space, policy, config.evaluation_seed, config.evaluation_missions
         ).missions
         network.train()
-        settled = len(self.scores) == config.window  # until then the latest are the best
+        settled = len(self.scores) == config.window  # before that the latest weights are kept
         self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
@@ -272,8 +272,8 @@ class Training:
         }
         row |= {f"evaluation_{name}": float(records[name].mean()) for name in METRICS}
         if self.finished:
-            flown = np.concatenate(self.finished)
-            row |= {f"training_{name}": float(flown[name].mean()) for name in METRICS}
+            finished = np.concatenate(self.finished)
+            row |= {f"training_{name}": float(finished[name].mean()) for name in METRICS}
         for name in self.losses[-1] if self.losses else ():
             row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())
         self.finished, self.losses = [], []
@@ -281,7 +281,7 @@ class Training:
 
 
 def _between(ends: tuple[float, float], share: float) -> float:
-    """A value that moves linearly from one end to the other, then stays."""
+    """Linear interpolation between the ends, constant beyond a share of 1."""
     return ends[0] + (ends[1] - ends[0]) * min(max(share, 0.0), 1.0)
 
 
@@ -291,12 +291,11 @@ def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
 
 
 @kernel
-def _run_low(missions, uavs, residual, environments, draws):
-    """Make newly launched missions ones that have flown: in the zone, latched, on a low battery.
+def _lower_batteries(missions, uavs, residual, environments, draws):
+    """Let new missions start in the zone as if after a flight: latched, on a low battery.
 
-    The battery is somewhere from 5 % to C_S, the same for the whole team as it is after a flight
-    together. The quota is as far filled as that flight would have, and some share of the nodes,
-    any from none to all, is empty.
+    The battery is uniform from 5 % to C_S and the same for the whole team. The communications
+    are those of the slots flown, and a uniform share of the nodes is empty.
     """
     for n in range(len(environments)):
         mission, data = missions[environments[n]], residual[environments[n]]

@@ -1,10 +1,10 @@
-"""What each means of learning is worth: trainings that differ in one setting, same budget.
+"""Ablation of the learner's settings: trainings that differ in one setting, with equal budgets.
 
-Runs the variants of ``VARIANTS`` from the shipped config ``quick``, each with several training
-seeds, and keeps the curve of each. A training whose curve is already there is not run again. The
-final figures are those of the selected weights on missions that no training and no selection has
-used.
+Trains the variants of ``VARIANTS``, which start from the shipped config ``quick``, with several
+training seeds, and writes the learning curves. A training whose curve exists is not run again. The
+final metrics are those of the selected weights on missions that no training and no selection used.
 
+    export OMP_NUM_THREADS=1
     python -m reports.tools.learning_curves --out runs/learning --seeds 1 2 3
     python -m reports.tools.learning_curves --out runs/learning \\
         --gather policies/trained/curves.parquet
@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import torch
 
 from dess import load_scenario, simulate_batch
 from policies.ddqn.config import TrainingConfig, load_config
+from policies.ddqn.session import device_of
 from policies.ddqn.training import Training
 
 EVALUATION_SEED = 900_000_001
@@ -27,7 +27,7 @@ METRICS = ("success", "collection_ratio", "collection_ratio_and_communication")
 
 
 def _variants() -> dict[str, dict[str, Any]]:
-    """Name -> settings that differ from those of ``quick``."""
+    """The settings that differ from ``quick``, by the name of the variant."""
     quick = load_config("quick")
     last = quick.phases[-1].model_dump()
     alone = {"phases": [last | {"ticks": quick.ticks}]}
@@ -58,7 +58,7 @@ VARIANTS = _variants()
 
 def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, float]]:
     """The curve of a training, and the metrics of its selected weights on unseen missions."""
-    training = Training(config, torch.device("cpu"))
+    training = Training(config, device_of("cpu"))
     training.run(config.ticks)
     policy = training.policy(training.best)
     records = simulate_batch(load_scenario(config.scenario), policy, EVALUATION_SEED, missions)
@@ -83,7 +83,7 @@ def table(curves: pd.DataFrame) -> str:
 
 
 def main() -> None:
-    """Run what the command line asks for."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, help="folder of the curves")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
@@ -101,7 +101,6 @@ def main() -> None:
         files = sorted(arguments.out.glob("*.parquet"))
         pd.concat(map(pd.read_parquet, files)).to_parquet(arguments.gather, index=False)
         return
-    torch.set_num_threads(1)
     arguments.out.mkdir(parents=True, exist_ok=True)
     for seed in arguments.seeds:
         for variant in arguments.variants:

@@ -1,6 +1,6 @@
-"""Write what can be computed of a model card: policies/trained/NAME/README.md.
+"""Write the computed part of a model card, policies/trained/NAME/README.md.
 
-Replaces the part between the two marks; what is written around them stays.
+Replaces the text between the two marks and keeps the text around them.
 
     python -m reports.tools.model_cards policies/trained/ddqn --command "dess train ddqn --out DIR"
 """
@@ -25,7 +25,7 @@ BEGIN, END = (
     "<!-- computed by reports/tools/model_cards.py -->",
     "<!-- end of the computed part -->",
 )
-# Never used by a training or a selection of weights, and for nothing else than these cards.
+# The seed of the missions of model cards; no training and no selection of weights uses it.
 EVALUATION_SEED = 20_261_121
 PRODUCT = "collection_ratio_and_communication"
 
@@ -74,8 +74,8 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
         }
     )
     yield (
-        "The curve (`training.parquet`), evaluations while training; those of a phase without "
-        "battery decrease are flown without it, too:"
+        "The learning curve (`training.parquet`): evaluations during training, without battery "
+        "decrease in a phase without it:"
     )
     rows = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 12).round().astype(int))]
     table = ["| tick | phase | minutes | success | product |", "| --- | --- | --- | --- | --- |"]
@@ -117,8 +117,8 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
         _row(f"I = {n}", simulate_batch(case, policy, EVALUATION_SEED, missions).missions)
         for n, case in ((n, load_scenario("fig4", uavs=n)) for n in (1, 2, 3))
     ]
-    for n, printed in paper.FIG_4.items():
-        cells = f"{100 * printed['success']:.1f} % | {100 * printed['collection_ratio']:.1f} % | "
+    for n, means in paper.FIG_4.items():
+        cells = f"{100 * means['success']:.1f} % | {100 * means['collection_ratio']:.1f} % | "
         rows.append(f"| paper, I = {n} | {cells}not printed |")
     yield f"The cases of Fig. 4, {missions} missions each:"
     yield "\n".join([HEAD, *rows])

@@ -36,12 +36,16 @@ HAND = {
 }
 
 
+# Two UAVs that start in a zone of two cells, far from a node that is never emptied.
+PAIR = HAND | {"uavs": 2, "zone": [0, 0, 2, 1], "nodes": [[3, 3]], "initial_data": 1000.0}
+
+
 def _bits(k: float) -> float:
     """Data units that a whole slot carries over k [cells^2]."""
     return math.log2(1 + 255 / (1 + 16 * k))
 
 
-def _fly(scenario: Scenario, *routes: str, starts: Any = None) -> tuple[MissionRecord, dict]:
+def _simulate(scenario: Scenario, *routes: str, starts: Any = None) -> tuple[MissionRecord, dict]:
     """The mission and its log; of the first replication in which UAV i starts at ``starts[i]``."""
     for replication in range(1000):
         record = simulate(scenario, Script(*routes), 0, replication, events=True)
@@ -61,7 +65,12 @@ def _values(log: dict[str, np.ndarray], event: str, *names: str) -> list[tuple]:
     return list(zip(*(log[name][chosen].tolist() for name in names), strict=True))
 
 
-def test_the_channel_is_as_easy_as_said() -> None:
+def _batteries(log: dict[str, np.ndarray], uav: int) -> list[float]:
+    """The battery of a UAV at the end of every slot in which it was active."""
+    return [battery for i, battery in _values(log, "move", "uav", "value") if i == uav]
+
+
+def test_the_rates_of_the_hand_worked_channel() -> None:
     assert _bits(0) == 8
     assert _bits(1) == 4
 
@@ -77,7 +86,7 @@ def test_a_node_is_emptied_by_flying_over_it() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 19.5, "quota": 4, "flying_time": 5}
     )
-    record, log = _fly(scenario, "EEW")
+    record, log = _simulate(scenario, "EEW")
     served = _values(log, "communication", "time", "uav", "node", "x", "y")
     assert served == [(1.0, 0, 0, 1.0, 0.0), (2.0, 0, 0, 2.0, 0.0), (3.0, 0, 0, 1.0, 0.0)]
     amounts = [value for (value,) in _values(log, "communication", "value")]
@@ -114,7 +123,7 @@ def test_two_nodes_are_harvested_on_the_way() -> None:
             "flying_time": 20,
         }
     )
-    record, log = _fly(scenario, "EEE")
+    record, log = _simulate(scenario, "EEE")
     served = _values(log, "communication", "time", "node", "x")
     assert served == [(0.5, 0, 0.5), (1.0, 0, 1.0), (1.5, 1, 1.5), (2.0, 1, 2.0), (2.5, 1, 2.5)]
     amounts = [value for (value,) in _values(log, "communication", "value")]
@@ -140,7 +149,7 @@ def test_a_charge_stop() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 5, "flying_time": 12}
     )
-    record, log = _fly(scenario, "")
+    record, log = _simulate(scenario, "")
     assert _values(log, "move", "time", "value") == [
         (0.0, 11.0),
         (1.0, 21.0),
@@ -162,7 +171,7 @@ def test_a_charge_stop() -> None:
     assert (row["slots_flying"], row["slots_charging"], row["slots_waiting"]) == (5, 2, 0)
 
 
-def test_flying_home_to_charge() -> None:
+def test_returning_to_charge() -> None:
     """C_S = 11, C_C = 25, b(0) = 13; east, west, then hovering at home (0, 0); node at (1, 0).
 
     Slot 0: out, b = 12, above the node: 8 units. Slot 1: back, b = 11: 4 units; it enters the
@@ -172,7 +181,7 @@ def test_flying_home_to_charge() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 3, "flying_time": 13}
     )
-    record, log = _fly(scenario, "EW")
+    record, log = _simulate(scenario, "EW")
     batteries = [value for (value,) in _values(log, "move", "value")]
     assert batteries == [12, 11, 21, 25, 24]
     amounts = [value for (value,) in _values(log, "communication", "value")]
@@ -188,17 +197,9 @@ def test_flying_home_to_charge() -> None:
 )
 def test_uavs_are_served_in_index_order(starts: list, amounts: list[float]) -> None:
     scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 2,
-            "zone": [0, 0, 2, 1],
-            "nodes": [[0, 0]],
-            "initial_data": 10.0,
-            "flying_time": 20,
-            "quota": 1,
-        }
+        **PAIR | {"nodes": [[0, 0]], "initial_data": 10.0, "flying_time": 20, "quota": 1}
     )
-    record, log = _fly(scenario, "", "", starts=starts)
+    record, log = _simulate(scenario, "", "", starts=starts)
     assert _values(log, "communication", "uav", "node") == [(0, 0), (1, 0)]
     assert record.uavs["collected"].tolist() == pytest.approx(amounts, abs=1e-9)
     # Each UAV is paid for the data of the whole team: 1.3 * 10 - 0.1 + 100.
@@ -216,22 +217,11 @@ def test_a_queue_for_the_only_pad() -> None:
     UAV 1 in 0, 1, 2, 6.
     """
     scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 2,
-            "zone": [0, 0, 2, 1],
-            "pads": 1,
-            "nodes": [[3, 3]],
-            "initial_data": 1000.0,
-            "flying_time": 12,
-            "charge_complete": 30,
-            "max_slots": 7,
-        }
+        **PAIR | {"pads": 1, "flying_time": 12, "charge_complete": 30, "max_slots": 7}
     )
-    record, log = _fly(scenario, "", "")
-    moves = _values(log, "move", "uav", "value")
-    assert [b for i, b in moves if i == 0] == [11, 21, 30, 29, 28, 27, 26]
-    assert [b for i, b in moves if i == 1] == [11, 10, 9, 19, 29, 30, 29]
+    record, log = _simulate(scenario, "", "")
+    assert _batteries(log, 0) == [11, 21, 30, 29, 28, 27, 26]
+    assert _batteries(log, 1) == [11, 10, 9, 19, 29, 30, 29]
     assert _values(log, "charge_request", "time", "uav") == [(1.0, 0), (1.0, 1)]
     assert _values(log, "charge_start", "time", "uav") == [(1.0, 0), (3.0, 1)]
     assert _values(log, "charge_end", "time", "uav") == [(3.0, 0), (6.0, 1)]
@@ -253,22 +243,10 @@ def test_a_queue_in_the_very_first_slot() -> None:
     UAV 0    15  25  24  23  22
     UAV 1     4   3  13  23  25    waits in slots 0 and 1
     """
-    scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 2,
-            "zone": [0, 0, 2, 1],
-            "pads": 1,
-            "nodes": [[3, 3]],
-            "initial_data": 1000.0,
-            "flying_time": 5,
-            "max_slots": 5,
-        }
-    )
-    record, log = _fly(scenario, "", "")
-    moves = _values(log, "move", "uav", "value")
-    assert [b for i, b in moves if i == 0] == [15, 25, 24, 23, 22]
-    assert [b for i, b in moves if i == 1] == [4, 3, 13, 23, 25]
+    scenario = Scenario.of(**PAIR | {"pads": 1, "flying_time": 5, "max_slots": 5})
+    record, log = _simulate(scenario, "", "")
+    assert _batteries(log, 0) == [15, 25, 24, 23, 22]
+    assert _batteries(log, 1) == [4, 3, 13, 23, 25]
     assert record.uavs["slots_waiting"].tolist() == [0, 2]
 
 
@@ -281,59 +259,43 @@ def test_pads_are_first_come_first_served() -> None:
     UAV 2    11  10  20  21  20  19    asks in slot 1, waits in 1, charges in 2 and 3
     """
     scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 3,
-            "zone": [0, 1, 3, 1],
-            "pads": 1,
-            "nodes": [[3, 3]],
-            "initial_data": 1000.0,
-            "flying_time": 12,
-            "charge_complete": 21,
-            "max_slots": 6,
-        }
+        **PAIR | {"uavs": 3, "zone": [0, 1, 3, 1], "pads": 1},
+        flying_time=12,
+        charge_complete=21,
+        max_slots=6,
     )
-    record, log = _fly(scenario, "NS", "", "")
-    moves = _values(log, "move", "uav", "value")
-    assert [b for i, b in moves if i == 0] == [11, 10, 9, 8, 18, 21]
-    assert [b for i, b in moves if i == 1] == [11, 21, 20, 19, 18, 17]
-    assert [b for i, b in moves if i == 2] == [11, 10, 20, 21, 20, 19]
+    record, log = _simulate(scenario, "NS", "", "")
+    assert _batteries(log, 0) == [11, 10, 9, 8, 18, 21]
+    assert _batteries(log, 1) == [11, 21, 20, 19, 18, 17]
+    assert _batteries(log, 2) == [11, 10, 20, 21, 20, 19]
     assert _values(log, "charge_start", "time", "uav") == [(1.0, 1), (2.0, 2), (4.0, 0)]
     assert record.uavs["slots_waiting"].tolist() == [2, 0, 1]
 
 
 @pytest.mark.parametrize("stuck", [0, 1])
-def test_a_uav_that_finds_its_cell_taken_dies(stuck: int) -> None:
-    """Crowding: one UAV charges slowly on (1, 0), the other wants in from (1, 1) until it is dead.
+def test_the_battery_of_a_uav_is_depleted_outside_a_taken_cell(stuck: int) -> None:
+    """Crowding: one UAV charges slowly on (1, 0), the other tries to enter from (1, 1) until its
+    battery is depleted.
 
     b(0) = 13, C_S = 10, C_C = 100, 1 % per charging slot, the mission is cut after 20 slots.
     The one at home: 12, 11, 10, then it charges in slots 3..19: 10 + 17 = 27.
     The other: south to (0, 1), east to (1, 1), then it asks for north in slots 2..12, is overruled
     11 times, and its battery is empty after slot 12, outside the zone.
     Node at (3, 3). From (1, 0) and (0, 1) it is k = 13: log2(1 + 255/209) = 1.15063 units a slot,
-    from (1, 1) k = 8: log2(1 + 255/129) = 1.57373. The team collects, until the other is dead,
-    3 * 1.15063 + 1.15063 + 12 * 1.57373 = 23.48728, and nothing after it.
+    from (1, 1) k = 8: log2(1 + 255/129) = 1.57373. The team collects, until then,
+    3 * 1.15063 + 1.15063 + 12 * 1.57373 = 23.48728, and nothing after.
     Reward of the other: 1.3 * 23.48728 - 13 * 0.1 - 11 * 1 - 300 = -281.7665;
     of the one at home: 1.3 * 23.48728 - 20 * 0.1 + 17 * 0.05 = 29.3835.
     """
     scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 2,
-            "zone": [0, 0, 2, 1],
-            "nodes": [[3, 3]],
-            "initial_data": 1000.0,
-            "flying_time": 13,
-            "charge_start": 10,
-            "charge_complete": 100,
-            "charge_rate": 1,
-            "max_slots": 20,
-        }
+        **PAIR | {"charge_start": 10, "charge_complete": 100, "charge_rate": 1},
+        flying_time=13,
+        max_slots=20,
     )
     at_home = 1 - stuck
     routes, starts = ["", ""], [(1.0, 0.0), (1.0, 0.0)]
     routes[stuck], starts[stuck] = "SE" + "N" * 18, (0.0, 0.0)
-    record, log = _fly(scenario, *routes, starts=starts)
+    record, log = _simulate(scenario, *routes, starts=starts)
     rows = record.uav_rows()
     assert rows[stuck] == {"quota": 13, "battery": 0, "slots_charging": 0, "end": "battery"}
     assert rows[at_home] == {"quota": 3, "battery": 27, "slots_charging": 17, "end": "truncated"}
@@ -352,7 +314,7 @@ def test_the_last_slot_of_the_battery_still_communicates() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 2, "flying_time": 2}
     )
-    record, _ = _fly(scenario, "EE")
+    record, _ = _simulate(scenario, "EE")
     assert record.uav_rows() == [{"quota": 2, "battery": 0, "slots_charging": 0, "end": "quota"}]
     assert (record.success, record.slots) == (1, 2)
     assert record.reward == pytest.approx(1.3 * 12 - 0.2 + 100, abs=1e-9)
@@ -377,7 +339,7 @@ def test_flying_without_battery_decrease(
         flight_cost=0,
         max_slots=6,
     )
-    record, log = _fly(scenario, "EEW")
+    record, log = _simulate(scenario, "EEW")
     assert record.uav_rows() == [{"quota": slots, "battery": 2, "slots_charging": 0, "end": end}]
     assert _values(log, "move", "time", "value") == [(float(t), 2.0) for t in range(slots)]
     assert (record.slots, record.uav_slots, record.success) == (slots, slots, end == "quota")
@@ -385,24 +347,17 @@ def test_flying_without_battery_decrease(
     assert record.reward == pytest.approx(reward, abs=1e-9)
 
 
-def test_a_uav_that_is_done_leaves_the_map() -> None:
+def test_a_uav_that_has_ended_leaves_the_map() -> None:
     """UAV 0 takes all 5 units in slot 0 and has its quota of 1; UAV 1 wants into its cell.
 
     In slot 0 UAV 1 is overruled, finds no data and stays; in slot 1 the cell is free.
     """
     scenario = Scenario.of(
-        **HAND
-        | {
-            "uavs": 2,
-            "zone": [0, 0, 2, 1],
-            "nodes": [[0, 0]],
-            "initial_data": 5.0,
-            "quota": 1,
-            "flying_time": 20,
-            "max_slots": 2,
-        }
+        **PAIR | {"nodes": [[0, 0]], "initial_data": 5.0, "quota": 1},
+        flying_time=20,
+        max_slots=2,
     )
-    record, log = _fly(scenario, "", "WW", starts=[(0, 0), (1, 0)])
+    record, log = _simulate(scenario, "", "WW", starts=[(0, 0), (1, 0)])
     assert [row["end"] for row in record.uav_rows()] == ["quota", "truncated"]
     assert _values(log, "collision", "time", "uav") == [(0.0, 1)]
     moves = [(0.0, 0, 0.0), (0.0, 1, 1.0), (1.0, 1, 0.0)]

@@ -1,4 +1,4 @@
-"""What a mission leaves: the event log of the contract, and the rows of the record."""
+"""The record of a mission and its event log."""
 
 import pickle
 
@@ -7,38 +7,26 @@ import pytest
 from hypothesis import given
 
 from dess.mission import simulate
-from dess.record import EVENT_NAMES, MISSION_RECORD, EventLog
+from dess.record import EVENT_NAMES, MISSION_RECORD, MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import sample_scenario
 from tests.drawn import Commuter, Fidget, policies, replications, seeds, spaces
 
-COLUMNS = ["time", "event", "uav", "node", "value", "x", "y"]
 
-
-def _log(space: ScenarioSpace | Scenario, policy: object, seed: int, replication: int) -> dict:
+def _logged(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> tuple[MissionRecord, dict[str, np.ndarray]]:
+    """The record of a mission and its event log."""
     record = simulate(space, policy, seed, replication, events=True)
     assert record.events is not None
-    return record.events.columns()
+    return record, record.events.columns()
 
 
-def test_the_names_are_those_of_the_contract() -> None:
-    assert EVENT_NAMES == (
-        "mission_start",
-        "move",
-        "collision",
-        "charge_request",
-        "charge_start",
-        "charge_end",
-        "communication",
-        "arrival",
-        "quota_filled",
-        "battery_empty",
-        "mission_end",
-    )
-    assert list(EventLog().columns()) == COLUMNS
+# A mission of any small space under any of the test policies.
+missions = given(spaces(), policies, seeds, replications)
 
 
-@given(spaces(), policies, seeds, replications)
+@missions
 def test_the_log_costs_nothing_and_changes_nothing(
     space: ScenarioSpace, policy: object, seed: int, replication: int
 ) -> None:
@@ -49,15 +37,12 @@ def test_the_log_costs_nothing_and_changes_nothing(
     assert logged.uavs.tobytes() == without.uavs.tobytes()
 
 
-@given(spaces(), policies, seeds, replications)
+@missions
 def test_the_log_is_a_table_in_the_order_of_time(
     space: ScenarioSpace, policy: object, seed: int, replication: int
 ) -> None:
-    record = simulate(space, policy, seed, replication, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    assert list(log) == COLUMNS
-    assert {len(column) for column in log.values()} == {len(record.events)}
+    record, log = _logged(space, policy, seed, replication)
+    assert {len(column) for column in log.values()} == {len(record.events or ())}
     assert set(log["event"]) <= set(EVENT_NAMES)
     assert (np.diff(log["time"]) >= 0).all()
 
@@ -82,11 +67,11 @@ def test_the_log_is_a_table_in_the_order_of_time(
     assert (log["value"][arrivals] >= 1).all()
 
 
-@given(spaces(), policies, seeds, replications)
+@missions
 def test_uavs_move_cell_by_cell_and_communicate_on_the_way(
     space: ScenarioSpace, policy: object, seed: int, replication: int
 ) -> None:
-    log = _log(space, policy, seed, replication)
+    _, log = _logged(space, policy, seed, replication)
     x, y, width, height = space.zone
     begins = (log["event"] == "mission_start") & (log["uav"] >= 0)
     occupied: dict[float, set] = {}
@@ -110,13 +95,11 @@ def test_uavs_move_cell_by_cell_and_communicate_on_the_way(
         np.testing.assert_allclose(log["y"][served], between[:, 1], atol=1e-9)
 
 
-@given(spaces(), policies, seeds, replications)
+@missions
 def test_pads_are_never_overbooked(
     space: ScenarioSpace, policy: object, seed: int, replication: int
 ) -> None:
-    record = simulate(space, policy, seed, replication, events=True)
-    assert record.events is not None
-    log = record.events.columns()
+    record, log = _logged(space, policy, seed, replication)
     pads = space.pads or space.zone[2] * space.zone[3]
     complete = int(record.metrics["charge_complete"])
     waiting: dict[int, float] = {}
@@ -154,11 +137,10 @@ def test_ends_are_logged_once() -> None:
     )
     seen = set()
     for replication in range(20):
-        record = simulate(space, Fidget(), 5, replication, events=True)
-        assert record.events is not None
+        record, log = _logged(space, Fidget(), 5, replication)
         ends = [
             (i, event)
-            for i, event in zip(record.events.uav, record.events.event, strict=True)
+            for i, event in zip(log["uav"], log["event"], strict=True)
             if event in ("quota_filled", "battery_empty")
         ]
         names = {"quota": "quota_filled", "battery": "battery_empty"}
@@ -168,7 +150,7 @@ def test_ends_are_logged_once() -> None:
     assert seen == set(names.values())
 
 
-def test_a_record_reads_like_one() -> None:
+def test_the_metrics_of_a_record_are_attributes() -> None:
     space = ScenarioSpace.of(uavs=[1, 3])
     record = simulate(space, Commuter(), 3, 4)
     drawn = sample_scenario(space, 3, 4)
@@ -188,7 +170,7 @@ def test_a_record_reads_like_one() -> None:
     assert copy.uavs.tobytes() == record.uavs.tobytes()
 
 
-def test_a_sea_without_data_has_nothing_left_to_collect() -> None:
+def test_the_collection_ratio_without_data_is_one() -> None:
     scenario = Scenario.of(initial_data=0, arrival_rate=0, uavs=1)
     record = simulate(scenario, Commuter(), 0, 0)
     assert (record.initial, record.arrived, record.collected, record.residual) == (0, 0, 0, 0)

@@ -289,4 +289,4 @@ def test_the_path_loss_table_is_eq_10(scenario: Scenario, data: st.DataObject) -
     )
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
     snr = 10 ** (scenario.edge_snr / 10) * (distance / edge) ** -scenario.path_loss_exponent
-    assert world_of(space).path_loss[coarse, fine] == pytest.approx(10 * np.log10(snr), abs=1e-9)
+    assert world_of(space).mean_snr[coarse, fine] == pytest.approx(10 * np.log10(snr), abs=1e-9)

@@ -1,7 +1,7 @@
-"""The paper's observation: maps centred on the UAV, near it in detail, far from it pooled.
+"""The paper's observation (a): a local and a pooled global map, both centred on the UAV.
 
-Section III-D, eq. 19-22. A few of the cells are not zero, so both maps are written straight from
-the zone, the nodes and the UAVs; the centred map between them is never built.
+Section III-D, eq. 19-22. Few cells are not zero, so both maps are written directly from the zone,
+the nodes and the UAVs; the centred map of eq. 19 is never built.
 """
 
 import numpy as np
@@ -23,10 +23,10 @@ CROP, POOL = 17, 3
 class Maps:
     """Encodes snapshots as the paper's local and global maps and the own flying time.
 
-    The M x M map is moved into one of ``2 M - 1`` cells a side with the UAV in its middle, and
-    zeros around. The local map is the ``crop`` x ``crop`` cells in the middle; a cell of the global
-    map is the mean of ``pool`` x ``pool`` cells, and what fills no whole one in the south and east
-    is left out. Maps are indexed layer, y, x; the layers are ``ZONE`` to ``STATUS``.
+    The M x M map is moved into one of ``2 M - 1`` cells a side, with the UAV in the middle and
+    zeros outside. The local map is the ``crop`` x ``crop`` cells in the middle. A cell of the
+    global map is the mean of ``pool`` x ``pool`` cells; incomplete cells at the south and east
+    edges are left out. Maps are indexed layer, y, x; the layers are ``ZONE`` to ``STATUS``.
 
     Attributes:
         layout: The grid, the zone and the nodes.
@@ -35,7 +35,7 @@ class Maps:
         width: Width of the global map, ``(2 M - 1) // pool``.
     """
 
-    version = 1  # of what the numbers mean: weights of another one do not fit
+    version = 1  # of the meaning of the numbers: weights of another version do not fit
 
     def __init__(self, layout: Layout, crop: int = CROP, pool: int = POOL) -> None:
         """Make an encoder for one layout.
@@ -62,7 +62,7 @@ class Maps:
     def encode(
         self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """What UAV ``uavs[r]`` of snapshot ``missions[r]`` observes, for every r.
+        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, for every r.
 
         Args:
             snapshots: S missions at one moment each.
@@ -89,7 +89,7 @@ def _encode(snapshots, layout, missions, uavs, pool, local, far, own):
         team, residual = snapshots.uavs[missions[r]], snapshots.residual[missions[r]]
         x, y = team[uavs[r], X], team[uavs[r], Y]
         own[r, 0] = team[uavs[r], BATTERY] / np.float32(BATTERY_SCALE)
-        # From here on all places are relative to the own cell.
+        # All positions below are relative to the UAV's cell.
         _mark_zone(local[r, ZONE], middle, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
         _mark_zone(far[r, ZONE], centre, pool, zone[0] - x, zone[1] - y, zone[2], zone[3])
         for k in range(len(nodes)):
@@ -109,7 +109,7 @@ def _encode(snapshots, layout, missions, uavs, pool, local, far, own):
 
 @inlined
 def _add(layer, centre, pool, dx, dy, value):
-    """Add a value at a cell to a layer that pools, if the layer holds the cell."""
+    """Add a value at a cell to a pooled layer, if the cell lies in the layer."""
     column, row = centre + dx, centre + dy
     end = len(layer) * pool
     if 0 <= column < end and 0 <= row < end:
@@ -118,7 +118,7 @@ def _add(layer, centre, pool, dx, dy, value):
 
 @inlined
 def _mark_zone(layer, centre, pool, dx, dy, width, height):
-    """Set each cell of a layer to the share of it that the zone covers."""
+    """Set each cell of a layer to the share that the zone covers."""
     end = len(layer) * pool
     left, right = max(centre + dx, 0), min(centre + dx + width, end)
     top, bottom = max(centre + dy, 0), min(centre + dy + height, end)

@@ -1,6 +1,7 @@
-"""Observation (b), node by node: the vector, and for every node how it lies to the UAV.
+"""Observation (b) with a row per node: the vector, and the position of every node to the UAV.
 
-A network that treats all nodes alike learns once what a node five slots to the east is worth.
+With the same layers for all nodes, a network learns the value of a node five slots to the east
+once, not once per node.
 """
 
 import numpy as np
@@ -16,11 +17,11 @@ class Nodes:
     """The observation of one UAV as a vector and one row per node.
 
     Attributes:
-        layout: The grid, zone and nodes that it is made for.
-        shapes: The shapes of its parts per row: (F,) and (K, 22).
+        layout: The grid, zone and nodes.
+        shapes: The shapes of its arrays per row: (F,) and (K, 22).
     """
 
-    version = 1  # of what the numbers mean: weights of another one do not fit
+    version = 1  # of the meaning of the numbers: weights of another version do not fit
 
     def __init__(self, layout: Layout):
         self.layout, self._vector = layout, Vector(layout)

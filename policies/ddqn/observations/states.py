@@ -1,7 +1,11 @@
-"""Compact states: what the observations are made of, a few bytes per mission and slot.
+"""Compact states, from which the observations are computed: a few bytes per mission and slot.
 
-The replay memory keeps snapshots, not observations: one serves all UAVs of its mission, and the
-next state of a transition is simply a later snapshot.
+The replay memory stores snapshots instead of observations: one snapshot serves all UAVs of its
+mission, and the next state of a transition is a later snapshot.
+
+    states = snapshot(view.state, guarded=True)
+    masks(states, view.mission, view.uav)                        # (R, 5) allowed actions
+    Vector(layout_of(space)).encode(states, view.mission, view.uav)
 """
 
 from typing import NamedTuple
@@ -9,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.compiled import kernel
+from dess.rules import on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
 from policies.guard import must_charge, parking_cell, safe_moves, slots_needed
@@ -17,8 +22,8 @@ from policies.guard import must_charge, parking_cell, safe_moves, slots_needed
 CHARGE_START, CHARGE_COMPLETE = range(2)
 MISSION_COLUMNS = 2
 # Columns of ``Snapshots.uavs``: the cell, the battery [%], mission slots until the quota is filled,
-# whether it is active, latched, charging and bound to charge, slots to its parking cell and the
-# mask of its actions as bits.
+# whether the UAV is active, latched, charging and must charge, slots to its parking cell, and the
+# mask of its allowed actions as bits.
 X, Y, BATTERY, NEEDED, ACTIVE, LATCH, CHARGING, MUST_CHARGE, HOME, MASK = range(10)
 UAV_COLUMNS = 10
 
@@ -26,7 +31,7 @@ _MOST = np.iinfo(np.int16).max
 
 
 class Snapshots(NamedTuple):
-    """S missions x I UAVs x K nodes at one moment each.
+    """S missions x I UAVs x K nodes, each mission at one time.
 
     Attributes:
         missions: (S, 2) int16, columns ``CHARGE_START`` and ``CHARGE_COMPLETE``.
@@ -40,7 +45,7 @@ class Snapshots(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """What all missions of a space have in common.
+    """The grid, zone and nodes that all missions of a space share.
 
     Attributes:
         grid: Cells along one side (M).
@@ -78,8 +83,8 @@ def snapshot(state: State, guarded: bool) -> Snapshots:
 
     Args:
         state: The state of B missions.
-        guarded: Whether the mask of actions is that of the return guard (``policies.guard``), or
-            just that of the moves that stay on the grid.
+        guarded: Whether the mask of actions is that of the return guard (``policies.guard``);
+            if not, it has the moves that stay on the grid.
     """
     taken = empty_snapshots(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     _take(state.missions, state.uavs, state.residual, guarded, taken)
@@ -113,7 +118,7 @@ def _take(missions, uavs, residual, guarded, out):
                 else:
                     for action in range(5):
                         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-                        safe[action] = 0 <= x < mission.grid and 0 <= y < mission.grid
+                        safe[action] = on_grid(mission, x, y)
                 row[MASK] = 0
                 for action in range(5):
                     row[MASK] |= safe[action] << action

@@ -1,9 +1,9 @@
-"""Observation (b): a compact vector that also tells what the paper's agent is never told.
+"""Observation (b): a compact vector, with more information than the paper's observation.
 
-That is the slots left until the quota is filled, the charging latch, C_S and C_C, the slots to the
-parking cell, who must charge, and which cells around are occupied. The nodes enter by number, so a
-network that has learned one layout knows that layout only; the number of teammates is free: the
-two nearest ones are described, all of them count in what is left for this UAV.
+It adds the slots until the quota is filled, the charging latch, C_S and C_C, the slots to the
+parking cell, which UAVs must charge, and which cells around are occupied. Nodes enter by index, so
+a network is valid for one layout only. The number of teammates is free: the two nearest are
+described one by one, and all of them affect the data that is left for this UAV.
 """
 
 import numpy as np
@@ -31,8 +31,8 @@ MATES = 2  # teammates described one by one, the nearest first
 _OWN = 16
 _NODE = 4
 _MATE = 11
-# Nearness of a node to a cell: exp(-slots / scale), one picture per scale [slots]; what the sum of
-# data times nearness is divided by.
+# Nearness of a node to a cell: exp(-slots / scale), for each scale [slots]; and the divisors of the
+# sums of data times nearness.
 SCALES = np.array([1.2, 4.0, 12.0])
 _NORMS = np.array([10.0, 25.0, 80.0])
 DATA_UNIT = 10.0  # data units that count as one
@@ -43,11 +43,11 @@ class Vector:
     """The observation of one UAV as a vector.
 
     Attributes:
-        layout: The grid, zone and nodes that it is made for.
-        shapes: The shapes of its parts per row: one vector (F,).
+        layout: The grid, zone and nodes.
+        shapes: The shapes of its arrays per row: one vector (F,).
     """
 
-    version = 1  # of what the numbers mean: weights of another one do not fit
+    version = 1  # of the meaning of the numbers: weights of another version do not fit
 
     def __init__(self, layout: Layout):
         self.layout = layout
@@ -96,7 +96,7 @@ def _encode(snapshots, rows_mission, rows_uav, grid, nodes, home, nearness, out)
 
 @kernel
 def _own(mission, team, i, data, line):
-    """The UAV's own state; returns where the next part begins."""
+    """Write the UAV's own state; returns the index of the next part."""
     me = team[i]
     active = 0
     for j in range(len(team)):
@@ -126,7 +126,7 @@ def _own(mission, team, i, data, line):
 
 @kernel
 def spare_slots(me, home, slots):
-    """Slots in hand if the UAV visits a node, then charges if it must; 20 or more count as one."""
+    """Spare slots if the UAV visits a node, then charges if it must; 20 or more count as one."""
     left = me[BATTERY] - 1 - home if me[MUST_CHARGE] else me[NEEDED]
     return min(max((left - slots) / 20.0, -1.0), 1.0)
 
@@ -143,7 +143,7 @@ def lead_of(team, i, x, y, slots):
 
 @kernel
 def _actions(me, team, i, data, free, nodes, nearness, line, at):
-    """Per action: whether it is allowed, who is there, and the data near the cell it leads to."""
+    """Write per action the mask, the teammates near the cell it leads to, and the data near it."""
     scales = len(nearness)
     for action in range(5):
         x, y = me[X] + STEP_X[action], me[Y] + STEP_Y[action]
@@ -165,7 +165,7 @@ def _actions(me, team, i, data, free, nodes, nearness, line, at):
 
 @kernel
 def _mates(team, i, line, at):
-    """The nearest active teammates, as seen from UAV ``i``."""
+    """Write the nearest active teammates, relative to UAV ``i``."""
     last_slots, last = -1, -1
     for _ in range(MATES):
         nearest, least = -1, 10_000

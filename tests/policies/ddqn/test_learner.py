@@ -125,7 +125,7 @@ def test_the_loss_is_that_of_the_differences_to_the_target(loss: str) -> None:
 def test_after_a_step_the_copies_have_moved_by_their_rates() -> None:
     learner, batch = _learner(target_rate=0.25, average_rate=0.5)
     assert learner.average is not None
-    assert learner.best_guess is learner.average
+    assert learner.evaluated is learner.average
     for copy in (learner.target, learner.average):
         assert not any(parameter.requires_grad for parameter in copy.parameters())
     before = _values(learner.online)
@@ -140,7 +140,7 @@ def test_after_a_step_the_copies_have_moved_by_their_rates() -> None:
 def test_without_a_slow_copy_the_online_network_is_evaluated() -> None:
     learner, _ = _learner(average_rate=1.0)
     assert learner.average is None
-    assert learner.best_guess is learner.online
+    assert learner.evaluated is learner.online
 
 
 def test_gradients_are_clipped() -> None:

@@ -224,24 +224,24 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
         PHASES[1] | {"epsilon": [0.5, 0.01], "epsilon_decay": 0.5, "learning_rate": [1e-4, 1e-4]},
     ]
     training = Training(tiny(phases=phases, evaluate_every=20), CPU)
-    fly, update = training._fly, training.learner.update
-    flown: list[float] = []
+    collect, update = training._collect, training.learner.update
+    epsilons_used: list[float] = []
     learned: list[float] = []
 
-    def note_fly(epsilon: float) -> None:
-        flown.append(epsilon)
-        fly(epsilon)
+    def note_collect(epsilon: float) -> None:
+        epsilons_used.append(epsilon)
+        collect(epsilon)
 
     def note_update(batch: Batch, rate: float) -> Any:
         learned.append(rate)
         return update(batch, rate)
 
-    monkeypatch.setattr(training, "_fly", note_fly)
+    monkeypatch.setattr(training, "_collect", note_collect)
     monkeypatch.setattr(training.learner, "update", note_update)
     training.run(1000)
     # The first phase starts at random, the second as it begins.
     falling = [0.5 - 0.49 * min(tick / 40, 1) for tick in range(80)]
-    assert flown == pytest.approx([1.0] * 60 + [0.1] * 80 + [0.5] * 60 + falling)
+    assert epsilons_used == pytest.approx([1.0] * 60 + [0.1] * 80 + [0.5] * 60 + falling)
     assert learned == pytest.approx([1e-3 - 9e-4 * tick / 80 for tick in range(80)] + [1e-4] * 80)
     rows = training.curve
     assert [row["tick"] for row in rows] == [20, 40, 60, 80, 100, 120, 140, 160]

@@ -1,4 +1,4 @@
-"""Policies that record actions and replay them: what a policy costs can be left out."""
+"""A policy that records actions and one that repeats them, to measure the engine alone."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ def _look_up(missions, actions, rows_mission, rows_uav):
 
 
 class Recorder:
-    """Another policy, whose actions it writes down."""
+    """Another policy, with a record of its actions."""
 
     name = "recorder"
 
@@ -30,10 +30,10 @@ class Recorder:
         return actions
 
 
-class Replay:
-    """A policy that costs nothing: recorded actions."""
+class Recorded:
+    """Recorded actions as a policy, which takes next to no time."""
 
-    name = "replay"
+    name = "recorded"
 
     def __init__(self, actions: np.ndarray):
         self.actions = actions
