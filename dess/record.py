@@ -1,6 +1,6 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -120,6 +120,7 @@ def empty_records(missions: int, uavs: int) -> Records:
     return Records(np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD))
 
 
+@dataclass
 class EventLog:
     """The events of one mission, in the order in which they happened.
 
@@ -132,22 +133,21 @@ class EventLog:
     -1 where an event has none.
     """
 
-    def __init__(self) -> None:
-        self._rows: list[tuple] = []
+    rows: list[tuple] = field(default_factory=list)
 
     def add(
         self, time: float, event: str, uav: int, node: int, value: float, x: float, y: float
     ) -> None:
         """Append one event at ``time`` [mission slots] and position ``x, y`` [cells]."""
-        self._rows.append((time, event, uav, node, value, x, y))
+        self.rows.append((time, event, uav, node, value, x, y))
 
     def __len__(self) -> int:
-        return len(self._rows)
+        return len(self.rows)
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""
         return {
-            name: np.array([row[index] for row in self._rows], dtype)
+            name: np.array([row[index] for row in self.rows], dtype)
             for index, (name, dtype) in enumerate(_EVENT_COLUMNS.items())
         }
 

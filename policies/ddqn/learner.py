@@ -8,7 +8,7 @@ import torch
 from torch import nn
 
 from policies.ddqn.config import TrainingConfig
-from policies.ddqn.observations.states import Snapshots, masks
+from policies.ddqn.observations.states import CompactStates, masks
 from policies.ddqn.replay import Batch
 
 
@@ -71,9 +71,9 @@ class Learner:
         return self.online if self.average is None else self.average
 
     def values(
-        self, network: nn.Module, states: Snapshots, missions: np.ndarray, uavs: np.ndarray
+        self, network: nn.Module, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
-        """(R, 5) action values of UAV ``uavs[r]`` in snapshot ``missions[r]``."""
+        """(R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
         return network(*self._observe(states, missions, uavs))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
@@ -103,9 +103,9 @@ class Learner:
         return {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
 
     def _observe(
-        self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> list[torch.Tensor]:
-        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, on the device."""
+        """The observations of UAV ``uavs[r]`` in state ``missions[r]``, on the device."""
         parts = self.observation.encode(states, missions, uavs)
         return [torch.from_numpy(part).to(self.device) for part in parts]
 

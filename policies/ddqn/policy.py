@@ -9,7 +9,7 @@ from torch import nn
 
 from dess.errors import InputError
 from dess.view import View
-from policies.ddqn.observations.states import Layout, masks, snapshot
+from policies.ddqn.observations.states import Layout, compact_states, masks
 
 # The rounding of sums depends on the number of rows evaluated together and must not affect actions:
 # if the two best values differ by less than CLOSE, they are computed again in double precision and
@@ -22,7 +22,7 @@ class DDQN:
 
     Attributes:
         name: The name under which results are stored.
-        observation: The network's input: ``encode(snapshots, missions, uavs)``.
+        observation: The network's input: ``encode(states, missions, uavs)``.
         network: Q-values of the five actions.
         exact: The same network in double precision, for close decisions; None during training.
         guarded: Whether the return guard masks the actions.
@@ -49,7 +49,7 @@ class DDQN:
             InputError: If the missions have another grid, zone or nodes than the training.
         """
         self._require_layout(view)
-        states = snapshot(view.state, self.guarded)
+        states = compact_states(view.state, self.guarded)
         allowed = masks(states, view.mission, view.uav)
         parts = self.observation.encode(states, view.mission, view.uav)
         values = np.where(allowed, _values(self.network, parts).astype(np.float64), -np.inf)

@@ -10,15 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.compiled import kernel
-from policies.ddqn.observations.states import Snapshots, empty_snapshots
+from policies.ddqn.observations.states import CompactStates, empty_states
 
 
 class Batch(NamedTuple):
     """A minibatch of B n-step transitions.
 
     Attributes:
-        state: The snapshots to which ``rows`` (the states) and ``later`` (the states after n slots
-            or at the end of the UAV's mission) refer.
+        state: The compact states of the memory; ``rows`` selects the states, ``later`` the states
+            after n slots or at the end of the UAV's mission.
         rows: (B,) missions of ``state``.
         later: (B,) missions of ``state``.
         uav: (B,) index of the UAV.
@@ -27,7 +27,7 @@ class Batch(NamedTuple):
         discount: (B,) float32, factor of the later state's value; 0 if the UAV terminated.
     """
 
-    state: Snapshots
+    state: CompactStates
     rows: np.ndarray
     later: np.ndarray
     uav: np.ndarray
@@ -48,7 +48,7 @@ class ReplayMemory:
     def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
         self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
         self.count = 0
-        self._states = empty_snapshots(capacity * num_envs, uavs, nodes)
+        self._states = empty_states(capacity * num_envs, uavs, nodes)
         shape = (capacity * num_envs, uavs)
         self._action = np.zeros(shape, np.int8)
         self._reward = np.zeros(shape, np.float32)
@@ -71,7 +71,7 @@ class ReplayMemory:
 
     def add(
         self,
-        states: Snapshots,
+        states: CompactStates,
         action: np.ndarray,
         reward: np.ndarray,
         acted: np.ndarray,

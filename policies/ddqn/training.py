@@ -30,13 +30,13 @@ from policies.ddqn.observations.states import (
     CHARGING,
     LATCH,
     MUST_CHARGE,
+    CompactStates,
     Layout,
-    Snapshots,
     X,
     Y,
+    compact_states,
     layout_of,
     masks,
-    snapshot,
 )
 from policies.ddqn.observations.vector import Vector
 from policies.ddqn.policy import DDQN
@@ -194,7 +194,7 @@ class Training:
         """Run one slot of all environments under the exploring policy and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
-        states = snapshot(state, self.config.guard)
+        states = compact_states(state, self.config.guard)
         missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
         actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
@@ -210,7 +210,7 @@ class Training:
         self._launch(over)
 
     def _explore(
-        self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray, epsilon: float
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray, epsilon: float
     ) -> np.ndarray:
         """Epsilon-greedy or softmax actions among the allowed ones."""
         allowed = masks(states, missions, uavs)
@@ -229,7 +229,9 @@ class Training:
             choice = np.where(homeward.any(1), np.where(homeward, noise, -1.0).argmax(1), choice)
         return np.where(self.generator.random(len(choice)) < epsilon, random, choice)
 
-    def _homeward(self, states: Snapshots, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
+    def _homeward(
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+    ) -> np.ndarray:
         """(R, 5) mask of the actions of UAVs that return early, so as to arrive with C_S left.
 
         The actions lead nearer to the zone; in the zone a latched UAV hovers.

@@ -259,9 +259,8 @@ def test_pads_are_first_come_first_served() -> None:
     UAV 2    11  10  20  21  20  19    asks in slot 1, waits in 1, charges in 2 and 3
     """
     scenario = Scenario.of(
-        **PAIR | {"uavs": 3, "zone": [0, 1, 3, 1], "pads": 1},
+        **PAIR | {"uavs": 3, "zone": [0, 1, 3, 1], "pads": 1, "charge_complete": 21},
         flying_time=12,
-        charge_complete=21,
         max_slots=6,
     )
     record, log = _simulate(scenario, "NS", "", "")

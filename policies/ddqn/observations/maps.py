@@ -8,7 +8,7 @@ import numpy as np
 
 from dess.compiled import inlined, kernel
 from dess.errors import InputError
-from policies.ddqn.observations.states import ACTIVE, BATTERY, Layout, Snapshots, X, Y
+from policies.ddqn.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y
 
 # The layers of a map: the charging zone, residual data / 20 [data units], remaining flying time
 # of the active UAVs / 100 [%], and their operational status.
@@ -21,7 +21,7 @@ CROP, POOL = 17, 3
 
 
 class Maps:
-    """Encodes snapshots as the paper's local and global maps and the own flying time.
+    """Encodes states as the paper's local and global maps and the own flying time.
 
     The M x M map is moved into one of ``2 M - 1`` cells a side, with the UAV in the middle and
     zeros outside. The local map is the ``crop`` x ``crop`` cells in the middle. A cell of the
@@ -60,13 +60,13 @@ class Maps:
         return (LAYERS, self.crop, self.crop), (LAYERS, self.width, self.width), (1,)
 
     def encode(
-        self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, for every r.
+        """The observations of UAV ``uavs[r]`` in state ``missions[r]``, for every r.
 
         Args:
-            snapshots: S missions at one moment each.
-            missions: (R,) indices into the snapshots.
+            states: S missions at one moment each.
+            missions: (R,) indices into the states.
             uavs: (R,) indices of the UAVs.
 
         Returns:
@@ -75,18 +75,18 @@ class Maps:
         """
         local, far, own = (np.zeros((len(missions), *s), np.float32) for s in self.shapes)
         rows = np.asarray(missions, np.int64), np.asarray(uavs, np.int64)
-        _encode(snapshots, self.layout, *rows, self.pool, local, far, own)
+        _encode(states, self.layout, *rows, self.pool, local, far, own)
         return local, far, own
 
 
 @kernel
-def _encode(snapshots, layout, missions, uavs, pool, local, far, own):
+def _encode(states, layout, missions, uavs, pool, local, far, own):
     """Write the maps of all rows into zeroed arrays."""
     zone, nodes = layout.zone, layout.nodes
     centre = layout.grid - 1
     middle = local.shape[2] // 2
     for r in range(len(missions)):
-        team, residual = snapshots.uavs[missions[r]], snapshots.residual[missions[r]]
+        team, residual = states.uavs[missions[r]], states.residual[missions[r]]
         x, y = team[uavs[r], X], team[uavs[r], Y]
         own[r, 0] = team[uavs[r], BATTERY] / np.float32(BATTERY_SCALE)
         # All positions below are relative to the UAV's cell.

@@ -7,7 +7,7 @@ once, not once per node.
 import numpy as np
 
 from dess.compiled import kernel
-from policies.ddqn.observations.states import Layout, Snapshots, X, Y
+from policies.ddqn.observations.states import CompactStates, Layout, X, Y
 from policies.ddqn.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
 
 NODE = 22
@@ -33,25 +33,25 @@ class Nodes:
         self._home = layout.zone_slots(layout.nodes)
 
     def encode(
-        self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``, as float32.
+        """The observations of UAV ``uavs[r]`` in state ``missions[r]``, as float32.
 
         Returns:
             (R, F) vectors and (R, K, 22) nodes.
         """
         out = np.zeros((len(missions), *self.shapes[1]), np.float32)
         nodes = self.layout.nodes
-        _encode(snapshots, missions, uavs, nodes, self._nearness, self._around, self._home, out)
-        return (*self._vector.encode(snapshots, missions, uavs), out)
+        _encode(states, missions, uavs, nodes, self._nearness, self._around, self._home, out)
+        return (*self._vector.encode(states, missions, uavs), out)
 
 
 @kernel
-def _encode(snapshots, rows_mission, rows_uav, nodes, nearness, around, home, out):
+def _encode(states, rows_mission, rows_uav, nodes, nearness, around, home, out):
     count = len(nodes)
     for row in range(len(rows_mission)):
-        team = snapshots.uavs[rows_mission[row]]
-        data = snapshots.residual[rows_mission[row]]
+        team = states.uavs[rows_mission[row]]
+        data = states.residual[rows_mission[row]]
         i = rows_uav[row]
         me = team[i]
         for k in range(count):

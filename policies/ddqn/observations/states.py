@@ -1,9 +1,9 @@
 """Compact states, from which the observations are computed: a few bytes per mission and slot.
 
-The replay memory stores snapshots instead of observations: one snapshot serves all UAVs of its
-mission, and the next state of a transition is a later snapshot.
+The replay memory stores these states instead of observations: one state serves all UAVs of its
+mission, and the next state of a transition is a later row of the memory.
 
-    states = snapshot(view.state, guarded=True)
+    states = compact_states(view.state, guarded=True)
     masks(states, view.mission, view.uav)                        # (R, 5) allowed actions
     Vector(layout_of(space)).encode(states, view.mission, view.uav)
 """
@@ -18,19 +18,19 @@ from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
 from policies.guard import must_charge, parking_cell, safe_moves, slots_needed
 
-# Columns of ``Snapshots.missions``.
+# Columns of ``CompactStates.missions``.
 CHARGE_START, CHARGE_COMPLETE = range(2)
 MISSION_COLUMNS = 2
-# Columns of ``Snapshots.uavs``: the cell, the battery [%], mission slots until the quota is filled,
-# whether the UAV is active, latched, charging and must charge, slots to its parking cell, and the
-# mask of its allowed actions as bits.
+# Columns of ``CompactStates.uavs``: the cell, the battery [%], mission slots until the quota is
+# filled, whether the UAV is active, latched, charging and must charge, slots to its parking cell,
+# and the mask of its allowed actions as bits.
 X, Y, BATTERY, NEEDED, ACTIVE, LATCH, CHARGING, MUST_CHARGE, HOME, MASK = range(10)
 UAV_COLUMNS = 10
 
 _MOST = np.iinfo(np.int16).max
 
 
-class Snapshots(NamedTuple):
+class CompactStates(NamedTuple):
     """S missions x I UAVs x K nodes, each mission at one time.
 
     Attributes:
@@ -69,30 +69,30 @@ def layout_of(space: ScenarioSpace) -> Layout:
     return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
 
 
-def empty_snapshots(count: int, uavs: int, nodes: int) -> Snapshots:
-    """Zeroed snapshots of that many missions, UAVs per mission and nodes."""
-    return Snapshots(
+def empty_states(count: int, uavs: int, nodes: int) -> CompactStates:
+    """Zeroed compact states of that many missions, UAVs per mission and nodes."""
+    return CompactStates(
         np.zeros((count, MISSION_COLUMNS), np.int16),
         np.zeros((count, uavs, UAV_COLUMNS), np.int16),
         np.zeros((count, nodes), np.float32),
     )
 
 
-def snapshot(state: State, guarded: bool) -> Snapshots:
-    """The snapshots of all missions of a state.
+def compact_states(state: State, guarded: bool) -> CompactStates:
+    """The compact states of all missions of a state.
 
     Args:
         state: The state of B missions.
         guarded: Whether the mask of actions is that of the return guard (``policies.guard``);
             if not, it has the moves that stay on the grid.
     """
-    taken = empty_snapshots(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
-    _take(state.missions, state.uavs, state.residual, guarded, taken)
-    return taken
+    states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
+    _fill(state.missions, state.uavs, state.residual, guarded, states)
+    return states
 
 
 @kernel
-def _take(missions, uavs, residual, guarded, out):
+def _fill(missions, uavs, residual, guarded, out):
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
     safe = np.empty(5, np.bool_)
     for b in range(len(missions)):
@@ -124,7 +124,7 @@ def _take(missions, uavs, residual, guarded, out):
                     row[MASK] |= safe[action] << action
 
 
-def masks(snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
-    """(R, 5) mask of the allowed actions of UAV ``uavs[r]`` in snapshot ``missions[r]``."""
-    bits = snapshots.uavs[missions, uavs, MASK]
+def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
+    """(R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
+    bits = states.uavs[missions, uavs, MASK]
     return (bits[:, None] >> np.arange(5) & 1).astype(bool)

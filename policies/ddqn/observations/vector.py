@@ -21,8 +21,8 @@ from policies.ddqn.observations.states import (
     MASK,
     MUST_CHARGE,
     NEEDED,
+    CompactStates,
     Layout,
-    Snapshots,
     X,
     Y,
 )
@@ -58,23 +58,23 @@ class Vector:
         self.shapes = ((own + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
 
     def encode(
-        self, snapshots: Snapshots, missions: np.ndarray, uavs: np.ndarray
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """The observations of UAV ``uavs[r]`` in snapshot ``missions[r]``: (R, F) float32."""
+        """The observations of UAV ``uavs[r]`` in state ``missions[r]``: (R, F) float32."""
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
         grid, nodes = self.layout.grid, self.layout.nodes
-        _encode(snapshots, missions, uavs, grid, nodes, self._home, self._nearness, out)
+        _encode(states, missions, uavs, grid, nodes, self._home, self._nearness, out)
         return (out,)
 
 
 @kernel
-def _encode(snapshots, rows_mission, rows_uav, grid, nodes, home, nearness, out):
+def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, out):
     count = len(nodes)
     free = np.empty(count, np.float32)  # data at nodes that no teammate is nearer to
     for row in range(len(rows_mission)):
-        mission = snapshots.missions[rows_mission[row]]
-        team = snapshots.uavs[rows_mission[row]]
-        data = snapshots.residual[rows_mission[row]]
+        mission = states.missions[rows_mission[row]]
+        team = states.uavs[rows_mission[row]]
+        data = states.residual[rows_mission[row]]
         i = rows_uav[row]
         me, line = team[i], out[row]
         at = _own(mission, team, i, data, line)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from policies.ddqn.observations.states import empty_snapshots
+from policies.ddqn.observations.states import empty_states
 from policies.ddqn.replay import Batch, ReplayMemory
 
 SLOT, ENVIRONMENT = 0, 1  # what the columns of the missions hold here
@@ -27,7 +27,7 @@ class Log(NamedTuple):
         slots, num_envs, uavs = self.action.shape
         memory = ReplayMemory(capacity, num_envs, uavs, 1)
         for slot in range(slots):
-            states = empty_snapshots(num_envs, uavs, 1)
+            states = empty_states(num_envs, uavs, 1)
             states.missions[:, SLOT], states.missions[:, ENVIRONMENT] = slot, np.arange(num_envs)
             memory.add(states, *(part[slot] for part in self))
         return memory

@@ -13,7 +13,7 @@ from dess.record import empty_records
 from dess.scenario import ScenarioSpace
 from policies.ddqn import training as module
 from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.observations.states import ACTIVE, CHARGING, masks, snapshot
+from policies.ddqn.observations.states import ACTIVE, CHARGING, compact_states, masks
 from policies.ddqn.replay import Batch
 from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
 from tests.policies.ddqn.tiny import (
@@ -253,8 +253,8 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
-    """Snapshots of what the environments are in, and their UAVs that act, many times over."""
-    states = snapshot(training.stepper.state, training.config.guard)
+    """Compact states of the environments, and their UAVs that act, many times over."""
+    states = compact_states(training.stepper.state, training.config.guard)
     missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
     return states, np.tile(missions, 2000), np.tile(uavs, 2000)
 

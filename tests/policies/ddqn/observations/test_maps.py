@@ -21,11 +21,11 @@ from policies.ddqn.observations.maps import (
 from policies.ddqn.observations.states import (
     ACTIVE,
     BATTERY,
+    CompactStates,
     Layout,
-    Snapshots,
     X,
     Y,
-    empty_snapshots,
+    empty_states,
 )
 
 GRID = 32  # centred: 63 cells a side with the UAV at 31; global: 21 cells with the UAV's at 10
@@ -40,20 +40,20 @@ class Observed(NamedTuple):
     own: np.ndarray
 
 
-def _team(*uavs: tuple[int, int, int, int], residual: tuple[float, ...] = ()) -> Snapshots:
-    """The snapshot of one mission with UAVs (x, y, battery, active)."""
-    snapshots = empty_snapshots(1, len(uavs), len(residual))
-    snapshots.uavs[0][:, [X, Y, BATTERY, ACTIVE]] = uavs
-    snapshots.residual[0] = residual
-    return snapshots
+def _team(*uavs: tuple[int, int, int, int], residual: tuple[float, ...] = ()) -> CompactStates:
+    """The state of one mission with UAVs (x, y, battery, active)."""
+    states = empty_states(1, len(uavs), len(residual))
+    states.uavs[0][:, [X, Y, BATTERY, ACTIVE]] = uavs
+    states.residual[0] = residual
+    return states
 
 
 def _layout(*nodes: tuple[int, int]) -> Layout:
     return Layout(GRID, np.array(ZONE_CELLS), np.array(nodes, np.int64).reshape(-1, 2))
 
 
-def _observe(layout: Layout, snapshots: Snapshots, uav: int = 0) -> Observed:
-    near, far, own = Maps(layout).encode(snapshots, np.array([0]), np.array([uav]))
+def _observe(layout: Layout, states: CompactStates, uav: int = 0) -> Observed:
+    near, far, own = Maps(layout).encode(states, np.array([0]), np.array([uav]))
     return Observed(near[0], far[0], own[0])
 
 
@@ -118,17 +118,17 @@ def test_a_whole_global_cell_of_zone_counts_one() -> None:
 
 
 def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
-    snapshots = _team((10, 10, 60, 1), (12, 7, 35, 1), (11, 10, 50, 0), (0, 0, 0, 0))
-    seen = _observe(_layout(), snapshots)
+    states = _team((10, 10, 60, 1), (12, 7, 35, 1), (11, 10, 50, 0), (0, 0, 0, 0))
+    seen = _observe(_layout(), states)
     assert _filled(seen.near[FLYING_TIME]) == pytest.approx({(8, 8): 0.6, (10, 5): 0.35})
     assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (10, 5): 1.0}
     assert _filled(seen.far[STATUS]) == pytest.approx({(10, 10): 1 / 9, (11, 9): 1 / 9})
     # The other one sees the first from its own place, and its own battery.
-    seen = _observe(_layout(), snapshots, uav=1)
+    seen = _observe(_layout(), states, uav=1)
     assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (6, 11): 1.0}
     assert seen.own == pytest.approx(0.35)
     # Who is done is not even on its own map.
-    seen = _observe(_layout(), snapshots, uav=2)
+    seen = _observe(_layout(), states, uav=2)
     assert _filled(seen.near[STATUS]) == {(7, 8): 1.0, (9, 5): 1.0}
     assert seen.own == pytest.approx(0.5)
 
@@ -156,7 +156,7 @@ def test_no_rows() -> None:
 
 
 @st.composite
-def _worlds(draw: st.DrawFn) -> tuple[Maps, Snapshots, np.ndarray, np.ndarray]:
+def _worlds(draw: st.DrawFn) -> tuple[Maps, CompactStates, np.ndarray, np.ndarray]:
     """Any layout, map sizes, three missions of a team, and rows of them."""
     grid = draw(st.integers(2, 12))
     width, height = draw(st.integers(1, grid)), draw(st.integers(1, grid))
@@ -167,14 +167,14 @@ def _worlds(draw: st.DrawFn) -> tuple[Maps, Snapshots, np.ndarray, np.ndarray]:
     crop = 2 * draw(st.integers(0, grid - 1)) + 1
     maps = Maps(layout, crop, draw(st.integers(1, 2 * grid - 1)))
 
-    snapshots = empty_snapshots(3, draw(st.integers(1, 4)), len(nodes))
-    fleet = snapshots.uavs.shape[:2]
-    snapshots.uavs[..., [X, Y]] = rng.integers(0, grid, (*fleet, 2))
-    snapshots.uavs[..., BATTERY] = rng.integers(0, 101, fleet)
-    snapshots.uavs[..., ACTIVE] = rng.integers(0, 2, fleet)
-    snapshots.residual[:] = rng.uniform(0, 20, snapshots.residual.shape)
+    states = empty_states(3, draw(st.integers(1, 4)), len(nodes))
+    fleet = states.uavs.shape[:2]
+    states.uavs[..., [X, Y]] = rng.integers(0, grid, (*fleet, 2))
+    states.uavs[..., BATTERY] = rng.integers(0, 101, fleet)
+    states.uavs[..., ACTIVE] = rng.integers(0, 2, fleet)
+    states.residual[:] = rng.uniform(0, 20, states.residual.shape)
     missions, uavs = (rng.integers(0, most, 7) for most in fleet)
-    return maps, snapshots, missions, uavs
+    return maps, states, missions, uavs
 
 
 def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -192,18 +192,18 @@ def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarra
 
 @given(_worlds())
 def test_the_maps_are_those_cut_from_the_whole_centred_map(
-    world: tuple[Maps, Snapshots, np.ndarray, np.ndarray],
+    world: tuple[Maps, CompactStates, np.ndarray, np.ndarray],
 ) -> None:
-    maps, snapshots, missions, uavs = world
+    maps, states, missions, uavs = world
     grid, crop, pool, width = maps.layout.grid, maps.crop, maps.pool, maps.width
-    encoded = maps.encode(snapshots, missions, uavs)
+    encoded = maps.encode(states, missions, uavs)
     assert [a.shape[1:] for a in encoded] == list(maps.shapes)
     assert all(a.dtype == np.float32 for a in encoded)
     event(f"cells left out {(2 * grid - 1) % pool > 0}")
 
     for near, far, own, mission, uav in zip(*encoded, missions, uavs, strict=True):
-        team = snapshots.uavs[mission]
-        layers = _layers(maps.layout, team, snapshots.residual[mission])
+        team = states.uavs[mission]
+        layers = _layers(maps.layout, team, states.residual[mission])
         x, y = team[uav, X], team[uav, Y]
         padded = np.pad(layers, ((0, 0), (grid - 1, grid - 1), (grid - 1, grid - 1)))
         centred = padded[:, y : y + 2 * grid - 1, x : x + 2 * grid - 1]

@@ -1,4 +1,4 @@
-"""Snapshots tell of the UAVs what the view tells, the mask of the guard included."""
+"""Compact states have the same information on the UAVs as the view, and the guard's mask."""
 
 from typing import Any
 
@@ -23,13 +23,13 @@ from policies.ddqn.observations.states import (
     LATCH,
     MUST_CHARGE,
     NEEDED,
-    Snapshots,
+    CompactStates,
     X,
     Y,
-    empty_snapshots,
+    compact_states,
+    empty_states,
     layout_of,
     masks,
-    snapshot,
 )
 from policies.guard import guard
 from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces, teams
@@ -45,21 +45,21 @@ FIELDS = {
 
 
 class _Compared:
-    """Another policy; on the way it compares what it sees with the snapshots."""
+    """Another policy; on the way it compares its view with the compact states."""
 
     def __init__(self, policy: Any):
         self.policy, self.name = policy, policy.name
         self.charging = 0
 
     def act(self, view: View) -> np.ndarray:
-        guarded, free = snapshot(view.state, True), snapshot(view.state, False)
+        guarded, free = compact_states(view.state, True), compact_states(view.state, False)
         assert (masks(guarded, view.mission, view.uav) == guard(view)).all()
         assert (masks(free, view.mission, view.uav) == view.legal).all()
         for states in (guarded, free):
             self._compare(view.state, states)
         return self.policy.act(view)
 
-    def _compare(self, state: State, states: Snapshots) -> None:
+    def _compare(self, state: State, states: CompactStates) -> None:
         present = np.arange(state.uavs.shape[1]) < state.missions["uavs"][:, None]
         assert not states.uavs[~present].any()
         for column, field in FIELDS.items():
@@ -103,14 +103,14 @@ def _state(uavs: list[dict[str, Any]], **scenario: Any) -> State:
 
 def test_a_uav_far_out_by_hand() -> None:
     # 6 + 5 slots from the nearest zone cell (26, 5), 11 % in hand: only the ways home are left.
-    states = snapshot(_state([{"x": 20, "y": 10, "battery": 12}]), True)
+    states = compact_states(_state([{"x": 20, "y": 10, "battery": 12}]), True)
     row = states.uavs[0, 0]
     assert [row[X], row[Y], row[BATTERY]] == [20, 10, 12]
     assert [row[NEEDED], row[MUST_CHARGE], row[HOME]] == [100, 1, 11]
     (mask,) = masks(states, np.array([0]), np.array([0]))
     assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
     # Four communications, one slot, are left: no need to charge, all is open.
-    states = snapshot(_state([{"x": 20, "y": 10, "battery": 3, "communications": 436}]), True)
+    states = compact_states(_state([{"x": 20, "y": 10, "battery": 3, "communications": 436}]), True)
     assert [states.uavs[0, 0, NEEDED], states.uavs[0, 0, MUST_CHARGE]] == [1, 0]
     assert masks(states, np.array([0]), np.array([0])).all()
 
@@ -118,25 +118,25 @@ def test_a_uav_far_out_by_hand() -> None:
 def test_each_has_its_own_parking_cell() -> None:
     # Both are nearest to (26, 5); the one with less battery chooses first.
     first, second = {"x": 23, "y": 5, "battery": 20}, {"x": 26, "y": 8, "battery": 19}
-    states = snapshot(_state([first, second]), True)
+    states = compact_states(_state([first, second]), True)
     assert states.uavs[0, :, HOME].tolist() == [3 + 1, 3]
 
 
 def test_without_the_guard_only_the_edge_closes() -> None:
-    states = snapshot(_state([{"x": 31, "y": 0, "battery": 1}]), False)
+    states = compact_states(_state([{"x": 31, "y": 0, "battery": 1}]), False)
     (mask,) = masks(states, np.array([0]), np.array([0]))
     assert np.nonzero(mask)[0].tolist() == [SOUTH, WEST, HOVER]
 
 
 def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
-    states = snapshot(_state([{}], quota=1_000_000, communication_slots=1), True)
+    states = compact_states(_state([{}], quota=1_000_000, communication_slots=1), True)
     assert states.uavs[0, 0, NEEDED] == np.iinfo(np.int16).max
 
 
 @pytest.mark.parametrize("uavs", [1, 3])
 def test_a_snapshot_takes_a_few_bytes(uavs: int) -> None:
     paper = load_scenario("paper")
-    one = sum(part.nbytes for part in empty_snapshots(1, uavs, len(paper.nodes)))
+    one = sum(part.nbytes for part in empty_states(1, uavs, len(paper.nodes)))
     assert one == 2 * 2 + 10 * 2 * uavs + 4 * 25  # thresholds, UAVs, nodes
     maps = sum(4 * int(np.prod(shape)) for shape in Maps(layout_of(paper)).shapes)
     assert 80 * one < uavs * maps

@@ -22,11 +22,11 @@ from policies.ddqn.observations.states import (
     MUST_CHARGE,
     NEEDED,
     UAV_COLUMNS,
+    CompactStates,
     Layout,
-    Snapshots,
     X,
     Y,
-    empty_snapshots,
+    empty_states,
     layout_of,
 )
 from policies.ddqn.observations.vector import Vector
@@ -48,23 +48,23 @@ class Parts:
         self.actions, self.mates = cut[7].reshape(5, ACTION), cut[8].reshape(2, MATE)
 
 
-def _team(*uavs: dict[int, int], residual: tuple[float, ...] = (0.0,)) -> Snapshots:
+def _team(*uavs: dict[int, int], residual: tuple[float, ...] = (0.0,)) -> CompactStates:
     """One mission, C_S 30 and C_C 80: active UAVs with the given columns, all actions open."""
-    snapshots = empty_snapshots(1, len(uavs), len(residual))
-    snapshots.missions[0, [CHARGE_START, CHARGE_COMPLETE]] = 30, 80
-    for row, values in zip(snapshots.uavs[0], uavs, strict=True):
+    states = empty_states(1, len(uavs), len(residual))
+    states.missions[0, [CHARGE_START, CHARGE_COMPLETE]] = 30, 80
+    for row, values in zip(states.uavs[0], uavs, strict=True):
         for column, value in ({BATTERY: 60, ACTIVE: 1, MASK: 31} | values).items():
             row[column] = value
-    snapshots.residual[0] = residual
-    return snapshots
+    states.residual[0] = residual
+    return states
 
 
 def _layout(*nodes: tuple[int, int]) -> Layout:
     return Layout(GRID, np.array([26, 2, 4, 4]), np.array(nodes))
 
 
-def _observe(layout: Layout, snapshots: Snapshots, uav: int = 0) -> Parts:
-    (lines,) = Vector(layout).encode(snapshots, np.array([0]), np.array([uav]))
+def _observe(layout: Layout, states: CompactStates, uav: int = 0) -> Parts:
+    (lines,) = Vector(layout).encode(states, np.array([0]), np.array([uav]))
     return Parts(lines[0], len(layout.nodes), layout.grid)
 
 
@@ -163,36 +163,36 @@ def test_the_two_nearest_teammates_come_first() -> None:
 
 
 @st.composite
-def _worlds(draw: st.DrawFn) -> tuple[Vector, Snapshots, int]:
+def _worlds(draw: st.DrawFn) -> tuple[Vector, CompactStates, int]:
     """A layout, a mission of a team of up to six in any state, and one that is active."""
     grid = draw(st.integers(2, 12))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     nodes = rng.integers(0, grid, (draw(st.integers(1, 5)), 2))
     uavs = draw(st.integers(1, 6))
-    snapshots = empty_snapshots(1, uavs, len(nodes))
-    snapshots.missions[0, [CHARGE_START, CHARGE_COMPLETE]] = rng.integers((10, 60), (51, 101))
-    team = snapshots.uavs[0]
+    states = empty_states(1, uavs, len(nodes))
+    states.missions[0, [CHARGE_START, CHARGE_COMPLETE]] = rng.integers((10, 60), (51, 101))
+    team = states.uavs[0]
     team[:, [X, Y]] = rng.integers(0, grid, (uavs, 2))
     team[:, BATTERY] = rng.integers(0, 101, uavs)
     team[:, NEEDED] = rng.integers(0, 111, uavs)
     team[:, [ACTIVE, LATCH, CHARGING, MUST_CHARGE]] = rng.integers(0, 2, (uavs, 4))
     team[:, HOME] = rng.integers(0, 2 * grid, uavs)
     team[:, MASK] = rng.integers(1, 32, uavs)
-    snapshots.residual[0] = rng.uniform(0, 20, len(nodes))
+    states.residual[0] = rng.uniform(0, 20, len(nodes))
     uav = draw(st.integers(0, uavs - 1))
     team[uav, ACTIVE] = 1
-    return Vector(Layout(grid, np.array([0, 0, 1, 1]), nodes)), snapshots, uav
+    return Vector(Layout(grid, np.array([0, 0, 1, 1]), nodes)), states, uav
 
 
-def _line(vector: Vector, snapshots: Snapshots, uav: int) -> np.ndarray:
-    (lines,) = vector.encode(snapshots, np.array([0]), np.array([uav]))
+def _line(vector: Vector, states: CompactStates, uav: int) -> np.ndarray:
+    (lines,) = vector.encode(states, np.array([0]), np.array([uav]))
     return lines[0]
 
 
 @given(_worlds())
-def test_it_has_one_form_for_every_fleet(world: tuple[Vector, Snapshots, int]) -> None:
-    vector, snapshots, uav = world
-    (lines,) = vector.encode(snapshots, np.zeros(3, np.int64), np.full(3, uav))
+def test_it_has_one_form_for_every_fleet(world: tuple[Vector, CompactStates, int]) -> None:
+    vector, states, uav = world
+    (lines,) = vector.encode(states, np.zeros(3, np.int64), np.full(3, uav))
     assert lines.dtype == np.float32
     assert lines.shape == (3, *vector.shapes[0])
     assert np.isfinite(lines).all()
@@ -200,48 +200,50 @@ def test_it_has_one_form_for_every_fleet(world: tuple[Vector, Snapshots, int]) -
 
 
 @given(_worlds())
-def test_the_data_near_a_cell_is_that_of_all_nodes(world: tuple[Vector, Snapshots, int]) -> None:
-    vector, snapshots, uav = world
+def test_the_data_near_a_cell_is_that_of_all_nodes(
+    world: tuple[Vector, CompactStates, int],
+) -> None:
+    vector, states, uav = world
     grid, _, nodes = vector.layout
-    seen = Parts(_line(vector, snapshots, uav), len(nodes), grid)
-    me = snapshots.uavs[0, uav]
+    seen = Parts(_line(vector, states, uav), len(nodes), grid)
+    me = states.uavs[0, uav]
     for action in range(5):  # cells off the grid included
         cell = me[X] + STEP_X[action], me[Y] + STEP_Y[action]
         slots = abs(nodes - cell).sum(1)
         for scale, norm, entry in zip(
             (NEAR, MIDDLE, FAR), (10, 25, 80), seen.actions[action, 2:], strict=False
         ):
-            expected = (snapshots.residual[0] * np.exp(-slots / scale)).sum() / norm
+            expected = (states.residual[0] * np.exp(-slots / scale)).sum() / norm
             assert entry == pytest.approx(expected, rel=1e-4)
 
 
 @given(_worlds(), st.integers(0, 2**32 - 1))
-def test_who_is_done_does_not_matter(world: tuple[Vector, Snapshots, int], seed: int) -> None:
-    vector, snapshots, uav = world
-    line = _line(vector, snapshots, uav)
-    done = snapshots.uavs[0, :, ACTIVE] == 0
+def test_who_is_done_does_not_matter(world: tuple[Vector, CompactStates, int], seed: int) -> None:
+    vector, states, uav = world
+    line = _line(vector, states, uav)
+    done = states.uavs[0, :, ACTIVE] == 0
     event(f"done {done.sum()}")
     # Whatever their state is.
     rng = np.random.default_rng(seed)
-    other = snapshots._replace(uavs=snapshots.uavs.copy())
+    other = states._replace(uavs=states.uavs.copy())
     other.uavs[0, done] = rng.integers(0, 2, (done.sum(), UAV_COLUMNS))
     other.uavs[0, done, ACTIVE] = 0
     assert (_line(vector, other, uav) == line).all()
     # And if they have never been there.
-    fewer = snapshots._replace(uavs=snapshots.uavs[:, ~done].copy())
+    fewer = states._replace(uavs=states.uavs[:, ~done].copy())
     assert (_line(vector, fewer, uav - done[:uav].sum()) == line).all()
 
 
 @given(_worlds(), st.randoms(use_true_random=False))
 def test_the_order_of_the_teammates_does_not_matter(
-    world: tuple[Vector, Snapshots, int], random: Random
+    world: tuple[Vector, CompactStates, int], random: Random
 ) -> None:
-    vector, snapshots, uav = world
-    team = snapshots.uavs[0]
+    vector, states, uav = world
+    team = states.uavs[0]
     order = list(range(len(team)))
     random.shuffle(order)
-    turned = snapshots._replace(uavs=snapshots.uavs[:, order].copy())
-    line, other = _line(vector, snapshots, uav), _line(vector, turned, order.index(uav))
+    turned = states._replace(uavs=states.uavs[:, order].copy())
+    line, other = _line(vector, states, uav), _line(vector, turned, order.index(uav))
     # Of two that are equally near either may be described first.
     mates = [j for j in range(len(team)) if j != uav and team[j, ACTIVE]]
     slots = [abs(team[j, [X, Y]] - team[uav, [X, Y]]).sum() for j in mates]
