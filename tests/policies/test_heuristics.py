@@ -115,8 +115,8 @@ def test_tour_visits_every_node_once_around() -> None:
 
 
 def test_random_has_its_own_stream_and_goes_everywhere() -> None:
-    open_sea = {"grid": 64, "zone": [30, 30, 4, 4], "nodes": [[0, 0]], "flying_time": 100}
-    space = ScenarioSpace.of(**open_sea, initial_data=1e6, quota=100, max_slots=20)
+    open_grid = {"grid": 64, "zone": [30, 30, 4, 4], "nodes": [[0, 0]], "flying_time": 100}
+    space = ScenarioSpace.of(**open_grid, initial_data=1e6, quota=100, max_slots=20)
     record = simulate(space, policies.load("random"), 5, events=True)
     again = simulate(space, policies.load("random"), 5, events=True)
     other = simulate(space, policies.load("random"), 6, events=True)
@@ -126,13 +126,11 @@ def test_random_has_its_own_stream_and_goes_everywhere() -> None:
     directions = {(0, -1): 0, (1, 0): 1, (0, 1): 2, (-1, 0): 3}
     scenario = ScenarioSpace.of(space, uavs=1)
     for replication in range(60):
-        run = simulate(scenario, policies.load("random"), 5, replication, events=True).events
-        assert run is not None
-        track = [
-            (x, y)
-            for event, i, x, y in zip(run.event, run.uav, run.x, run.y, strict=True)
-            if i == 0 and event in ("mission_start", "move")
-        ]
+        events = simulate(scenario, policies.load("random"), 5, replication, events=True).events
+        assert events is not None
+        log = events.columns()
+        own_moves = (log["uav"] == 0) & np.isin(log["event"], ("mission_start", "move"))
+        track = list(zip(log["x"][own_moves], log["y"][own_moves], strict=True))
         for (a, b), (c, d) in zip(track, track[1:], strict=False):
             counts[directions[c - a, d - b]] += 1
     total = counts.sum()
