@@ -170,7 +170,7 @@ def _indices(
     samples = values.reshape(design.base, factors + 2)[:, [0, -1]]  # A and B
     if np.ptp(samples) <= np.finfo(float).eps * np.ptp(values):
         return np.full((factors, 6), np.nan)
-    found = sobol.analyze(
+    indices = sobol.analyze(
         design.problem,
         values,
         calc_second_order=False,
@@ -178,17 +178,17 @@ def _indices(
         conf_level=level,
         seed=np.random.default_rng(seed),  # not the seed itself: SALib takes 0 for none
     )
-    pairs = [(found[index], found[f"{index}_conf"]) for index in ("S1", "ST")]
+    pairs = [(indices[name], indices[f"{name}_conf"]) for name in ("S1", "ST")]
     return np.column_stack(
-        [v for index, half in pairs for v in (index, index - half, index + half)]
+        [ends for mean, half in pairs for ends in (mean, mean - half, mean + half)]
     )
 
 
 def _check(design: Saltelli, missions: pd.DataFrame) -> None:
-    wanted = [(number, point.replication) for number, point in enumerate(design.points)]
-    found = list(missions[["point", "replication"]].itertuples(index=False, name=None))
-    if found != wanted:
+    expected = [(number, point.replication) for number, point in enumerate(design.points)]
+    keys = list(missions[["point", "replication"]].itertuples(index=False, name=None))
+    if keys != expected:
         raise InputError(
-            f"missions: {len(found)} that are not those of the design; "
-            f"allowed: one for each of its {len(wanted)} points, in order, of one policy"
+            f"missions: {len(keys)} that are not those of the design; "
+            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
         )

@@ -181,9 +181,9 @@ def test_the_interval_of_the_worst_missions_covers(failures, trials):
 
 
 def pairs(generator: np.random.Generator, n: int, difference: float) -> tuple[np.ndarray, ...]:
-    """Values of a common sea, with skewed noise of their own, that differ in mean."""
-    sea, own = generator.beta(8, 2, n), generator.exponential(0.05, (2, n))
-    return sea + own[0] + difference, sea + own[1]
+    """Values of a common realisation, with skewed noise of their own, that differ in mean."""
+    common, noise = generator.beta(8, 2, n), generator.exponential(0.05, (2, n))
+    return common + noise[0] + difference, common + noise[1]
 
 
 @pytest.mark.parametrize("trials", QUICK)
@@ -199,10 +199,10 @@ def test_the_paired_test_finds_what_independent_samples_hide():
     # 0.02 is 4 standard errors of the mean of pairs, 1.7 of that of independent samples
     generator = rng(9)
     draws = [pairs(generator, 200, 0.02) for _ in range(300)]
-    found = [paired(a, b).p <= 0.05 for a, b in draws]
-    apart = [stats.ttest_ind(a, b).pvalue <= 0.05 for a, b in draws]
-    assert np.mean(found) > 0.95
-    assert np.mean(apart) < 0.6
+    of_pairs = [paired(a, b).p <= 0.05 for a, b in draws]
+    independent = [stats.ttest_ind(a, b).pvalue <= 0.05 for a, b in draws]
+    assert np.mean(of_pairs) > 0.95
+    assert np.mean(independent) < 0.6
 
 
 @pytest.mark.parametrize("trials", QUICK)
@@ -312,7 +312,7 @@ def test_the_interval_of_a_learner_covers_trainings_and_missions(trainings, tria
 @pytest.mark.parametrize("training", [0.0, 0.01, 0.03, 0.1])
 @pytest.mark.parametrize(("mission", "rest"), [(0.1, 0.1), (0.02, 0.1), (0.1, 0.02)])
 def test_the_interval_of_a_learner_never_covers_less(trainings, training, mission, rest):
-    # More, where one of the parts is nearly nothing and cannot be told from the rest.
+    # More, where one of the parts is too small to be separated from the rest.
     drawn = list(layouts((trainings, 200), training, mission, rest))
     results = [crossed(d) for d, _ in drawn]
     assert covered(((r.low, r.high) for r in results), 0.0) >= 0.93

@@ -19,6 +19,10 @@ def test_differences_are_in_points_with_a_sign() -> None:
     assert numbers.points(0.01, -0.002, 0.0222) == "+1.0 [−0.2, +2.2]"
 
 
+def test_a_margin_is_in_words() -> None:
+    assert [numbers.margin(share) for share in (0.01, 0.005)] == ["1 point", "0.5 points"]
+
+
 @pytest.mark.parametrize(
     ("values", "text"), [([300, 300], "300"), ([1200, 20, 300], "20 to 1,200"), ([7], "7")]
 )

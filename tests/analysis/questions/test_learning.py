@@ -13,7 +13,7 @@ STEPS = [1000, 2000, 3000, 4000]
 
 
 def training(variant, seed, values, before=0):
-    """A curve with so many evaluations before the last phase."""
+    """A curve with a number of evaluations before the last phase."""
     phases = ["harvest"] * before + ["battery"] * (len(values) - before)
     steps = STEPS[: len(values)]
     columns = {"phase": phases, "updates": steps, METRIC: values, "final_product": values[-1]}

@@ -15,8 +15,8 @@ def study(policies=("tour", "greedy", "ddqn", "ddqn-2"), points=2, n=12):
     frames = []
     for level, policy in enumerate(policies):
         for point in range(points):
-            common, own = rng(9).normal(0.5, 0.1, n), rng((level, point)).normal(0, 0.01, n)
-            ratio = common + own + 0.01 * level + 0.2 * point
+            common, noise = rng(9).normal(0.5, 0.1, n), rng((level, point)).normal(0, 0.01, n)
+            ratio = common + noise + 0.01 * level + 0.2 * point
             labels = {"policy": policy, "point": point, "quota": 100 * point, "seed": 7}
             values = {"replication": range(n), "uavs": np.arange(n) % 3 + 1, METRIC: ratio}
             success = (rng((level, 5)).random(n) < 0.8).astype(int)
