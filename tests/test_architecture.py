@@ -1,17 +1,27 @@
-"""The house: imports only go downwards, the command line loads nothing heavy, all is documented."""
+"""The architecture: floors and rooms import downwards only, folders and notebooks stay small."""
 
 import ast
 import json
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import jupytext
 import pytest
 
 ROOT = Path(__file__).parents[1]
 FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
+# The rooms of a floor; each imports only from those before it.
+ROOMS = {
+    "analysis": (
+        *("names", "numbers", "stats", "study", "results", "execution", "questions"),
+        *("replication", "verification", "figures"),
+    ),
+    "reports": ("player", "tools", "pages", "cli"),
+}
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and most commands need none of it.
@@ -42,6 +52,9 @@ SOURCES = {
 }
 # Notebooks document themselves in their cells.
 LIBRARY = {name: tree for name, tree in SOURCES.items() if ".notebooks." not in name}
+NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").glob("*.py"))
+# Functions that simulate missions; of the notebooks only what_if calls one.
+SIMULATING = {"simulate", "simulate_batch", "evaluate", "fly", "run_study", "measure"}
 
 
 def imports_of(name: str) -> set[str]:
@@ -91,6 +104,28 @@ def test_imports_only_go_downwards(floor: str) -> None:
     assert not climbing
 
 
+@pytest.mark.parametrize("floor", ROOMS)
+def test_rooms_only_import_from_rooms_before_them(floor: str) -> None:
+    rooms = ROOMS[floor]
+    climbing = set()
+    for name in LIBRARY:
+        if name.startswith(f"{floor}."):
+            allowed = rooms[: rooms.index(name.split(".")[1]) + 1]
+            climbing |= {
+                f"{name} imports {imported}"
+                for imported in imports_of(name)
+                if imported.split(".")[0] == floor and imported.split(".")[1] not in allowed
+            }
+    assert not climbing
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_folders_have_at_most_twelve_modules(floor: str) -> None:
+    modules = [path for path in (ROOT / floor).rglob("*.py") if not path.name.startswith("__")]
+    folders = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
+    assert not {folder for folder, count in folders.items() if count > 12}
+
+
 def test_no_modules_import_each_other() -> None:
     graph = {name: imports_of(name) & set(SOURCES) for name in SOURCES}
     try:
@@ -124,3 +159,20 @@ def test_what_is_public_is_documented(name: str) -> None:
     assert ast.get_docstring(tree), "the module has no docstring"
     silent = [f"{node.name}:{node.lineno}" for node in public(tree) if not ast.get_docstring(node)]
     assert not silent
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_and_their_cells_are_short(path: Path) -> None:
+    text = path.read_text("utf-8")
+    assert len(text.splitlines()) <= 200
+    cells = [cell.source for cell in jupytext.reads(text, "py:percent").cells]
+    lines = [[line for line in cell.splitlines() if line.strip()] for cell in cells]
+    assert not [cell[0] for cell in lines if len(cell) > 12]
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_only_what_if_simulates_missions(path: Path) -> None:
+    nodes = [*ast.walk(ast.parse(path.read_text("utf-8")))]
+    imported = {alias.name for n in nodes if isinstance(n, ast.ImportFrom) for alias in n.names}
+    used = {n.attr for n in nodes if isinstance(n, ast.Attribute)} | imported
+    assert path.stem == "what_if" or not SIMULATING & used
