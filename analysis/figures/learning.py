@@ -67,8 +67,8 @@ def trainings_caption(counts: Sequence[int]) -> str:
     else:
         band = f"No band: over n = {min(counts)}, one of {level} would be of no use."
     return (
-        f"Thick: mean of the exponential moving averages (weight of the newest evaluation {ALPHA:g})"
-        f"; thin: single trainings; dotted: phase I. {band}"
+        f"Thick: mean of the exponential moving averages (weight of the newest evaluation {ALPHA:g}"
+        f"); thin: single trainings; dotted: phase I. {band}"
     )
 
 

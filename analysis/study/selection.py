@@ -80,8 +80,8 @@ class Selection(BaseModel):
     """The rule that missions are spent to find the best of the design points.
 
     The missions come in rounds that grow. What is wanted is a function of the values in the order
-    of their replications, found by playing all rounds again, so the counts are the same however a run
-    was interrupted; and ``kn`` decides as if missions came one by one.
+    of their replications, found by playing all rounds again, so the counts are the same however a
+    run was interrupted; and ``kn`` decides as if missions came one by one.
 
     Raises:
         pydantic.ValidationError: If a field is not valid.

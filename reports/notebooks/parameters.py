@@ -42,6 +42,7 @@ effects = main_effects.effects(fig5)
 effects = effects[effects["policy"].isin(policies)]
 changes = main_effects.changes_by_field(fig5, effects)
 level = numbers.level(LEVEL)
+rule, checks = sweet.manifest["study"]["selection"], summary.checks(sweet)
 
 # %% [markdown]
 # ## <a id="fig-5"></a>One by one: the paper's Fig. 5
@@ -100,8 +101,8 @@ html.say(
 
 # %%
 html.say(
-    "So for {leading}, of {n} claims, {verdicts}. They overlap, so their number is no score. By the "
-    "largest difference between two values, the parameters rank: {parameters}.",
+    "So for {leading}, of {n} claims, {verdicts}. They overlap, so their number is no score. By "
+    "the largest difference between two values, the parameters rank: {parameters}.",
     leading=leading,
     n=len(rows),
     verdicts=scorecard.counted(rows),
@@ -112,7 +113,6 @@ html.say(
 # ## <a id="sweet-spot"></a>All together: the sweet spot
 
 # %%
-rule = sweet.manifest["study"]["selection"]
 html.say(
     "Of {n:,} settings, the one with the highest mean of {metric} was selected for every policy, "
     "by `{rule[procedure]}` with an indifference of {margin}. A winner's mean is too high, because "
@@ -127,7 +127,6 @@ html.say(
 )
 
 # %%
-checks = summary.checks(sweet)
 caption = "The check: n = {:,} missions per policy, bars are {} intervals. Dashed: the paper."
 html.gallery(
     [

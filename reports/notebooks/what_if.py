@@ -94,7 +94,9 @@ html.gallery(
 # %%
 spread = {policy: what_if_answer.differences(study, policy) for policy in study.policies}
 pairs = f"n = {missions:,} pairs per policy"
-caption = f"{pairs}: {what_if_answer.winners(spread)}. Below: between the quantiles of 5 % and 95 %."
+caption = (
+    f"{pairs}: {what_if_answer.winners(spread)}. Below: between the quantiles of 5 % and 95 %."
+)
 html.gallery(
     [
         (figures.gains(answers), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
