@@ -8,6 +8,8 @@ From the event log of a mission (``dess.record.EventLog``):
 Nodes and UAVs are in the order of their numbers.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 
@@ -28,15 +30,14 @@ def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
 
 def held(events: Events, nodes: int) -> np.ndarray:
     """Data that every node ever held: at the start, and what arrived [data units], (K,)."""
-    log = pd.DataFrame(events)
-    inflow = log[log["event"].isin(["mission_start", "arrival"]) & (log["node"] >= 0)]
-    return np.bincount(inflow["node"].to_numpy(int), inflow["value"], minlength=nodes)
+    return _of_nodes(events, ["mission_start", "arrival"], nodes)
 
 
-def left_behind(events: Events, uavs: int, nodes: int) -> np.ndarray:
+def left_behind(events: Events, nodes: int) -> np.ndarray:
     """Whether less than ``LEFT_BEHIND`` of what a node ever held was collected, (K,)."""
-    taken = collected(events, uavs, nodes).sum(axis=0)
-    return np.asarray(taken < LEFT_BEHIND * held(events, nodes))
+    return np.asarray(
+        _of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
+    )
 
 
 def far_edges(nodes: np.ndarray) -> np.ndarray:
@@ -94,3 +95,10 @@ def _directions(nodes: np.ndarray) -> np.ndarray:
     turns = turns if turns.size else np.zeros(1)
     between = turns + np.diff(turns, append=turns[0] + np.pi) / 2
     return np.column_stack([np.cos(between), np.sin(between)])
+
+
+def _of_nodes(events: Events, names: Sequence[str], nodes: int) -> np.ndarray:
+    """The sum of the values of these events at every node, (K,)."""
+    log = pd.DataFrame(events)
+    at_nodes = log[log["event"].isin(names) & (log["node"] >= 0)]
+    return np.bincount(at_nodes["node"].to_numpy(int), at_nodes["value"], minlength=nodes)

@@ -201,7 +201,7 @@ FIG_5 = Section("Fig. 5: one parameter at a time", "parameters.html#fig-5", "fig
 SWEET_SPOT = Section("Section V-D: the sweet spot", "parameters.html#sweet-spot", "sweet-spot", [
     *(Claim(
         f"{name} with every parameter at its best", "Section V-D",
-        rules.reached, partial(measures.mean_of_checks, metric=metric),
+        rules.reached, partial(measures.mean, metric=metric),
         _printed(metric, paper.SWEET_SPOT[metric], paper.SWEET_SPOT_MISSIONS),
         basis="Of missions that had no part in the selection.",
     ) for metric, name in METRICS.items()),

@@ -57,14 +57,6 @@ def negated(changes: pd.DataFrame) -> pd.DataFrame:
     return changes.assign(**{end: -changes[other] for end, other in turned.items()})
 
 
-class EventLog(NamedTuple):
-    """The event log of a mission, ``events``, with its number of UAVs and its (K, 2) nodes."""
-
-    events: pd.DataFrame
-    uavs: int
-    nodes: np.ndarray
-
-
 @dataclass(frozen=True, eq=False)
 class EvidenceOfPolicy:
     """The results of one policy in one study."""
@@ -83,21 +75,19 @@ class EvidenceOfPolicy:
         return main_effects.effects(self.results)
 
     def missions(self, uavs: int | None = None) -> pd.DataFrame:
-        """The missions of the policy; those of a number of UAVs, if asked."""
-        missions = self.results.missions
+        """The missions of the policy; those of a number of UAVs, if asked.
+
+        Of a study that selects a setting they are those that check it: they had no part in the
+        selection.
+        """
+        selects = self.results.manifest["study"]["selection"] is not None
+        missions = self.results.checks if selects else self.results.missions
         chosen = missions["policy"] == self.policy
         if uavs is not None:
             chosen &= missions["uavs"] == uavs
         if not chosen.any():
             raise MissingError(f"the study {self.study} has no such mission")
         return missions[chosen]
-
-    def checks(self) -> pd.DataFrame:
-        """The missions that check what the study selected for the policy."""
-        checks = self.results.checks[self.results.checks["policy"] == self.policy]
-        if checks.empty:
-            raise MissingError(f"the study {self.study} has no missions that check a selection")
-        return checks
 
     def pairs(self, field: str, metric: str) -> Pairs:
         """The values of a parameter, compared mission by mission."""
@@ -107,18 +97,19 @@ class EvidenceOfPolicy:
         changes = main_effects.changes(self.results, self.effects, self.policy, field, metric)
         return Pairs(changes, dict(zip(values["value"], values["position"], strict=True)))
 
-    def logs(self, uavs: int) -> list[EventLog]:
-        """The event logs that the study keeps of missions with a number of UAVs."""
+    def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
+        """The event logs, with (K, 2) nodes, that are kept of missions with a number of UAVs."""
         missions, logged = self.missions(uavs), self.results.manifest["study"]["logged"]
         missions = missions[missions["replication"] < logged]
         if missions.empty:
             raise MissingError(f"the study {self.study} keeps no event logs")
-        logs = []
-        for point, replication in missions[["point", "replication"]].itertuples(index=False):
-            nodes = np.array(self.results.scenario(point).nodes)
-            events = self.results.events(self.policy, point, replication)
-            logs.append(EventLog(events, uavs, nodes))
-        return logs
+        return [
+            (
+                self.results.events(self.policy, point, replication),
+                np.array(self.results.scenario(point).nodes),
+            )
+            for point, replication in missions[["point", "replication"]].itertuples(index=False)
+        ]
 
 
 def evidence_of_policy(

@@ -15,7 +15,6 @@ from analysis.questions import main_effects, node_shares
 from analysis.questions.learning import Transfer
 from analysis.replication import paper
 from analysis.replication.evidence_of_policy import (
-    EventLog,
     EvidenceOfPolicy,
     EvidenceOfTrainings,
     MissingError,
@@ -70,28 +69,26 @@ class Measured(NamedTuple):
     quantities: tuple[Quantity, ...]
     note: str = ""
 
+    @classmethod
+    def of(cls, *quantities: Quantity) -> "Measured":
+        """Figures whose intervals are what the judge takes."""
+        return cls(tuple(quantity.interval for quantity in quantities), quantities)
+
 
 # Means.
 
 
 def mean(evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Measured:
     """The mean of a metric over all missions, or those of a number of UAVs."""
-    quantity = _mean_of(evidence.missions(uavs), metric)
-    return Measured((quantity.interval,), (quantity,))
-
-
-def mean_of_checks(evidence: EvidenceOfPolicy, metric: str) -> Measured:
-    """The mean of a metric over the missions that check a selection."""
-    quantity = _mean_of(evidence.checks(), metric)
-    return Measured((quantity.interval,), (quantity,))
+    return Measured.of(_mean_of(evidence.missions(uavs), metric))
 
 
 def missed_data(evidence: EvidenceOfPolicy) -> Measured:
     """The mean collection ratio, and the share of missions that collected everything."""
     missions = evidence.missions()
-    ratio = _mean_of(missions, RATIO)
-    whole = _share_of(missions[RATIO].to_numpy() >= 1, "missions that collected everything")
-    return Measured((ratio.interval, whole.interval), (ratio, whole))
+    everything = missions[RATIO].to_numpy() >= 1
+    name = "missions that collected everything"
+    return Measured.of(_mean_of(missions, RATIO), _share_of(everything, name))
 
 
 # Event logs.
@@ -99,32 +96,32 @@ def missed_data(evidence: EvidenceOfPolicy) -> Measured:
 
 def single_charges(evidence: EvidenceOfPolicy) -> Measured:
     """The share of missions in which a lone UAV charges once."""
-    charges = [(log.events["event"] == "charge_start").sum() for log in evidence.logs(uavs=1)]
-    share = _share_of(np.array(charges) == 1, "missions with one charge")
-    return Measured((share.interval,), (share,))
+    charges = [(events["event"] == "charge_start").sum() for events, _ in evidence.logs(uavs=1)]
+    return Measured.of(_share_of(np.array(charges) == 1, "missions with one charge"))
 
 
 def ignored_nodes(evidence: EvidenceOfPolicy) -> Measured:
     """The shares of nodes that a lone UAV ignores, on the far edges and elsewhere."""
-    far, others = np.transpose([_left_behind(log) for log in evidence.logs(uavs=1)])
+    far, others = np.transpose([_left_behind(*log) for log in evidence.logs(uavs=1)])
     shares = _mean_share(far, "ignored of these nodes"), _mean_share(others, "of the others")
     return Measured((shares[0].interval, mean_interval(far - others)), shares)
 
 
 def reached_nodes(evidence: EvidenceOfPolicy) -> Measured:
     """How many more nodes of the far edges two UAVs reach than one, in the same missions."""
-    one, two = ([_left_behind(log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
+    one, two = ([_left_behind(*log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
     more = np.array([alone - team for alone, team in zip(one, two, strict=False)])
     name = "more of these nodes than by a lone UAV"
     gain = Quantity(*mean_interval(more), len(more), "points", name)
-    reached = _mean_share(1 - np.array(two), "of these nodes not ignored")
-    return Measured((gain.interval,), (gain, reached))
+    return Measured(
+        (gain.interval,), (gain, _mean_share(1 - np.array(two), "of these nodes not ignored"))
+    )
 
 
 def sectors(evidence: EvidenceOfPolicy) -> Measured:
     """The share of data that two UAVs collect each on its own side, beside what chance gives."""
     generator = np.random.default_rng(evidence.results.store.manifest.seed)
-    rows = [row for log in evidence.logs(uavs=2) if (row := _division(log, generator))]
+    rows = [row for log in evidence.logs(uavs=2) if (row := _division(*log, generator))]
     if not rows:
         raise MissingError("no data was collected")
     sides, chance, most = np.transpose(rows)
@@ -136,23 +133,25 @@ def sectors(evidence: EvidenceOfPolicy) -> Measured:
     return Measured((mean_interval(sides - chance), quantities[2].interval), quantities)
 
 
-def _left_behind(log: EventLog) -> tuple[float, float]:
+def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]:
     """The shares left behind, of the nodes of the far edges and of the others."""
-    left = node_shares.left_behind(log.events, log.uavs, len(log.nodes))
-    far = node_shares.far_edges(log.nodes)
+    left = node_shares.left_behind(events, len(nodes))
+    far = node_shares.far_edges(nodes)
     if far.all():
         raise MissingError("all nodes are on the edges")
     return float(left[far].mean()), float(left[~far].mean())
 
 
-def _division(log: EventLog, generator: np.random.Generator) -> tuple[float, ...]:
+def _division(
+    events: pd.DataFrame, nodes: np.ndarray, generator: np.random.Generator
+) -> tuple[float, ...]:
     """The share on the own side, the same by chance, and by the UAV that serves a node most."""
-    data = node_shares.collected(log.events, log.uavs, len(log.nodes))
+    data = node_shares.collected(events, 2, len(nodes))
     if not data.any():
         return ()
     shuffled = (generator.permutation(data, axis=1) for _ in range(SHUFFLES))
-    chance = np.mean([node_shares.sectors(by_chance, log.nodes) for by_chance in shuffled])
-    return node_shares.sectors(data, log.nodes), float(chance), node_shares.division(data)
+    chance = np.mean([node_shares.sectors(by_chance, nodes) for by_chance in shuffled])
+    return node_shares.sectors(data, nodes), float(chance), node_shares.division(data)
 
 
 # The values of a parameter, compared mission by mission.
@@ -162,8 +161,7 @@ def change(
     evidence: EvidenceOfPolicy, field: str, metric: str, first: str, second: str
 ) -> Measured:
     """How much a metric changes from one value of a parameter to another."""
-    quantity = _points(evidence.pairs(field, metric).change(first, second))
-    return Measured((quantity.interval,), (quantity,))
+    return Measured.of(_points(evidence.pairs(field, metric).change(first, second)))
 
 
 def lead(

@@ -25,7 +25,7 @@ def test_what_is_collected_and_held() -> None:
     """The battery at the start is no data."""
     assert node_shares.collected(EVENTS, 2, 2).tolist() == [[2.0, 0.0], [1.5, 1.0]]
     assert node_shares.held(EVENTS, 2).tolist() == [6.0, 5.0]
-    assert node_shares.left_behind(EVENTS, 2, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
+    assert node_shares.left_behind(EVENTS, 2).tolist() == [False, True]  # 3.5 of 6, 1 of 5
 
 
 def test_a_mission_is_accounted_for() -> None:
