@@ -1,4 +1,4 @@
-"""The player shows what happened, slot by slot, in a page that needs nothing else."""
+"""The player shows the state of a mission after every slot, in a page that requests nothing."""
 
 import json
 import re
@@ -22,58 +22,58 @@ from reports.player import library, player
 from reports.player.mission_map import TRAIL
 from tests.reports.browser import Visit
 
-# One UAV; three in a queue for one pad, of which one runs dry long before the others are done;
-# quotas that are filled at once; nothing to serve, in a mission that is truncated.
+# One UAV; three in a queue for one pad, of which one has its battery depleted long before the
+# others end; quotas that are filled at once; nothing to serve, in a mission that is truncated.
 CASES: dict[str, dict[str, Any]] = {
     "alone": {"uavs": 1},
     "queue": {"uavs": 3, "pads": 1, "zone": [26, 2, 4, 1]},
     "short": {"uavs": 2, "quota": 4},
-    "empty sea": {"uavs": 2, "initial_data": 0, "arrival_rate": 0, "max_slots": 9},
+    "empty": {"uavs": 2, "initial_data": 0, "arrival_rate": 0, "max_slots": 9},
 }
 
 
-class Mission(NamedTuple):
+class Logged(NamedTuple):
     log: pd.DataFrame
     scenario: dess.Scenario
 
 
-def flown(**fields: Any) -> Mission:
+def simulated(**fields: Any) -> Logged:
     """A mission of the ``fig4`` scenario."""
     space = dess.load_scenario("fig4", **fields)
     record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
-    return Mission(pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0))
+    return Logged(pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0))
 
 
 @pytest.fixture(scope="module", params=CASES)
-def mission(request: pytest.FixtureRequest) -> Mission:
-    return flown(**CASES[request.param])
+def mission(request: pytest.FixtureRequest) -> Logged:
+    return simulated(**CASES[request.param])
 
 
 @pytest.fixture(scope="module")
-def queue() -> Mission:
-    return flown(**CASES["queue"])
+def queue() -> Logged:
+    return simulated(**CASES["queue"])
 
 
 def figure(html: str) -> dict[str, Any]:
     """The traces, the layout and the frames in the HTML of a player."""
     read = json.JSONDecoder().raw_decode
-    found = {}
+    parts = {}
     for call, names in (("newPlot", ("name", "data", "layout")), ("addFrames", ("", "frames"))):
         at = html.index(f"Plotly.{call}(") + len(f"Plotly.{call}(")
         for name in names:
             at += len(html[at:]) - len(html[at:].lstrip(" ,\n"))
             if name:
-                found[name], at = read(html, at)
+                parts[name], at = read(html, at)
             else:
                 at = html.index(",", at) + 1
-    return found
+    return parts
 
 
-class Replay:
-    """What a player shows: ``replay[t][name]`` is a trace of the frame of slot t."""
+class Shown:
+    """What a player shows: ``shown[t][name]`` is a trace of the frame of slot t."""
 
-    def __init__(self, mission: Mission):
-        self.figure = figure(player(*mission, "replay").data)
+    def __init__(self, mission: Logged):
+        self.figure = figure(player(*mission, "shown").data)
         self.traces = self.figure["data"]
 
     def __len__(self) -> int:
@@ -87,16 +87,14 @@ class Replay:
 
 
 @pytest.fixture(scope="module")
-def replay(mission: Mission) -> Replay:
-    return Replay(mission)
+def shown(mission: Logged) -> Shown:
+    return Shown(mission)
 
 
-def test_there_is_a_frame_and_a_step_of_the_slider_per_slot(
-    mission: Mission, replay: Replay
-) -> None:
-    (slider,) = replay.figure["layout"]["sliders"]
+def test_there_is_a_frame_and_a_step_of_the_slider_per_slot(mission: Logged, shown: Shown) -> None:
+    (slider,) = shown.figure["layout"]["sliders"]
     times = [str(t) for t in range(duration(mission.log) + 1)]
-    assert [frame["name"] for frame in replay.figure["frames"]] == times
+    assert [frame["name"] for frame in shown.figure["frames"]] == times
     assert [step["args"][0] for step in slider["steps"]] == [[t] for t in times]
     assert [step["label"] for step in slider["steps"]] == times
 
@@ -109,45 +107,43 @@ def holds(trace: dict[str, Any], change: dict[str, Any]) -> bool:
     )
 
 
-def test_the_page_opens_at_the_start(replay: Replay) -> None:
-    traces = {trace["name"]: trace for trace in replay.traces}
-    assert len(traces) == len(replay.traces)
-    assert all(holds(traces[name], change) for name, change in replay[0].items())
+def test_the_page_opens_at_the_start(shown: Shown) -> None:
+    traces = {trace["name"]: trace for trace in shown.traces}
+    assert len(traces) == len(shown.traces)
+    assert all(holds(traces[name], change) for name, change in shown[0].items())
 
 
-def test_discs_are_the_residual_data(mission: Mission, replay: Replay) -> None:
+def test_discs_are_the_residual_data(mission: Logged, shown: Shown) -> None:
     residual = residual_data(mission.log)
     for time, row in enumerate(residual.to_numpy()):
-        assert np.allclose(replay[time]["nodes"]["marker"]["size"], row, atol=0.0051, rtol=0)
-    (rings,) = (trace for trace in replay.traces if trace["name"] == "rings")
+        assert np.allclose(shown[time]["nodes"]["marker"]["size"], row, atol=0.0051, rtol=0)
+    (rings,) = (trace for trace in shown.traces if trace["name"] == "rings")
     assert np.allclose(rings["marker"]["size"], residual.max(), atol=0.0051, rtol=0)
-    (nodes,) = (trace for trace in replay.traces if trace["name"] == "nodes")
+    (nodes,) = (trace for trace in shown.traces if trace["name"] == "nodes")
     assert list(zip(nodes["x"], nodes["y"], strict=True)) == list(mission.scenario.nodes)
     assert nodes["marker"]["color"] == node_colours(len(mission.scenario.nodes))
 
 
-def test_uavs_are_where_they_are_until_their_mission_ends(mission: Mission, replay: Replay) -> None:
+def test_uavs_are_where_they_are_until_their_mission_ends(mission: Logged, shown: Shown) -> None:
     slots = uav_slots(mission.log)
     for row in slots.itertuples():
-        before, after = replay[row.slot]["UAVs"], replay[row.slot + 1]["UAVs"]
+        before, after = shown[row.slot]["UAVs"], shown[row.slot + 1]["UAVs"]
         assert (before["x"][row.uav], before["y"][row.uav]) == (row.from_x, row.from_y)
         assert (after["x"][row.uav], after["y"][row.uav]) == (row.x, row.y)
         assert before["marker"]["opacity"][row.uav] == 1
-    for uav, own in slots.groupby("uav"):
-        for time in range(own["slot"].max() + 1, len(replay)):
-            dots = replay[time]["UAVs"]
+    for uav, active in slots.groupby("uav"):
+        for time in range(active["slot"].max() + 1, len(shown)):
+            dots = shown[time]["UAVs"]
             assert dots["marker"]["opacity"][uav] < 1
-            assert (dots["x"][uav], dots["y"][uav]) == (own["x"].iloc[-1], own["y"].iloc[-1])
+            assert (dots["x"][uav], dots["y"][uav]) == (active["x"].iloc[-1], active["y"].iloc[-1])
 
 
-def test_links_lead_from_each_uav_to_the_node_that_it_serves(
-    mission: Mission, replay: Replay
-) -> None:
+def test_links_lead_from_each_uav_to_the_node_that_it_serves(mission: Logged, shown: Shown) -> None:
     nodes, colours = mission.scenario.nodes, node_colours(len(mission.scenario.nodes))
     slots = uav_slots(mission.log).set_index(["slot", "uav"])
-    for time in range(len(replay)):
+    for time in range(len(shown)):
         for uav in range(mission.scenario.uavs):
-            link, dots = replay[time][f"link {uav + 1}"], replay[time]["UAVs"]
+            link, dots = shown[time][f"link {uav + 1}"], shown[time]["UAVs"]
             start, end = zip(link["x"], link["y"], strict=True)
             assert start == (dots["x"][uav], dots["y"][uav])
             node = slots["node"].get((time - 1, uav), -1)
@@ -155,73 +151,72 @@ def test_links_lead_from_each_uav_to_the_node_that_it_serves(
             assert node < 0 or link["line"]["color"] == colours[node]
 
 
-def test_trails_are_the_last_moves(mission: Mission, replay: Replay) -> None:
+def test_trails_are_the_last_moves(mission: Logged, shown: Shown) -> None:
     for uav in range(mission.scenario.uavs):
-        way = [replay[time]["UAVs"] for time in range(len(replay))]
-        for time in range(len(replay)):
+        way = [shown[time]["UAVs"] for time in range(len(shown))]
+        for time in range(len(shown)):
             past = [way[max(time - n, 0)] for n in range(TRAIL + 1)]
-            trail = replay[time][f"trail {uav + 1}"]
+            trail = shown[time][f"trail {uav + 1}"]
             assert trail["x"] == [dots["x"][uav] for dots in past]
             assert trail["y"] == [dots["y"][uav] for dots in past]
 
 
-def test_batteries_are_told_on_the_curves_and_at_the_uavs(mission: Mission, replay: Replay) -> None:
+def test_batteries_stand_on_the_curves_and_at_the_uavs(mission: Logged, shown: Shown) -> None:
     for row in battery_levels(mission.log).itertuples():
-        assert replay[row.time]["batteries"]["y"][row.uav] == row.battery
-        assert replay[row.time]["UAVs"]["customdata"][row.uav] == row.battery
-    for time in range(len(replay)):
-        assert set(replay[time]["batteries"]["x"]) == {time}
-        assert all(replay[time][f"cursor {panel}"]["x"] == [time, time] for panel in (2, 3, 4))
+        assert shown[row.time]["batteries"]["y"][row.uav] == row.battery
+        assert shown[row.time]["UAVs"]["customdata"][row.uav] == row.battery
+    for time in range(len(shown)):
+        assert set(shown[time]["batteries"]["x"]) == {time}
+        assert all(shown[time][f"cursor {panel}"]["x"] == [time, time] for panel in (2, 3, 4))
 
 
-def test_squares_and_the_status_tell_who_charges_and_who_waits(
-    mission: Mission, replay: Replay
+def test_squares_and_the_status_show_who_charges_and_who_waits(
+    mission: Logged, shown: Shown
 ) -> None:
     slots = uav_slots(mission.log)
     left = residual_data(mission.log).sum(axis=1)
-    for time in range(len(replay)):
+    for time in range(len(shown)):
         now = slots[slots["slot"] == time - 1]
-        (status,) = replay[time]["status"]["text"]
-        told = re.fullmatch(
+        (status,) = shown[time]["status"]["text"]
+        match = re.fullmatch(
             r"(\d+) data units left · (\d+) of (\d+) pads? in use(?:, (\d+) waiting)?", status
         )
-        assert told
-        assert abs(int(told[1]) - left[time]) <= 0.51
-        assert int(told[2]) == now["charging"].sum()
-        assert int(told[3]) == (mission.scenario.pads or mission.scenario.zone_cells)
-        assert int(told[4] or 0) == now["waiting"].sum()
+        assert match
+        assert abs(int(match[1]) - left[time]) <= 0.51
+        assert int(match[2]) == now["charging"].sum()
+        assert int(match[3]) == (mission.scenario.pads or mission.scenario.zone_cells)
+        assert int(match[4] or 0) == now["waiting"].sum()
         for state in ("charging", "waiting"):
-            seen = np.flatnonzero(replay[time][state]["marker"]["opacity"])
+            seen = np.flatnonzero(shown[time][state]["marker"]["opacity"])
             assert seen.tolist() == now.loc[now[state], "uav"].tolist()
-            assert replay[time][state]["x"] == replay[time]["UAVs"]["x"]
+            assert shown[time][state]["x"] == shown[time]["UAVs"]["x"]
 
 
-def test_bars_are_the_slots_of_charging_and_waiting(mission: Mission, replay: Replay) -> None:
+def test_bars_are_the_slots_of_charging_and_waiting(mission: Logged, shown: Shown) -> None:
     slots = uav_slots(mission.log)
     for state in ("charging", "waiting"):
-        for uav, own in slots.groupby("uav"):
-            (bars,) = (t for t in replay.traces if t["name"] == f"{state} {uav + 1}")
+        for uav, of_uav in slots.groupby("uav"):
+            (bars,) = (t for t in shown.traces if t["name"] == f"{state} {uav + 1}")
             edges = zip(bars["x"][0::6], bars["x"][1::6], strict=True)
-            assert [slot for a, b in edges for slot in range(a, b)] == own.loc[
-                own[state], "slot"
-            ].tolist()
+            busy = of_uav.loc[of_uav[state], "slot"]
+            assert [slot for a, b in edges for slot in range(a, b)] == busy.tolist()
 
 
-def test_the_cases_are_what_they_are_meant_to_be(queue: Mission) -> None:
+def test_the_cases_cover_waiting_charging_and_short_missions(queue: Logged) -> None:
     slots = uav_slots(queue.log)
     ends = slots.groupby("uav")["slot"].max()
     assert slots["waiting"].any() and slots["charging"].any() and ends.nunique() > 1
-    notes = {note["text"] for note in Replay(queue).figure["layout"]["annotations"]}
+    notes = {note["text"] for note in Shown(queue).figure["layout"]["annotations"]}
     assert {"✓", "✕"} <= notes
-    assert duration(flown(**CASES["short"]).log) < TRAIL
+    assert duration(simulated(**CASES["short"]).log) < TRAIL
 
 
-def test_plotly_knows_every_attribute(mission: Mission, replay: Replay) -> None:
-    parts = {name: replay.figure[name] for name in ("data", "frames", "layout")}
-    assert len(graph_objects.Figure(parts).frames) == len(replay)
+def test_plotly_knows_every_attribute(mission: Logged, shown: Shown) -> None:
+    parts = {name: shown.figure[name] for name in ("data", "frames", "layout")}
+    assert len(graph_objects.Figure(parts).frames) == len(shown)
 
 
-def test_the_same_log_gives_the_same_bytes(mission: Mission) -> None:
+def test_the_same_log_gives_the_same_bytes(mission: Logged) -> None:
     columns = {name: mission.log[name].to_numpy() for name in mission.log}
     again = player(columns, mission.scenario, "one", "title", "caption").data
     assert player(*mission, "one", "title", "caption").data == again
@@ -229,29 +224,29 @@ def test_the_same_log_gives_the_same_bytes(mission: Mission) -> None:
 
 
 def test_a_long_mission_is_light() -> None:
-    log, scenario = flown(uavs=3, quota=10_000, flight_cost=0, max_slots=150)
+    log, scenario = simulated(uavs=3, quota=10_000, flight_cost=0, max_slots=150)
     assert duration(log) == 150 and len(scenario.nodes) == 25
     assert len(player(log, scenario, "long").data.encode()) < 0.5e6
 
 
-def test_a_player_refers_to_nothing_outside(queue: Mission) -> None:
+def test_a_player_refers_to_nothing_outside(queue: Logged) -> None:
     html = player(*queue, "one", "A title", "A caption").data
     assert not re.search(r"https?:|//\w|\b(src|href)=|url\(|@import|\bimport\b", html)
 
 
-def test_words_are_shown_as_they_are(queue: Mission) -> None:
+def test_words_are_shown_as_they_are(queue: Logged) -> None:
     html = player(*queue, "one", "<b>I & U</b>", "1 < 2").data
     assert "&lt;b&gt;I &amp; U&lt;/b&gt;" in html and "1 &lt; 2" in html
 
 
-def test_a_log_of_another_scenario_is_refused(queue: Mission) -> None:
+def test_a_log_of_another_scenario_is_refused(queue: Logged) -> None:
     for fields, what in (({"uavs": 2}, "uav"), ({"nodes": ((1, 1),)}, "node")):
         other = queue.scenario.model_copy(update=fields)
         with pytest.raises(InputError, match=f"mission_start has .* rows of a {what}; allowed"):
             player(queue.log, other, "one")
 
 
-def test_a_log_without_an_end_is_refused(queue: Mission) -> None:
+def test_a_log_without_an_end_is_refused(queue: Logged) -> None:
     log = queue.log[queue.log["event"] != "mission_end"]
     with pytest.raises(InputError, match="events: mission_end has 0 rows of a uav; allowed: one"):
         player(log, queue.scenario, "one")
@@ -261,9 +256,9 @@ def test_a_log_without_an_end_is_refused(queue: Mission) -> None:
 
 
 @pytest.fixture(scope="module")
-def document(queue: Mission, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def document(queue: Logged, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A page with two players."""
-    alone = flown(**CASES["alone"])
+    alone = simulated(**CASES["alone"])
     parts = [library(), player(*queue, "first", "I = 3"), player(*alone, "second", "I = 1")]
     path = tmp_path_factory.mktemp("page") / "page.html"
     head = (
@@ -285,7 +280,7 @@ def slot(name: str) -> str:
 
 @pytest.mark.parametrize("width", [pytest.param(1200, marks=pytest.mark.slow), 390])
 def test_a_mission_is_played_and_paused(
-    visit: Callable[[Path, int], Visit], document: Path, queue: Mission, width: int
+    visit: Callable[[Path, int], Visit], document: Path, queue: Logged, width: int
 ) -> None:
     opened, end = visit(document, width), duration(queue.log)
     page, status = opened.page, opened.page.locator("#first .x5y5 .textpoint")
@@ -299,7 +294,7 @@ def test_a_mission_is_played_and_paused(
     paused = page.evaluate(slot("first"))
     page.wait_for_timeout(1000)  # three slots, were it playing
     assert 3 <= page.evaluate(slot("first")) == paused < end
-    assert status.text_content() == Replay(queue)[paused]["status"]["text"][0]
+    assert status.text_content() == Shown(queue)[paused]["status"]["text"][0]
     assert page.evaluate(slot("second")) == 0
 
     button(page, "first", "Play").click()
@@ -309,7 +304,7 @@ def test_a_mission_is_played_and_paused(
     assert box is not None
     rail.click(position={"x": 0.999 * box["width"], "y": box["height"] / 2}, force=True)
     page.wait_for_function(f"{slot('first')} === {end}")
-    expect(status).to_have_text(Replay(queue)[end]["status"]["text"][0])
+    expect(status).to_have_text(Shown(queue)[end]["status"]["text"][0])
     button(page, "first", "Fast").click()
     page.wait_for_function(f"0 < {slot('first')} && {slot('first')} < {end}")
 

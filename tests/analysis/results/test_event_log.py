@@ -29,12 +29,12 @@ def logged(policy: str, replication: int = 0, **fields: Any) -> tuple[Any, pd.Da
 
 def assert_agree(record: Any, log: pd.DataFrame) -> None:
     slots = uav_slots(log)
-    own = slots.groupby("uav")
-    assert own["charging"].sum().tolist() == record.uavs["slots_charging"].tolist()
-    assert own["waiting"].sum().tolist() == record.uavs["slots_waiting"].tolist()
+    of_uav = slots.groupby("uav")
+    assert of_uav["charging"].sum().tolist() == record.uavs["slots_charging"].tolist()
+    assert of_uav["waiting"].sum().tolist() == record.uavs["slots_waiting"].tolist()
     flying = (~slots["charging"]).groupby(slots["uav"]).sum()
     assert flying.tolist() == record.uavs["slots_flying"].tolist()
-    assert own["battery"].last().tolist() == record.uavs["battery"].tolist()
+    assert of_uav["battery"].last().tolist() == record.uavs["battery"].tolist()
     assert not (slots["charging"] & (slots["waiting"] | slots["moved"])).any()
     assert duration(log) == record.slots == slots["slot"].max() + 1
     end = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
@@ -60,9 +60,9 @@ def test_steps_are_one_cell_long_and_join() -> None:
     slots = uav_slots(logged("greedy", uavs=3)[1])
     length = (slots["x"] - slots["from_x"]).abs() + (slots["y"] - slots["from_y"]).abs()
     assert (length == slots["moved"]).all()
-    for _, own in slots.groupby("uav"):
-        assert own["slot"].tolist() == list(range(len(own)))
-        assert (own["from_x"].iloc[1:].to_numpy() == own["x"].iloc[:-1].to_numpy()).all()
+    for _, steps in slots.groupby("uav"):
+        assert steps["slot"].tolist() == list(range(len(steps)))
+        assert (steps["from_x"].iloc[1:].to_numpy() == steps["x"].iloc[:-1].to_numpy()).all()
 
 
 def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
@@ -86,10 +86,10 @@ def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
 def test_batteries_start_full_and_move_by_a_flight_or_a_charge() -> None:
     record, log = logged("greedy", uavs=3)
     levels = battery_levels(log)
-    for uav, own in levels.groupby("uav"):
-        assert own["battery"].iloc[0] == record.flying_time
-        assert own["battery"].iloc[-1] == record.uavs["battery"][uav]
-        steps = own["battery"].diff().iloc[1:]
+    for uav, curve in levels.groupby("uav"):
+        assert curve["battery"].iloc[0] == record.flying_time
+        assert curve["battery"].iloc[-1] == record.uavs["battery"][uav]
+        steps = curve["battery"].diff().iloc[1:]
         assert (steps == -1).sum() == record.uavs["slots_flying"][uav]
         assert (steps > 0).sum() == record.uavs["slots_charging"][uav]
 

@@ -1,0 +1,60 @@
+"""The page on missions shows numbers that are computed here anew from the results."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import t
+
+from analysis import load_results
+from tests.reports.small import run_small_studies, said_by
+
+RATIO, PRODUCT = "collection_ratio", "collection_ratio_and_communication"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return run_small_studies(tmp_path_factory.mktemp("results"), "fig1", "fig4")
+
+
+@pytest.fixture(scope="module")
+def text(results: Path) -> str:
+    return said_by("mission", results=str(results), policy="greedy", replication=0)
+
+
+def test_missions_and_their_means(results: Path, text: str) -> None:
+    missions = load_results(results / "fig4").missions.query("policy == 'greedy'")
+    for point, printed in enumerate(("63.4 %", "89.4 %", "93.8 %")):
+        at_point = missions[missions["point"] == point]
+        values = at_point[RATIO].to_numpy(float)
+        half = t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
+        low, mean, high = 100 * (values.mean() + half * np.array([-1, 0, 1]))
+        assert f"is {mean:.1f} % [{low:.1f}, {high:.1f}], the paper's {printed}." in text
+        (mission,) = at_point[at_point["replication"] == 0].itertuples()
+        total = mission.initial + mission.arrived
+        assert f"{mission.slots} slots; {mission.collected:.0f} of {total:.0f} data units" in text
+        assert f"I = {point + 1}: {100 * mission.collection_ratio:.1f} % collected" in text
+
+
+def test_every_uav_has_a_row(results: Path, text: str) -> None:
+    uavs = load_results(results / "fig4").uavs
+    uavs = uavs.query("policy == 'greedy' and replication == 0")
+    assert len(uavs) == 6
+    for row in uavs.itertuples():
+        cells = f"{row.point + 1} {row.uav + 1} {row.quota} of "
+        assert cells in text
+        slots = f"{row.slots_flying} {row.slots_charging} {row.slots_waiting} {row.battery} %"
+        assert f"{row.collected:.1f} {slots}" in text
+
+
+def test_the_policy_of_the_example_is_the_best_one(results: Path, text: str) -> None:
+    missions = pd.read_parquet(results / "fig1" / "missions")
+    means = missions.groupby("policy")[PRODUCT].mean()
+    assert f"the policy of this mission is {means.idxmax()}, of " in text
+    assert f"collection ratio and communication: {100 * means.max():.1f} % [" in text
+
+
+def test_commands_simulate_the_missions_again(text: str) -> None:
+    for uavs in (1, 2, 3):
+        assert f"dess simulate --scenario fig4 --set uavs={uavs} --policy greedy --seed " in text
