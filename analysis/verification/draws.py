@@ -22,11 +22,6 @@ from dess.scenario import SAMPLED, ScenarioSpace
 _FEWEST = 30  # values from which their sum counts as normal
 
 
-def window_of(rate: float) -> int:
-    """Mission slots in which a node receives about one data unit."""
-    return max(2, round(1 / rate))
-
-
 def arrival_fits(counts: np.ndarray, rate: float) -> list[tuple[str, Fit, float]]:
     """Counts per node and slot, per slot, and per node over many slots: name, fit and mean.
 
@@ -40,7 +35,7 @@ def arrival_fits(counts: np.ndarray, rate: float) -> list[tuple[str, Fit, float]
     if not rate:
         return []
     slots, nodes = counts.shape
-    window = window_of(rate)
+    window = max(2, round(1 / rate))  # slots in which a node receives about one data unit
     windows = counts[: slots // window * window].reshape(-1, window, nodes).sum(1)
     panels = (
         ("Counts per node and slot", counts, rate),

@@ -8,6 +8,7 @@ the channel. Here there is nothing to choose, and a communication slot is one dr
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -39,19 +40,11 @@ def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
 
     The mission lasts that many slots: the battery does not decrease, and the node is never empty.
     """
-    return ScenarioSpace.of(
-        space,
-        uavs=1,
-        flying_time=100,
-        flight_cost=0,
-        pads=None,
-        zone=(0, 0, 1, 1),
-        nodes=((dx, dy),),
-        initial_data=_PLENTY,
-        arrival_rate=0.0,
-        quota=slots * space.communication_slots,
-        max_slots=slots,
-    )
+    still: dict[str, Any] = {"uavs": 1, "flying_time": 100, "flight_cost": 0, "pads": None}
+    place: dict[str, Any] = {"zone": (0, 0, 1, 1), "nodes": ((dx, dy),)}
+    data: dict[str, Any] = {"initial_data": _PLENTY, "arrival_rate": 0.0}
+    quota = slots * space.communication_slots
+    return ScenarioSpace.of(space, **still, **place, **data, quota=quota, max_slots=slots)
 
 
 def offsets(space: ScenarioSpace) -> list[tuple[int, int]]:
