@@ -14,6 +14,7 @@ _HOME = {
     "evaluate": "execution.runner",
     "Results": "results.tables",
     "load_results": "results.tables",
+    "resimulate": "results.resimulate",
     "fly": "results.resimulate",
     "summary": "stats.intervals",
     "distribution": "stats.distribution",

@@ -1,12 +1,11 @@
 """What goes with results wherever they are shown, so that anybody can check them.
 
 A page cannot carry all missions of a study. It carries what they were made with, and a sample of
-them whose records can be compared, bit for bit, with those of the same missions flown again.
+them, whose records can be compared, bit for bit, with those of the same missions simulated again.
 """
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
@@ -15,33 +14,22 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, ValidationError, field_validator, model_validator
 
-import dess
 from analysis.results.documents import Document
 from analysis.results.manifest import simulate_command
-from analysis.results.provenance import (
-    Acceptance,
-    Team,
-    code_behind,
-    differing,
-    library_versions,
-    team_of,
-)
-from analysis.results.resimulate import difference, kept
-from analysis.results.store import Store
+from analysis.results.provenance import Origin
+from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from analysis.study.study import load_study, study_names
-from dess import simulate
 from dess.errors import InputError
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace, validation_line
-from policies import load_team
 from policies.registry import TRAINED
 
 SAMPLE = 32  # missions of a study that a page carries
 
 
 class Mission(Document):
-    """A mission of a study: who flew it, what its design point sets, and its record.
+    """A mission of a study: its team, what its design point sets, and its record.
 
     The record has the fields of ``MISSION_RECORD``, and those of the UAVs as ``uav 1 quota``.
     """
@@ -59,7 +47,7 @@ class Mission(Document):
         return record
 
 
-class Evidence(Document):
+class Evidence(Origin):
     """What the results of a study were made with, and some of their missions.
 
     Attributes:
@@ -71,18 +59,9 @@ class Evidence(Document):
 
     study: str
     key: str
-    version: str
-    code: dict[str, str]
-    engine_code: str
-    accepted: list[Acceptance]
-    commit: str | None
-    libraries: dict[str, str]
-    seed: int
     engine: str
     scenario_name: str
     settings: dict[str, Any]
-    scenario: dict[str, Any]
-    policies: list[Team]
     points: int
     missions: tuple[int, int]
     budget: str
@@ -90,9 +69,9 @@ class Evidence(Document):
 
     @model_validator(mode="after")
     def _sample_is_of_the_study(self) -> Self:
-        strange = {mission.policy for mission in self.sample} - {t.policy for t in self.policies}
-        if strange:
-            raise ValueError(f"sample: {min(strange)} is no policy of the study")
+        unknown = {mission.policy for mission in self.sample} - {t.policy for t in self.policies}
+        if unknown:
+            raise ValueError(f"sample: {min(unknown)} is no policy of the study")
         return self
 
     @classmethod
@@ -108,20 +87,12 @@ class Evidence(Document):
         manifest = results.store.manifest
         counts = [n for of_team in manifest.missions for n in of_team]
         return cls(
+            **{name: getattr(manifest, name) for name in Origin.model_fields},
             study=manifest.study["name"],
             key=manifest.key,
-            version=manifest.version,
-            code=manifest.code,
-            engine_code=manifest.engine_code,
-            accepted=manifest.accepted,
-            commit=manifest.commit,
-            libraries=manifest.libraries,
-            seed=manifest.seed,
             engine=manifest.study["engine"],
             scenario_name=manifest.study["scenario"],
             settings=manifest.study["set"],
-            scenario=manifest.scenario,
-            policies=manifest.policies,
             points=len(manifest.points),
             missions=(min(counts), max(counts)),
             budget=_budget(results),
@@ -143,7 +114,7 @@ class Evidence(Document):
     @property
     def text(self) -> str:
         """The evidence as JSON."""
-        return json.dumps(self.model_dump(mode="json", by_alias=True))
+        return json.dumps(self.data)
 
     def command(self, mission: Mission) -> str:
         """The command that simulates a mission of the sample again."""
@@ -168,67 +139,6 @@ class Evidence(Document):
             raise InputError(validation_line(error, f"study {self.study}")) from None
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What came of a check.
-
-    Attributes:
-        what: Was checked: a study, by its name, or something else that goes with pages.
-        compared: How many missions, or files.
-        differing: A line for every one that is another than it was.
-        notes: In what the code at hand is not the one that made the results.
-    """
-
-    what: str
-    compared: int
-    differing: list[str]
-    notes: list[str]
-
-
-def verify(evidence: Evidence, missions: int, seed: int) -> Verdict:
-    """Fly a random part of the sample again, with the SimPy engine, and compare the records.
-
-    Args:
-        evidence: Of the study.
-        missions: How many, at most.
-        seed: Of the choice.
-
-    Raises:
-        InputError: If a policy is not there, or a scenario is none.
-    """
-    notes, differing = _notes(evidence), []
-    chosen = _chosen(len(evidence.sample), missions, seed)
-    for mission in (evidence.sample[number] for number in chosen):
-        team = load_team(mission.policy)
-        record = simulate(evidence.space(mission), team, evidence.seed, mission.replication)
-        if changed := difference(record, mission.record):
-            differing.append(f"{changed}; replay: {evidence.command(mission)}")
-    return Verdict(evidence.study, len(chosen), differing, notes)
-
-
-def verify_logs(store: Store, missions: int, seed: int) -> Verdict:
-    """Fly some of the missions again whose event logs are kept, and compare the logs.
-
-    Args:
-        store: The results folder.
-        missions: How many, at most.
-        seed: Of the choice.
-    """
-    manifest, logged = store.manifest, store.logged
-    differing = []
-    for cell, replication in (logged[n] for n in _chosen(len(logged), missions, seed)):
-        team = load_team(manifest.policies[cell.team].policy)
-        space = manifest.scenarios[cell.point]
-        log = simulate(space, team, manifest.seed, replication, events=True).events
-        held = store.load_log(cell, replication)
-        assert log is not None and held is not None
-        if not held.to_pandas().equals(pd.DataFrame(log.columns())):
-            line = "the event log is another one when flown again"
-            differing.append(f"{line}; replay: {manifest.command(cell, replication)}")
-    name = f"{manifest.study['name']}, event logs"
-    return Verdict(name, min(len(logged), missions), differing, [])
-
-
 def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     """The files of learned policies and their curves, with the hashes of their bytes."""
     kinds = ("*.safetensors", "*.json", "*.parquet")
@@ -238,42 +148,24 @@ def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     return {p.relative_to(folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in paths}
 
 
-def _notes(evidence: Evidence) -> list[str]:
-    """What is not as it was."""
-    notes = []
-    if evidence.version != dess.__version__:
-        notes.append(f"made by dess {evidence.version}, not {dess.__version__}")
-    elif changes := differing(
-        evidence.code, code_behind(team.policy for team in evidence.policies)
-    ):
-        notes.append(f"made by other code of {', '.join(changes)}")
-    changed = [t.policy for t in evidence.policies if t.weights != team_of(t.policy).weights]
-    if changed:
-        notes.append(f"made by other weights of {', '.join(changed)}")
-    ours = library_versions()
-    others = [name for name in ours if evidence.libraries.get(name) != ours[name]]
-    if others:
-        notes.append(f"made with other versions of {', '.join(others)}")
-    return notes
-
-
 def _sample(results: Results, sample: int, seed: int) -> list[Mission]:
     """Missions drawn at random, in the order of the study."""
     missions = pd.concat([results.missions, results.checks], ignore_index=True)
     points = results.store.manifest.points
-    rows = missions.iloc[_chosen(len(missions), sample, seed)]
+    rows = missions.iloc[chosen(len(missions), sample, seed)]
     return [
         Mission(
             policy=row["policy"],
             values=points[row["point"]].values,
             replication=row["replication"],
-            record=kept(results, row["policy"], row["point"], row["replication"]),
+            record=recorded(results, row["policy"], row["point"], row["replication"]),
         )
         for row in rows.to_dict("records")
     ]
 
 
-def _chosen(count: int, most: int, seed: int) -> Sequence[int]:
+def chosen(count: int, most: int, seed: int) -> Sequence[int]:
+    """Some of the numbers 0..count - 1, ``most`` or all of them, drawn at random, in order."""
     numbers = np.random.default_rng(seed).choice(count, min(count, most), replace=False)
     return sorted(numbers.tolist())
 
@@ -286,19 +178,19 @@ def _hash(results: Results) -> int:
 
 
 def _budget(results: Results) -> str:
-    """What part this is of the shipped study of the same name."""
-    ours = dict(results.store.manifest.study)
-    name = ours["name"]
-    if name not in study_names():
+    """The share of the shipped study of the same name, in words."""
+    run = results.store.manifest.study
+    if run["name"] not in study_names():
         return "as asked"
-    whole = load_study(name).model_dump(mode="json")
-    parts = []
-    if {*ours["policies"]} < {*whole["policies"]}:
-        parts.append(f"{len(ours['policies'])} of {len(whole['policies'])} policies")
-    elif {*ours["policies"]} != {*whole["policies"]}:
-        parts.append("other policies")
-    if ours["missions"] != whole["missions"]:
-        parts.append(f"{ours['missions']:,} instead of {whole['missions']:,} missions")
-    told = ("policies", "missions", "description")
-    parts += [f"another {key}" for key in whole if key not in told and ours[key] != whole[key]]
-    return ", ".join(parts) or "full"
+    shipped = load_study(run["name"]).model_dump(mode="json")
+    differences = []
+    if {*run["policies"]} < {*shipped["policies"]}:
+        count, of = len(run["policies"]), len(shipped["policies"])
+        differences.append(f"{count} of {of} policies")
+    elif {*run["policies"]} != {*shipped["policies"]}:
+        differences.append("other policies")
+    if run["missions"] != shipped["missions"]:
+        differences.append(f"{run['missions']:,} instead of {shipped['missions']:,} missions")
+    others = shipped.keys() - {"policies", "missions", "description"}
+    differences += [f"another {k}" for k in shipped if k in others and run[k] != shipped[k]]
+    return ", ".join(differences) or "full"

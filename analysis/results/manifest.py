@@ -13,7 +13,7 @@ import dess
 from analysis.results.documents import Document, read_json
 from analysis.results.provenance import (
     Acceptance,
-    Team,
+    Origin,
     code_behind,
     commit_of_source,
     differing,
@@ -59,31 +59,17 @@ class DesignPoint(Document):
     replication: int = 0
 
 
-class Manifest(Document):
+class Manifest(Origin):
     """What a results folder is about. No clock and no path: equal runs have equal manifests.
 
     Attributes:
-        code: A hash of every module that the records depend on, as of the last run.
-        engine_code: A hash of the code of the engines, as of the first run; it is part of the keys
-            of the cells, like the code of the policies.
-        accepted: The changes of code between the runs, in their order.
-        scenario: The whole scenario that the design points change.
         missions: Wanted of every team and design point; grows where a rule decides it.
         selected: The design point that was selected for every team, if the study selects.
         complete: Whether all of it is there.
     """
 
     schema_version: int
-    version: str
-    code: dict[str, str]
-    engine_code: str
-    accepted: list[Acceptance]
-    commit: str | None
-    libraries: dict[str, str]
-    seed: int
     study: dict[str, Any]
-    scenario: dict[str, Any]
-    policies: list[Team]
     points: list[DesignPoint]
     missions: list[list[int]]
     selected: list[int | None]

@@ -12,7 +12,7 @@ from reports.cli import console
 from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting, with_absolute_paths
 
 if TYPE_CHECKING:
-    from reports.pages.verify import Verdict
+    from reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set
 
@@ -101,7 +101,7 @@ def verify(
         raise typer.Exit(console.fail(f"dess: error: {line}", 1))
 
 
-def _print_verdicts(path: Path, verdicts: "list[Verdict]") -> None:
+def _print_verdicts(path: Path, verdicts: "list[Check]") -> None:
     rows = [[v.what, str(v.compared), str(len(v.differing))] for v in verdicts]
     console.print_table([str(path), "compared", "differing"], rows)
     for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):

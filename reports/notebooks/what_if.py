@@ -29,7 +29,7 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 # %%
 from IPython.display import display
 
-from analysis import fly
+from analysis import resimulate
 from analysis.figures import what_if as figures
 from analysis.figures.missions import mission_figure
 from analysis.names import METRICS
@@ -139,7 +139,7 @@ html.table(what_if_answer.pairing(answers), f"Differences of n = {missions:,} pa
 # %%
 def pictured(point: int, replication: int) -> tuple:
     """A mission of the policy, simulated again: its drawing, alternative text and caption."""
-    mission = fly(study, policy, point, replication)
+    mission = resimulate(study, policy, point, replication)
     caption = what_if_answer.outcome(study, policy, point, replication)
     drawing = mission_figure(mission.events, mission.scenario)
     return drawing, "Map of the mission; battery, residual data and charging", caption

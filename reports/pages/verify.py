@@ -1,18 +1,48 @@
-"""Whether pages and results are what they were: their bytes, and missions flown again."""
+"""Checks of pages and results: their bytes, and the records of missions simulated again.
+
+A page has a checksum of the rest of it, and the evidence of its studies (``Evidence``): what they
+were made with, and some of their missions. Results have all missions, and a hash in every file's
+name. Whoever forges both is found by simulating missions again.
+"""
 
 import json
 import re
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from analysis.results.evidence import Evidence, Verdict, learned_files, verify, verify_logs
+import pandas as pd
+
+import dess
+from analysis.results.evidence import Evidence, chosen, learned_files
+from analysis.results.provenance import code_behind, differing, library_versions, team_of
+from analysis.results.resimulate import difference
 from analysis.results.store import MANIFEST, Store
 from analysis.results.tables import results_of
+from dess import simulate
 from dess.errors import InputError
+from policies import load_team
 from reports.pages.html import FILES, STUDY, embedded
 
 # Where a page carries the checksum of all the rest of it.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
+
+
+@dataclass(frozen=True)
+class Check:
+    """What came of a check.
+
+    Attributes:
+        what: Was checked: a study, by its name, or something else that goes with pages.
+        compared: The number of missions, or files.
+        differing: A line for every one that differs.
+        notes: How the code and libraries differ from those that made the results.
+    """
+
+    what: str
+    compared: int
+    differing: list[str]
+    notes: list[str]
 
 
 def sealed(html: str) -> str:
@@ -26,12 +56,12 @@ def is_sealed(html: str) -> bool:
     return seal is not None and seal[2] == _checksum(html)
 
 
-def verify_page(path: Path, missions: int, seed: int) -> list[Verdict]:
+def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
     """Check a page: its checksum, the learned policies, and missions of its studies.
 
     Args:
         path: The page.
-        missions: How many to fly again, at most, of every study that it shows.
+        missions: How many to simulate again, at most, of every study that it shows.
         seed: Of their choice.
 
     Raises:
@@ -46,60 +76,113 @@ def verify_page(path: Path, missions: int, seed: int) -> list[Verdict]:
     altered = [] if is_sealed(html) else ["the page has been altered"]
     carried = [_files(text, path) for text in embedded(FILES, html)]
     studies = [Evidence.parse(text, str(path)) for text in embedded(STUDY, html)]
-    notes = [] if studies else ["carries no missions to fly again"]
-    flown = [verify(evidence, missions, seed) for evidence in studies]
-    return [Verdict("page", 1, altered, notes), *carried, *flown]
+    notes = [] if studies else ["carries no missions to simulate again"]
+    records = [check_records(evidence, missions, seed) for evidence in studies]
+    return [Check("page", 1, altered, notes), *carried, *records]
 
 
-def verify_results(folder: Path, missions: int, seed: int) -> list[Verdict]:
+def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
     """Check results: the bytes of all files, and missions drawn at random, with logs and without.
 
     Args:
         folder: A results folder, or one that holds such.
-        missions: How many to fly again, at most, of every study.
+        missions: How many to simulate again, at most, of every study.
         seed: Of their choice.
 
     Raises:
         InputError: If there are no results, they are incomplete, or a policy is not there.
     """
-    found = sorted(path.parent for path in folder.rglob(MANIFEST))
-    if not found:
+    folders = sorted(path.parent for path in folder.rglob(MANIFEST))
+    if not folders:
         raise InputError(f"{folder}: holds no results and is no page; {_ALLOWED}")
-    if found == [folder]:
-        return _verify_study(folder, missions, seed)
-    return [verdict for each in found for verdict in _verify_one_of(each, missions, seed)]
+    if folders == [folder]:
+        return _check_study(folder, missions, seed)
+    return [check for each in folders for check in _check_one_of(each, missions, seed)]
 
 
 _ALLOWED = "allowed: a page of dess report, or a results folder"
 
 
-def _verify_one_of(folder: Path, missions: int, seed: int) -> list[Verdict]:
+def _check_one_of(folder: Path, missions: int, seed: int) -> list[Check]:
     """Check one of several: what cannot be read differs, what is incomplete is noted."""
     try:
         if not Store.read(folder).manifest.complete:
-            return [Verdict(str(folder), 0, [], ["incomplete, so not checked"])]
-        return _verify_study(folder, missions, seed)
+            return [Check(str(folder), 0, [], ["incomplete, so not checked"])]
+        return _check_study(folder, missions, seed)
     except InputError as error:
-        return [Verdict(str(folder), 0, [str(error)], [])]
+        return [Check(str(folder), 0, [str(error)], [])]
 
 
-def _verify_study(folder: Path, missions: int, seed: int) -> list[Verdict]:
+def _check_study(folder: Path, missions: int, seed: int) -> list[Check]:
     store = Store.read(folder)
     if store.damaged:
         lines = [f"{path}: is not what was written" for path in store.damaged]
-        return [Verdict(store.manifest.study["name"], 0, lines, [])]
-    flown = verify(Evidence.of(results_of(store), missions, seed), missions, seed)
-    return [flown, verify_logs(store, missions, seed)] if store.logged else [flown]
+        return [Check(store.manifest.study["name"], 0, lines, [])]
+    records = check_records(Evidence.of(results_of(store), missions, seed), missions, seed)
+    return [records, _check_logs(store, missions, seed)] if store.logged else [records]
 
 
-def _files(text: str, path: Path) -> Verdict:
+def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
+    """Simulate a random part of the sample again, with the SimPy engine, and compare the records.
+
+    Args:
+        evidence: Of the study.
+        missions: How many, at most.
+        seed: Of the choice.
+
+    Raises:
+        InputError: If a policy does not exist, or a scenario is not valid.
+    """
+    notes, lines = _notes(evidence), []
+    numbers = chosen(len(evidence.sample), missions, seed)
+    for mission in (evidence.sample[number] for number in numbers):
+        team = load_team(mission.policy)
+        record = simulate(evidence.space(mission), team, evidence.seed, mission.replication)
+        if changed := difference(record, mission.record):
+            lines.append(f"{changed}; command: {evidence.command(mission)}")
+    return Check(evidence.study, len(numbers), lines, notes)
+
+
+def _check_logs(store: Store, missions: int, seed: int) -> Check:
+    """Simulate some of the missions again whose event logs are kept, and compare the logs."""
+    manifest, logged, lines = store.manifest, store.logged, []
+    for cell, replication in (logged[n] for n in chosen(len(logged), missions, seed)):
+        team = load_team(manifest.policies[cell.team].policy)
+        space = manifest.scenarios[cell.point]
+        log = simulate(space, team, manifest.seed, replication, events=True).events
+        stored = store.load_log(cell, replication)
+        assert log is not None and stored is not None
+        if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
+            line = "the event log is another one when simulated again"
+            lines.append(f"{line}; command: {manifest.command(cell, replication)}")
+    return Check(f"{manifest.study['name']}, event logs", min(len(logged), missions), lines, [])
+
+
+def _notes(evidence: Evidence) -> list[str]:
+    """How the code and libraries differ from those that made the results."""
+    notes, teams = [], evidence.policies
+    if evidence.version != dess.__version__:
+        notes.append(f"made by dess {evidence.version}, not {dess.__version__}")
+    elif changes := differing(evidence.code, code_behind(team.policy for team in teams)):
+        notes.append(f"made by other code of {', '.join(changes)}")
+    if changed := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
+        notes.append(f"made by other weights of {', '.join(changed)}")
+    versions = library_versions()
+    if others := [name for name in versions if evidence.libraries.get(name) != versions[name]]:
+        notes.append(f"made with other versions of {', '.join(others)}")
+    return notes
+
+
+def _files(text: str, path: Path) -> Check:
     try:
         files = {str(name): str(digest) for name, digest in json.loads(text).items()}
     except (ValueError, AttributeError):
         raise InputError(f"{path}: its list of files is none; {_ALLOWED}") from None
-    ours = learned_files()
-    differing = [f"{name}: is another one here" for name in files if ours.get(name) != files[name]]
-    return Verdict("learned policies", len(files), differing, [])
+    shipped = learned_files()
+    others = [name for name in files if shipped.get(name) != files[name]]
+    return Check(
+        "learned policies", len(files), [f"{name}: is another one here" for name in others], []
+    )
 
 
 def _checksum(html: str) -> str:

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis import load_study, run_study
-from analysis.results.evidence import Evidence, learned_files, verify
+from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import load_results
 from dess.errors import InputError
 from policies.registry import TRAINED
@@ -20,7 +20,7 @@ from reports.pages.html import STUDY, embedded
 from reports.pages.index import index_of, pages_in
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import render
-from reports.pages.verify import sealed, verify_page, verify_results
+from reports.pages.verify import check_records, sealed, verify_page, verify_results
 
 ALL = 10**6
 
@@ -72,7 +72,7 @@ def test_another_number_on_a_page_is_found(page: Path, tmp_path: Path) -> None:
     assert lines_of(forged) == ["the page has been altered"]
 
 
-def test_a_page_whose_missions_were_altered_is_found_by_flying_them(
+def test_a_page_whose_missions_were_altered_is_found_by_simulating_them(
     page: Path, tmp_path: Path
 ) -> None:
     """Even where the checksum was made anew."""
@@ -99,7 +99,7 @@ def test_a_file_of_results_that_was_altered_is_found(results: Path, tmp_path: Pa
     assert lines_of(folder) == []
 
 
-def test_a_forged_record_is_found_by_flying_its_mission(results: Path, tmp_path: Path) -> None:
+def test_a_forged_record_is_found_by_simulating_its_mission(results: Path, tmp_path: Path) -> None:
     """A file that is sound in itself, with the name that belongs to its bytes."""
     folder = shutil.copytree(results / "table4", tmp_path / "table4")
     path = sorted((folder / "missions").rglob("*.parquet"))[0]
@@ -155,7 +155,7 @@ def test_a_page_without_missions_or_with_few_fields_says_so(page: Path, tmp_path
     bare = tmp_path / "bare.html"
     bare.write_text(sealed('<meta name="dess-checksum" content="">'))
     (verdict,) = verify_page(bare, ALL, 0)
-    assert verdict.notes == ["carries no missions to fly again"]
+    assert verdict.notes == ["carries no missions to simulate again"]
     text = embedded(STUDY, page.read_text("utf-8"))[0]
     for field, value in (("sample", []), ("policies", json.loads(text)["policies"][1:])):
         evidence = json.loads(text) | {field: value}
@@ -217,20 +217,20 @@ def _digests(folder: Path) -> tuple[str, str]:
 
 def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: Path) -> None:
     evidence = Evidence.of(load_results(results / "table4"))
-    assert verify(evidence, ALL, 0).notes == []
+    assert check_records(evidence, ALL, 0).notes == []
     team = evidence.policies[0]
     member = team.members[0].model_copy(update={"weights": "other"})
     other = team.model_copy(update={"members": [member]})
     code = evidence.code | {"dess.rules": "other", "policies.guard": "other"}
     changes = {"code": code, "policies": [other, *evidence.policies[1:]]}
-    found = verify(evidence.model_copy(update=changes), ALL, 0)
+    found = check_records(evidence.model_copy(update=changes), ALL, 0)
     assert found.notes == [
         "made by other code of dess.rules, policies.guard",
         "made by other weights of random",
     ]
     assert found.differing == []
     older = evidence.model_copy(update={"version": "0.0.1"})
-    assert verify(older, ALL, 0).notes[0].startswith("made by dess 0.0.1, not ")
+    assert check_records(older, ALL, 0).notes[0].startswith("made by dess 0.0.1, not ")
 
 
 def test_the_sample_is_drawn_at_random(results: Path) -> None:
