@@ -1,7 +1,4 @@
-"""Figures of one policy against another on the same missions, and of what decisions cost.
-
-Each returns a figure of its own; nothing touches pyplot's state.
-"""
+"""Figures of one policy against another in the same missions, and of what decisions cost."""
 
 from collections.abc import Sequence
 
@@ -48,18 +45,10 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         ax.axhline(overall, color=MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall")
         for row in rows.itertuples():
             colour = COLOURS[row.verdict]
-            ax.errorbar(
-                row.position,
-                row.mean,
-                yerr=[[row.mean - row.low], [row.high - row.mean]],
-                fmt="o",
-                markersize=6,
-                color=colour,
-                markerfacecolor="white" if row.verdict == INCONCLUSIVE else colour,
-                capsize=4,
-                elinewidth=1.8,
-                gid=row.verdict,
-            )
+            ax.errorbar(row.position, row.mean, yerr=[[row.mean - row.low], [row.high - row.mean]],
+                        markerfacecolor="white" if row.verdict == INCONCLUSIVE else colour,
+                        fmt="o", markersize=6, color=colour, capsize=4, elinewidth=1.8,
+                        gid=row.verdict)  # fmt: skip
         ax.set(title=parameter(field).label, ylabel="mean difference [points]")
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
@@ -83,32 +72,23 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     grid[table["position"], table["position_2"]] = table["mean"]
     widest = max(float(np.nanmax(np.abs(grid))), 0.01)
     with style():
-        height = 1.5 + 0.55 * len(names)
-        figure, ax = panels(height)
+        figure, ax = panels(1.5 + 0.55 * len(names))
         ax.grid(False)
         colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
         ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
                       edgecolors="white", linewidth=2)  # fmt: skip
         for row in table.itertuples():
-            text = f"{100 * row.mean:+.1f}".replace("-", "−")
-            ax.annotate(
-                f"({text})" if row.verdict == INCONCLUSIVE else text,
-                (row.position_2 + 0.5, row.position + 0.5),
-                ha="center",
-                va="center",
-                fontsize=10,
-                gid=row.verdict,
-                path_effects=[withStroke(linewidth=2.5, foreground="white")],
-            )
+            text = numbers.difference(row.mean, 0)
+            ax.annotate(f"({text})" if row.verdict == INCONCLUSIVE else text,
+                        (row.position_2 + 0.5, row.position + 0.5), ha="center", va="center",
+                        fontsize=10, gid=row.verdict,
+                        path_effects=[withStroke(linewidth=2.5, foreground="white")])  # fmt: skip
         ax.set_xticks(np.arange(len(names_2)) + 0.5, names_2)
         ax.set_yticks(np.arange(len(names)) + 0.5, names)
         ax.invert_yaxis()
         ax.tick_params(length=0)
-        ax.set(
-            xlabel=parameter(second).label,
-            ylabel=parameter(first).label,
-            title="Mean difference [points]",
-        )
+        ax.set(xlabel=parameter(second).label, ylabel=parameter(first).label)
+        ax.set_title("Mean difference [points]")
         sns.despine(ax=ax, left=True, bottom=True)
     return figure
 
@@ -120,8 +100,8 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     ``EDGE`` of the missions lie beyond.
 
     Args:
-        missions: Rows of ``analysis.questions.head_to_head.duels``.
-        pair: Of whom.
+        missions: Rows of ``questions.head_to_head.duels``.
+        pair: The policies.
     """
     values = np.sort(missions["difference"].to_numpy(float))
     shares = np.arange(1, len(values) + 1) / len(values)
@@ -141,7 +121,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         )
         ax.step(x, y, where="post", color=INK, linewidth=1.8, gid="shares")
         for x_text, side, outcome in ((0, "left", BEHIND), (1, "right", AHEAD)):
-            share = (values < 0).mean() if outcome == BEHIND else (values > 0).mean()
+            share = (values < 0 if outcome == BEHIND else values > 0).mean()
             ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (x_text, 1.03), ha=side,
                         xycoords="axes fraction", color=COLOURS[outcome], gid=outcome)  # fmt: skip
         ax.set_title("Difference in every mission", pad=22)
@@ -160,7 +140,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
     that 95 % of them keep below; a diamond is a UAV's share of a call with those of many missions.
 
     Args:
-        costs: Of a ``analysis.execution.decision_time.Timing``.
+        costs: Those of an ``execution.decision_time.Timing``.
         policies: All policies of the study: they give every policy its colour on all pages.
     """
     colours = policy_colours([*policies, *(cost.policy for cost in costs)])

@@ -1,19 +1,16 @@
-"""Figures of a question: the variation beside its baseline.
-
-Each returns a figure of its own; nothing touches pyplot's state.
-"""
+"""Figures of a what-if question: the variation beside its baseline."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 import seaborn as sns
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from analysis.figures.style import (
     INK,
+    LINES,
     MUTED,
     arms,
     dot,
@@ -22,6 +19,7 @@ from analysis.figures.style import (
     points_axis,
     policy_colours,
     round_ticks,
+    shifts,
     style,
 )
 from analysis.names import METRICS
@@ -35,7 +33,7 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     """A metric of every policy in the baseline and in the variation, with intervals.
 
     Args:
-        table: Rows of ``analysis.questions.what_if.means``.
+        table: Rows of ``questions.what_if_answer.means``.
         metric: One of ``METRICS``.
         settings: Of baseline and variation: what is set, in words.
     """
@@ -44,9 +42,11 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     colours = policy_colours(rows["policy"])
     with style():
         figure, ax = panels(4.1)
-        for policy, shift in zip(policies, _apart(len(policies), 0.05), strict=True):
-            own = rows[rows["policy"] == policy].sort_values("point")
-            ax.errorbar(own["point"] + shift, own["mean"], yerr=arms(own), linewidth=1,
+        for policy, shift in zip(
+            policies, shifts(len(policies), 0.025 * (len(policies) - 1)), strict=True
+        ):
+            sides = rows[rows["policy"] == policy].sort_values("point")
+            ax.errorbar(sides["point"] + shift, sides["mean"], yerr=arms(sides), linewidth=1,
                         label=policy, **dot(policy, colours))  # fmt: skip
         ax.set(title=METRICS[metric], xlim=(-0.45, 1.45), ylim=_ends(rows))
         ticks = ["\n".join((s, *words)) for s, words in zip(SIDES, settings, strict=True)]
@@ -63,7 +63,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     """The paired differences of the metrics of every policy, with intervals.
 
     Args:
-        answers: Rows of ``analysis.questions.what_if.answers``.
+        answers: Rows of ``questions.what_if_answer.answers``.
     """
     rows = answers[answers["metric"].isin([*METRICS])].rename(columns={"difference": "mean"})
     policies = list(dict.fromkeys(rows["policy"]))
@@ -71,15 +71,17 @@ def gains(answers: pd.DataFrame) -> Figure:
     with style():
         height = 1.6 + len(METRICS) * (0.35 + 0.22 * len(policies))
         figure, ax = panels(height)
-        for policy, shift in zip(policies, _apart(len(policies), 0.11), strict=True):
-            own = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
-            ax.errorbar(own["mean"], np.arange(len(METRICS)) + shift, xerr=arms(own),
+        for policy, shift in zip(
+            policies, shifts(len(policies), 0.055 * (len(policies) - 1)), strict=True
+        ):
+            changes = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
+            ax.errorbar(changes["mean"], np.arange(len(METRICS)) + shift, xerr=arms(changes),
                         linestyle="", label=policy, **dot(policy, colours))  # fmt: skip
         ax.axvline(0, color=INK, linewidth=0.9, zorder=1)
         ax.set_yticks(range(len(METRICS)), map(_broken, METRICS.values()))
         ax.set(title="Variation − baseline, mission by mission", xlabel="percentage points",
                ylim=(len(METRICS) - 0.5, -0.5))  # fmt: skip
-        _points_axis(ax)
+        points_axis(ax.xaxis, 7)
         ax.grid(axis="y", visible=False)
         sns.despine(ax=ax, left=True)
         legend_below(figure, ax)
@@ -90,37 +92,32 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     """The distribution of the paired differences of every policy: all, and those in the middle.
 
     Args:
-        differences: Per policy, as of ``analysis.questions.what_if.differences``.
+        differences: Per policy, as of ``questions.what_if_answer.differences``.
     """
     colours = policy_colours(differences)
     tails = (1 - MIDDLE) / 2
-    ends = np.array([own.quantile([tails, 1 - tails]) for own in differences.values()])
+    ends = np.array([gaps.quantile([tails, 1 - tails]) for gaps in differences.values()])
     low, high = min(ends[:, 0].min(), 0.0), max(ends[:, 1].max(), 0.0)
     room = max(0.04 * (high - low), 0.002)
     with style():
         figure, axes = panels(5.6, 2, sharey=True)
         titles = ("Share of missions with that difference or less", "The same, near the middle")
         for ax, title in zip(axes, titles, strict=True):
-            for number, (policy, own) in enumerate(differences.items()):
-                values = np.sort(own.to_numpy(float))
+            for number, (policy, gaps) in enumerate(differences.items()):
+                values = np.sort(gaps.to_numpy(float))
                 shares = np.arange(1, len(values) + 1) / len(values)
-                line = ("-", "--", ":", "-.")[number % 4]
                 ax.step([values[0], *values], [0, *shares], where="post", label=policy,
-                        color=colours[policy][0], linestyle=line, linewidth=1.7)  # fmt: skip
+                        color=colours[policy][0], linestyle=LINES[number % 4],
+                        linewidth=1.7)  # fmt: skip
             ax.axvline(0, color=INK, linewidth=0.9, zorder=1)
             ax.axhline(0.5, color=MUTED, linewidth=0.9, linestyle=":", zorder=1)
             ax.set(title=title, ylim=(-0.02, 1.02))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-            _points_axis(ax)
+            points_axis(ax.xaxis, 7)
             sns.despine(ax=ax)
         axes[1].set(xlim=(low - room, high + room), xlabel="percentage points")
         legend_below(figure, axes[0])
     return figure
-
-
-def _apart(count: int, step: float) -> np.ndarray:
-    """Where things of one spot are drawn so that they do not hide each other."""
-    return step * (np.arange(count) - (count - 1) / 2)
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:
@@ -128,10 +125,6 @@ def _ends(rows: pd.DataFrame) -> tuple[float, float]:
     low, high = rows["low"].min(), rows["high"].max()
     room = max(0.08 * (high - low), (0.05 - (high - low)) / 2, 0.005)
     return low - room, high + room
-
-
-def _points_axis(ax: Axes) -> None:
-    points_axis(ax.xaxis, 7)
 
 
 def _broken(name: str) -> str:

@@ -26,7 +26,7 @@ from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 from dess.errors import InputError
 
-AHEAD, EVEN, BEHIND = "ahead", "level", "behind"  # in one mission; of many it may be INCONCLUSIVE
+AHEAD, BEHIND = "ahead", "behind"
 OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
 
 _VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}

@@ -100,7 +100,7 @@ def dependence(missions: pd.DataFrame) -> pd.DataFrame:
     Returns:
         A row per parameter that varies, the one that explains most first: ``field``, ``explained``
         (share of the variance between the bins of ``along``), ``p`` (Alexander and Govern's test
-        of equal means, which lets the variances differ; 1 where there is too little to test) and
+        of equal means, which lets the variances differ; 1 where the data are too few) and
         ``p_adjusted`` (Holm).
     """
     rows = []
@@ -244,7 +244,7 @@ def _leaves(
     """The leaves below a node, each with the range (low, high] of every field that is split."""
     box = box or {}
     left, right = tree.children_left[node], tree.children_right[node]
-    if left == right:  # there are none
+    if left == right:  # a leaf
         yield node, box
         return
     field, split = fields[tree.feature[node]], float(tree.threshold[node])
