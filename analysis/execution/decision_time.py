@@ -1,6 +1,6 @@
-"""What a decision costs in time: measured by a command and kept, for whoever tells of it.
+"""What a decision costs in time: measured by a command, and kept in a file that pages read.
 
-A time is another one whenever it is taken, so no report takes any.
+A time differs whenever it is measured, so no report measures any.
 """
 
 import json
@@ -83,7 +83,7 @@ class Timing(Document):
         threads: That the libraries were allowed.
         scenario: The name of the scenario.
         constants: What it says.
-        missions: Flown by every policy: replications 0, 1, ... of the seed.
+        missions: Number per policy: replications 0, 1, ... of the seed.
     """
 
     schema_version: int
@@ -104,7 +104,7 @@ class Timing(Document):
     def _fits_together(self) -> Self:
         names = [cost.policy for cost in self.costs]
         if len({*names}) < len(names):
-            raise ValueError("costs: a policy is there twice")
+            raise ValueError("costs: a policy is listed twice")
         ScenarioSpace.of(**self.constants)
         return self
 
@@ -131,13 +131,13 @@ def measure(
 
     One mission at a time in the SimPy engine, then all at once in the batch engine. The policies
     take turns, so that a machine that slows down for a while slows down all of them. The first
-    mission, and the first round of the batch, are flown once before to warm up.
+    mission, and the first round of the batch, are simulated once before to warm up.
 
     Args:
         policies: The teams, by name.
         scenario: Name or file of the scenario.
         seed: Of the missions.
-        missions: How many every policy flies.
+        missions: Number of missions per policy.
         clock: Tells the time [s].
         progress: Called after every step.
 
@@ -153,7 +153,7 @@ def measure(
     teams = {name: _Team(name, clock) for name in dict.fromkeys(policies)}
     steps = len(teams) * (1 + missions + 1 + ROUNDS)
     with threadpool_limits(THREADS):
-        for done, _ in enumerate(_flights(teams.values(), space, seed, missions), 1):
+        for done, _ in enumerate(_steps(teams.values(), space, seed, missions), 1):
             if progress:
                 progress(done, steps)
     return Timing(
@@ -234,7 +234,7 @@ def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bo
 
 
 def unlike(timing: Timing, manifest: Manifest) -> list[str]:
-    """The policies of a study that were not timed as they flew it: with other code or weights."""
+    """The policies of a study that were timed with other code or weights than the study has."""
     timed = {cost.policy: cost.members for cost in timing.costs}
     if timing.code != manifest.engine_code:
         return [team.policy for team in manifest.policies if team.policy in timed]
@@ -291,10 +291,10 @@ class _Team:
         )
 
 
-def _flights(
+def _steps(
     teams: Iterable[_Team], space: ScenarioSpace, seed: int, missions: int
 ) -> Iterator[None]:
-    """Fly all that is measured, step by step."""
+    """Simulate all that is measured, step by step."""
     for number, replication in enumerate([0, *range(missions)]):
         for team in teams:
             simulate(space, team.policies, seed, replication)

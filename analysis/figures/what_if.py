@@ -42,9 +42,8 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     colours = policy_colours(rows["policy"])
     with style():
         figure, ax = panels(4.1)
-        for policy, shift in zip(
-            policies, shifts(len(policies), 0.025 * (len(policies) - 1)), strict=True
-        ):
+        offsets = shifts(len(policies), 0.025 * (len(policies) - 1))
+        for policy, shift in zip(policies, offsets, strict=True):
             sides = rows[rows["policy"] == policy].sort_values("point")
             ax.errorbar(sides["point"] + shift, sides["mean"], yerr=arms(sides), linewidth=1,
                         label=policy, **dot(policy, colours))  # fmt: skip
@@ -69,11 +68,9 @@ def gains(answers: pd.DataFrame) -> Figure:
     policies = list(dict.fromkeys(rows["policy"]))
     colours = policy_colours(rows["policy"])
     with style():
-        height = 1.6 + len(METRICS) * (0.35 + 0.22 * len(policies))
-        figure, ax = panels(height)
-        for policy, shift in zip(
-            policies, shifts(len(policies), 0.055 * (len(policies) - 1)), strict=True
-        ):
+        figure, ax = panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(policies)))
+        offsets = shifts(len(policies), 0.055 * (len(policies) - 1))
+        for policy, shift in zip(policies, offsets, strict=True):
             changes = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
             ax.errorbar(changes["mean"], np.arange(len(METRICS)) + shift, xerr=arms(changes),
                         linestyle="", label=policy, **dot(policy, colours))  # fmt: skip

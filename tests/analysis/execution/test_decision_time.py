@@ -176,10 +176,10 @@ def test_what_is_missing_or_no_json_is_refused_in_a_line(tmp_path):
         decision_time.read(tmp_path)
 
 
-def test_a_policy_that_is_there_twice_is_refused(measured, tmp_path):
+def test_a_policy_that_is_listed_twice_is_refused(measured, tmp_path):
     data = json.loads(measured.model_dump_json(by_alias=True))
     (tmp_path / "timing.json").write_text(json.dumps(data | {"costs": data["costs"][:1] * 2}))
-    with pytest.raises(InputError, match="costs: a policy is there twice"):
+    with pytest.raises(InputError, match="costs: a policy is listed twice"):
         decision_time.read(tmp_path)
 
 
