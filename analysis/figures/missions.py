@@ -46,9 +46,9 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     colours = np.array([*node_colours(len(scenario.nodes)), MUTED])  # the last for node -1
     offsets = shifts(scenario.uavs, SPREAD / 2)
     _grid(scenario, ax)
-    for uav, flown in slots.groupby("uav"):
-        shifted = flown.assign(
-            **{column: flown[column] + offsets[uav] for column in ("from_x", "from_y", "x", "y")}
+    for uav, of_uav in slots.groupby("uav"):
+        shifted = of_uav.assign(
+            **{column: of_uav[column] + offsets[uav] for column in ("from_x", "from_y", "x", "y")}
         )
         colour = uav_colours(scenario.uavs)[uav]
         _trail(shifted, colour, ax)

@@ -34,7 +34,7 @@ class Shape:
 
     Two values differ if their Holm-adjusted p-value is at most 1 - ``LEVEL``. Without any that do
     it stays level; if all differences have one sign it rises or falls; if no two before a value
-    fall and no two behind it rise, it rises to there, then falls; and the other way round.
+    fall and no two behind it rise, it rises to that value, then falls; and the other way round.
 
     Attributes:
         words: One of ``LEVELS``, ``RISES``, ``FALLS``, ``PEAK``, ``VALLEY``, ``IRREGULAR``.

@@ -11,8 +11,8 @@ from analysis.study.design import NOISE
 from tests.analysis.questions.test_main_effects import pairs_of
 
 VALUES = {"initial_data": ["5–7.5", "7.5–10", "10–12.5"], "uavs": ["1", "2"]}
-CHANGES = {"ours": pairs_of([0.1, -0.2]), "theirs": pairs_of([0.05, 0.01])}
-POLICIES = ["other", "ours", "theirs"]
+CHANGES = {"mine": pairs_of([0.1, -0.2]), "other": pairs_of([0.05, 0.01])}
+POLICIES = ["third", "mine", "other"]
 
 
 @pytest.fixture(scope="module")
@@ -46,17 +46,19 @@ def test_a_panel_per_metric_shows_means_and_intervals(table, panels):
     for ax, (metric, name) in zip(panels, METRICS.items(), strict=False):
         assert ax.get_title(loc="left") == name
         for bar, policy in zip(ax.containers, CHANGES, strict=True):
-            own = rows[(rows["metric"] == metric) & (rows["policy"] == policy)]
-            assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
-            assert [round(x) for x in bar.lines[0].get_xdata()] == own["position"].tolist()
-            assert segments(bar) == pytest.approx(own[["low", "high"]].to_numpy())
+            means = rows[(rows["metric"] == metric) & (rows["policy"] == policy)]
+            assert bar.lines[0].get_ydata() == pytest.approx(means["mean"])
+            assert [round(x) for x in bar.lines[0].get_xdata()] == means["position"].tolist()
+            assert segments(bar) == pytest.approx(means[["low", "high"]].to_numpy())
 
 
 def test_the_last_panel_shows_the_changes_from_the_first_value(panels):
     for bar, pairs in zip(panels[-1].containers, CHANGES.values(), strict=True):
-        own = pairs[pairs["first"] == 0]
-        assert bar.lines[0].get_ydata() == pytest.approx([0, *own["difference"]])
-        assert segments(bar) == pytest.approx(np.array([[0, 0], *own[["low", "high"]].to_numpy()]))
+        steps = pairs[pairs["first"] == 0]
+        assert bar.lines[0].get_ydata() == pytest.approx([0, *steps["difference"]])
+        assert segments(bar) == pytest.approx(
+            np.array([[0, 0], *means[["low", "high"]].to_numpy()])
+        )
     assert "5–7.5" in panels[-1].get_title(loc="left")
 
 
@@ -69,16 +71,16 @@ def test_values_are_named_and_ranges_are_ranges(panels):
 def test_metrics_have_the_same_axes_for_all_parameters(table, panels):
     changes = {policy: pairs_of([0.5]) for policy in CHANGES}
     others = parameters.effect(table, "uavs", changes, POLICIES).axes
-    for ours, theirs, metric in zip(panels[:3], others[:3], METRICS, strict=True):
-        assert ours.get_ylim() == theirs.get_ylim()
+    for first, second, metric in zip(panels[:3], others[:3], METRICS, strict=True):
+        assert first.get_ylim() == second.get_ylim()
         rows = table[table["metric"] == metric]
-        assert ours.get_ylim()[0] < rows["low"].min() < rows["high"].max() < ours.get_ylim()[1]
+        assert first.get_ylim()[0] < rows["low"].min() < rows["high"].max() < first.get_ylim()[1]
     assert others[-1].get_xlabel() == "Number of UAVs"
 
 
 def test_a_policy_keeps_its_colour_whoever_else_is_drawn(table, panels):
-    alone = table[table["policy"] == "theirs"]
-    changes = {"theirs": CHANGES["theirs"]}
+    alone = table[table["policy"] == "other"]
+    changes = {"other": CHANGES["other"]}
     other = parameters.effect(alone, "initial_data", changes, POLICIES).axes[0]
     (mine,) = other.containers
     assert mine.lines[0].get_color() == panels[0].containers[1].lines[0].get_color()
@@ -95,7 +97,7 @@ def indices():
 
 
 def test_sensitivities_are_bars_with_intervals(indices):
-    (ax,) = parameters.sensitivity(indices, "ours").axes
+    (ax,) = parameters.sensitivity(indices, "mine").axes
     bars = [c for c in ax.containers if hasattr(c, "patches")]
     for bar, index in zip(bars, ("first", "total"), strict=True):
         assert [patch.get_width() for patch in bar.patches] == pytest.approx(indices[index])
@@ -110,5 +112,5 @@ def test_sensitivities_are_bars_with_intervals(indices):
 def test_figures_leave_no_state_behind(table, indices):
     before = dict(mpl.rcParams)
     parameters.effect(table, "initial_data", CHANGES, POLICIES)
-    parameters.sensitivity(indices, "ours")
+    parameters.sensitivity(indices, "mine")
     assert dict(mpl.rcParams) == before

@@ -11,7 +11,7 @@ from analysis.names import METRICS
 
 
 def summary(by: dict[str, list[Any]]) -> pd.DataFrame:
-    """Rows as of ``analysis.summary``, with numbers of their own in every one."""
+    """Rows as of ``analysis.summary``, with different numbers."""
     rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
     mean = np.linspace(0.2, 0.8, len(rows))
     return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
@@ -37,8 +37,8 @@ def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
     (ax,) = policies.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
     rows = table[table["metric"] == "success"]
     assert len(ax.containers) == 2
-    for bar, (_, own) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
-        assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
+    for bar, (_, means) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
+        assert bar.lines[0].get_ydata() == pytest.approx(means["mean"])
         assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
     (printed,) = (line for line in ax.lines if line.get_label() == "paper")
     assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])

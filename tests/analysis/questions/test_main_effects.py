@@ -52,9 +52,9 @@ def test_effects_are_the_means_by_value(results, table):
         ["initial_data", 2, "2–20"],
     ]
     row = table.query("field == 'initial_data' and position == 2 and policy == 'random'")
-    ours = results.missions.query("point == 4 and policy == 'random'")
+    missions = results.missions.query("point == 4 and policy == 'random'")
     ends = row.set_index("metric").loc["reward", ["mean", "low", "high"]]
-    assert tuple(ends) == mean_interval(ours["reward"])
+    assert tuple(ends) == mean_interval(missions["reward"])
 
 
 def test_a_design_of_several_fields_is_refused(tmp_path):
@@ -66,8 +66,8 @@ def test_a_design_of_several_fields_is_refused(tmp_path):
 def test_changes_are_paired_by_replication(results, table):
     pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
     assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
-    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    gaps = ours.loc[4, "collection_ratio"] - ours.loc[3, "collection_ratio"]
+    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
     ends = mean_interval(gaps)
     assert pairs.loc[2, ["difference", "low", "high"]].tolist() == pytest.approx(list(ends))
     assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
@@ -77,8 +77,8 @@ def test_changes_are_paired_by_replication(results, table):
 def test_intervals_that_hold_at_once_are_wider(results, table):
     """By Bonferroni: three pairs, each at 1 - 0.05 / 3."""
     pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
-    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    gaps = ours.loc[4, "collection_ratio"] - ours.loc[3, "collection_ratio"]
+    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
     _, low, high = mean_interval(gaps, 1 - 0.05 / 3)
     assert pairs.loc[2, ["wide_low", "wide_high"]].tolist() == pytest.approx([low, high])
     assert (pairs["wide_low"] < pairs["low"]).all() and (pairs["high"] < pairs["wide_high"]).all()
@@ -87,8 +87,8 @@ def test_intervals_that_hold_at_once_are_wider(results, table):
 def test_successes_are_compared_as_shares(results, table):
     """So that equal outcomes still have an interval."""
     pairs = main_effects.changes(results, table, "greedy", "uavs", "success")
-    ours = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    of = (ours.loc[point, "success"].to_numpy(float) for point in (1, 0))
+    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    of = (missions.loc[point, "success"].to_numpy(float) for point in (1, 0))
     expected = paired(*of, share=True)
     assert pairs.loc[0, ["low", "high"]].tolist() == pytest.approx([expected.low, expected.high])
     assert expected.low < pairs.loc[0, "difference"] < expected.high
