@@ -1,8 +1,11 @@
-"""A mission replayed in its page: play, pause, and a slider over the mission slots.
+"""A mission to play in its page, slot by slot: buttons, and a slider over the mission slots.
 
-A page shows ``library()`` once, before its first ``player``; together they are all that it needs,
-nothing is loaded. A player is a plotly figure with a frame per mission slot: frame t shows the
-mission after t slots, frame 0 its start, the last one its end.
+A page shows ``library()`` once, before its first ``player``, and then requests nothing. A player
+is a plotly figure with a frame per mission slot: frame t shows the mission after t slots, frame 0
+its start, the last one its end.
+
+    display(library())
+    display(player(log, scenario, "player-1", "One UAV"))
 """
 
 from html import escape
@@ -29,8 +32,8 @@ READING = (
 
 
 def library() -> HTML:
-    """The drawing library, plotly.js: once in a page, before its players."""
-    # plotly rejects, for no reason and unheard, the promise of a replay that is paused.
+    """The library plotly.js: once in a page, before its players."""
+    # A paused animation rejects its promise without a reason, which the console would report.
     quiet = """window.addEventListener("unhandledrejection", (event) => {
         if (event.reason === undefined) event.preventDefault();
     });"""
@@ -40,14 +43,14 @@ def library() -> HTML:
 def player(
     events: Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
 ) -> HTML:
-    """A mission to play, to pause and to leaf through, slot by slot.
+    """A mission to play, to pause and to step through, slot by slot.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
         scenario: The mission's scenario.
         name: The player's id, unique in its page: letters, digits and hyphens.
-        title: What stands above the map.
-        caption: What stands below the figure; ``READING`` tells how to read it.
+        title: The text above the map.
+        caption: The text below the figure; ``READING`` says how to read it.
 
     Raises:
         InputError: If the log is not that of a whole mission of this scenario.

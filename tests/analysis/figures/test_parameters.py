@@ -56,9 +56,8 @@ def test_the_last_panel_shows_the_changes_from_the_first_value(panels):
     for bar, pairs in zip(panels[-1].containers, CHANGES.values(), strict=True):
         steps = pairs[pairs["first"] == 0]
         assert bar.lines[0].get_ydata() == pytest.approx([0, *steps["difference"]])
-        assert segments(bar) == pytest.approx(
-            np.array([[0, 0], *means[["low", "high"]].to_numpy()])
-        )
+        ends = [[0, 0], *steps[["low", "high"]].to_numpy()]
+        assert segments(bar) == pytest.approx(np.array(ends))
     assert "5–7.5" in panels[-1].get_title(loc="left")
 
 
