@@ -303,11 +303,11 @@ def _lower_batteries(missions, uavs, residual, environments, draws):
         mission, data = missions[environments[n]], residual[environments[n]]
         span = mission.charge_start - 5 + 1
         battery = min(5 + int(draws[n, 0] * span), mission.charge_start)
-        flown = max(mission.flying_time - battery, 0)
+        slots_flown = max(mission.flying_time - battery, 0)
         for i in range(mission.uavs):
             u = uavs[environments[n], i]
             u.battery = battery
-            u.communications = min(flown * mission.communication_slots, mission.quota - 1)
+            u.communications = min(slots_flown * mission.communication_slots, mission.quota - 1)
             u.latch = True
         for k in range(mission.nodes):
             if draws[n, 2 + k] < draws[n, 1]:

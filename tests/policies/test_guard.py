@@ -1,4 +1,4 @@
-"""The return guard: who follows it comes home in time."""
+"""The return guard: UAVs that follow it reach the charger in time."""
 
 from typing import Any
 
@@ -36,7 +36,7 @@ class Guarded:
 
 
 @given(spaces(uavs=1, initial_data=1e6), seeds, replications)
-def test_a_guarded_lone_uav_never_runs_dry(
+def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
     space: ScenarioSpace, seed: int, replication: int
 ) -> None:
     record = simulate(space, Guarded(), seed, replication)
