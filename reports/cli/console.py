@@ -38,8 +38,8 @@ def bar(unit: str, total: int = 0) -> Iterator[Any]:
     """
     from tqdm import tqdm
 
-    interval = 0.1 if sys.stderr.isatty() else 10
-    with tqdm(total=total, unit=unit, delay=1, mininterval=interval) as progress:
+    delay, interval = (1, 0.1) if sys.stderr.isatty() else (10, 10)
+    with tqdm(total=total, unit=unit, delay=delay, mininterval=interval) as progress:
         yield progress
 
 

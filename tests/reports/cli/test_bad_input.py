@@ -1,0 +1,94 @@
+"""Bad input: exit code 2, one line that names the key and the allowed values, no files."""
+
+import pytest
+
+from tests.analysis.small import files_of
+
+# Arguments, and what the line on stderr must name.
+BAD = {
+    "simulate --scenario nope": ["nope: no such scenario", "fig4, paper"],
+    "simulate --scenario .": ["cannot be read"],
+    "simulate --policy gredy": ["'gredy' is unknown", "random, nearest, greedy, tour"],
+    "simulate --policy greedy,": ["'' is unknown"],
+    "simulate --seed -1": ["seed: -1", "0..2**64-1"],
+    "simulate --replication 4294967296": ["replication: 4294967296", "0..2**32-1"],
+    "simulate --set uavs": ["'uavs' is not KEY=VALUE"],
+    "simulate --set uavs=": ["'uavs=' is not KEY=VALUE"],
+    "simulate --set uavs=two": ["'uavs=two' is not KEY=VALUE"],
+    "simulate --set uavs=1\nquota=2": ["is not KEY=VALUE"],
+    "simulate --set uavz=1": ["uavz: unknown key", "flying_time"],
+    "simulate --set uavs='2'": ["uavs", "'2'"],
+    "simulate --set uavs=17": ["uavs: 17", "1..16"],
+    "simulate --set charge_start=60": ["charge_start: 60 is not below charge_complete 60"],
+    "simulate --set zone=[30,2,4,4]": ["zone: [30, 2, 4, 4]", "32 x 32"],
+    "simulate --set nodes=[[3,32]]": ["nodes: [3, 32] is off the grid", "0 <= x, y < 32"],
+    "simulate --set nodes=[[3,3],[4,4],[3,3]]": ["nodes: [3, 3] is listed twice"],
+    "simulate --events none/log.parquet": ["none/log.parquet: cannot be written"],
+    "simulate --events .": ["is a folder"],
+    "simulate --figure mission.txt": ["mission.txt", ".png, .pdf, .svg"],
+    "simulate --replication one": ["--replication", "integer"],
+    "evaluate": ["--policy"],
+    "evaluate --policy greedy --missions 0": ["--missions", "1"],
+    "evaluate --policy greedy --engine fast": ["--engine", "'batch', 'events'"],
+    "evaluate --policy greedy --policy gredy": ["'gredy' is unknown"],
+    "study run nope": ["nope: no such study", "fig4, fig5", "table4"],
+    "study run trial.toml --policy gredy": ["trial.toml: policies", "'gredy' is unknown"],
+    "study run trial.toml --missions 0": ["--missions", "1"],
+    "study run trial.toml --out small.toml": ["small.toml: cannot be written"],
+    "study run trial.toml --out small.toml/out": ["small.toml/out: cannot be written"],
+    "study run trial.toml --out .": ["no manifest.json", "another --out"],
+    "study run trial.toml --dry-run --out .": ["no manifest.json", "another --out"],
+    "study show trial --policy tour": ["trial/manifest.json: no such file"],
+    "study show nope": ["nope/manifest.json: no such file", "made by dess study run"],
+    "study": ["Missing command", "dess study --help"],
+    "fly": ["No such command 'fly'", "dess --help"],
+    "simulate --fly": ["--fly"],
+    "report nope": ["'nope' is unknown"],
+    "report mission --set uavs=5": ["--set: mission has nothing to set", "what-if"],
+    "report what-if --set uavs": ["--set: 'uavs' is not KEY=VALUE"],
+    "report what-if --set uavz=5": ["uavz: unknown key", "flying_time"],
+    "report what-if --set uavs=17": ["uavs: 17", "1..16"],
+    "report what-if --parameter speed=2": ["'speed' is unknown to what-if", "baseline, missions"],
+    "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
+    "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
+    "verify nope": ["nope: cannot be read"],
+    "verify small.toml": ["small.toml: is no page of dess"],
+    "verify .": [".: holds no results and is no page"],
+}
+
+
+@pytest.mark.parametrize("arguments", BAD)
+def test_bad_input_gets_one_line_and_leaves_nothing(arguments, dess, tmp_path):
+    before = files_of(tmp_path)
+    code, out, err = dess(*arguments.split(" "))
+    assert code == 2
+    assert out == ""
+    *progress, line = err.splitlines()
+    assert line.startswith("dess: error: ")
+    assert all("cell" in bar for bar in filter(None, progress))  # on a busy machine
+    for part in BAD[arguments]:
+        assert part in line
+    assert files_of(tmp_path) == before
+
+
+FILES = {
+    "speed = 1": "speed: unknown key",
+    "uavs = 'two'": "uavs",
+    "uavs = 2.0": "uavs",
+    "uavs = 17": "uavs: 17",
+    "charge_start = 60": "charge_start: 60",
+    "zone = [30, 2, 4, 4]": "zone",
+    "nodes = [[32, 3]]": "nodes",
+    "nodes = [[3, 3], [3, 3]]": "nodes",
+    "uavs = [1": "not valid TOML",
+}
+
+
+@pytest.mark.parametrize("text", FILES)
+def test_a_bad_scenario_file_is_named_with_its_key(text, dess, tmp_path):
+    (tmp_path / "bad.toml").write_text(text)
+    code, out, err = dess("simulate", "--scenario", "bad.toml")
+    assert (code, out) == (2, "")
+    assert err.startswith("dess: error: bad.toml: ")
+    assert err.count("\n") == 1
+    assert FILES[text] in err

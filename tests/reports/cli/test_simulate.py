@@ -1,0 +1,77 @@
+"""``dess simulate``: its JSON, the event log, the figure."""
+
+import pyarrow.parquet as pq
+import pytest
+
+from analysis import load_results
+from tests.analysis.small import files_of
+
+SIMULATE_KEYS = [
+    "policy",
+    "scenario",
+    "seed",
+    "replication",
+    "slots",
+    "success",
+    "collection_ratio",
+    "collection_ratio_and_communication",
+    "initial",
+    "arrived",
+    "collected",
+    "residual",
+    "uavs",
+]
+
+
+def test_simulate_prints_the_contract(dess_json):
+    mission = dess_json("simulate", "--scenario", "small.toml", "--seed", 7, "--replication", 3)
+    assert list(mission) == SIMULATE_KEYS
+    assert (mission["policy"], mission["scenario"]) == ("greedy", "small.toml")
+    assert (mission["seed"], mission["replication"]) == (7, 3)
+    assert mission["success"] in (0, 1)
+    assert not isinstance(mission["success"], bool)
+    for uav in mission["uavs"]:
+        assert list(uav) == ["quota", "battery", "slots_charging", "end"]
+        assert uav["end"] in ("quota", "battery", "truncated")
+    total = mission["initial"] + mission["arrived"]
+    assert total == pytest.approx(mission["collected"] + mission["residual"], abs=1e-9)
+
+
+def test_a_mission_of_a_study_can_be_simulated_alone(dess, dess_json, tmp_path):
+    assert dess("study", "run", "trial.toml", "--out", "out", "--policy", "greedy,random")[0] == 0
+    row = load_results(tmp_path / "out").missions.iloc[6]
+    team = ("--policy", "greedy,random", "--seed", row["seed"], "--replication", 6)
+    alone = dess_json("simulate", "--scenario", "small.toml", *team)
+    shared = SIMULATE_KEYS[2:-1]
+    assert {key: alone[key] for key in shared} == {key: row[key] for key in shared}
+
+
+def test_set_takes_toml_values(dess_json):
+    settings = ("--set", "uavs=1", "--set", "initial_data = 5", "--set", "nodes=[[0, 0], [7, 7]]")
+    mission = dess_json("simulate", "--scenario", "small.toml", *settings)
+    assert len(mission["uavs"]) == 1
+    assert mission["initial"] == 10.0
+
+
+def test_the_event_log_and_the_figure(dess, tmp_path):
+    files = ("--events", "log.parquet", "--figure", "mission.png")
+    code, *_ = dess("simulate", "--scenario", "small.toml", *files)
+    assert code == 0
+    log = pq.read_table(tmp_path / "log.parquet")
+    assert log.column_names == ["time", "event", "uav", "node", "value", "x", "y"]
+    assert {"mission_start", "move", "communication", "mission_end"} <= set(
+        log["event"].to_pylist()
+    )
+    assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
+    assert len(files_of(tmp_path)) == 4  # with the scenario and the study
+
+
+def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dess.mission.simulate", fail)
+    (tmp_path / "log.parquet").write_text("old")
+    before = files_of(tmp_path)
+    assert dess("simulate", "--events", "log.parquet") == (1, "", "interrupted\n")
+    assert files_of(tmp_path) == before

@@ -1,0 +1,119 @@
+"""``dess study``: runs, resumes and shows studies."""
+
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+
+import pytest
+
+from analysis import load_results
+from tests.analysis import troublesome
+from tests.analysis.small import environment, files_of
+
+
+def test_a_study_lands_in_the_results_by_default(dess, tmp_path):
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 3)
+    assert code == 0
+    assert out.startswith("results/trial: 6 missions of study trial")
+    assert len(load_results(tmp_path / "results" / "trial").missions) == 6
+
+
+def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
+    before = files_of(tmp_path)
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 30, "--dry-run")
+    assert code == 0
+    assert "60 missions of study trial (2 policies x 1 design points x 30 replications)" in out
+    assert re.search(r"about \d+ s with 1 at work", out)
+    assert files_of(tmp_path) == before
+
+
+def test_a_study_is_shown(dess, dess_json):
+    assert dess("study", "run", "trial.toml", "--missions", 30)[0] == 0
+    code, out, _ = dess("study", "show", "results/trial", "--worst", 2)
+    assert code == 0
+    data = dess_json("study", "show", "results/trial", "--worst", 2)
+    assert data["study"] == "trial"
+    assert {row["policy"] for row in data["means"]} == {"greedy", "random"}
+    assert [row["baseline"] for row in data["comparisons"]] == ["greedy"] * 3
+    assert len(data["worst"]) == 2
+    for row in data["worst"]:
+        assert row["policy"] == "greedy"
+        assert row["command"] in out
+    product = next(r for r in data["means"] if r["metric"] == "collection_ratio")
+    assert f"{100 * product['mean']:.1f} %" in out
+
+
+def test_a_selection_is_shown_with_its_check(dess, tmp_path):
+    with open("trial.toml") as file:
+        text = file.read().replace("missions = 10\n", "")
+    rule = "procedure = 'kn'\nfirst = 8\nindifference = 0.05\nbudget = 900\ncheck = 9\n"
+    design = "[design]\nkind = 'grid'\nvalues.quota = [20, 60]\n"
+    (tmp_path / "best.toml").write_text(f"{text}\n{design}[selection]\n{rule}")
+    code, out, _ = dess("study", "run", "best.toml")
+    assert code == 0
+    assert re.search(r"greedy +quota (20|60) +\d+ +1", out)
+    assert "9 further missions" in out
+    assert "with probability at least 0.95" in out
+
+
+def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatch):
+    troublesome.install(tmp_path / "plugin", monkeypatch)
+    asked = ["study", "run", "trial.toml", "--policy", "raising", "--policy", "greedy"]
+    code, out, err = dess(*asked)
+    assert (code, out) == (1, "")
+    _, first, last = err.splitlines()
+    assert first.startswith(
+        "failed: ZeroDivisionError: nothing to divide by (results/trial/failures/"
+    )
+    assert last == "dess: error: 1 of the chunks of study trial failed, the rest is done"
+    command = shlex.split(first.partition("command: ")[2])
+    assert command[:2] == ["dess", "simulate"]
+    with pytest.raises(ZeroDivisionError):
+        dess(*command[1:])
+
+
+def test_results_of_another_version_are_refused(dess, tmp_path):
+    assert dess("study", "run", "trial.toml", "--out", "out")[0] == 0
+    path = tmp_path / "out" / "manifest.json"
+    path.write_text(path.read_text().replace('"version": "', '"version": "9.', 1))
+    before = files_of(tmp_path)
+    code, out, err = dess("study", "run", "trial.toml", "--out", "out")
+    assert (code, out) == (2, "")
+    assert "out/manifest.json: made by dess 9." in err
+    assert "allowed: another --out" in err
+    assert err.count("\n") == 1
+    assert files_of(tmp_path) == before
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
+    command = [sys.executable, "-m", "reports.cli", "study", "run", "trial.toml", "--out", "out"]
+    with open("trial.toml", "a") as study:  # slow enough to be caught in the middle
+        study.write('engine = "events"\n')
+    missions = ("--missions", "1000")
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # A background job of a shell ignores SIGINT, and its children with it: not this one.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    start = partial(subprocess.Popen, env=environment(), preexec_fn=heed, **pipes)
+    with start([*command, *missions]) as running:
+        while len(list(tmp_path.glob("out/missions/*/*.parquet"))) < 2:
+            assert running.poll() is None
+            time.sleep(0.01)
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate()
+    assert (running.returncode, out) == (1, "")
+    assert err.endswith("interrupted: run the same command again to complete it\n")
+    assert "Traceback" not in err
+    assert not [name for name in files_of(tmp_path) if name.endswith(".tmp")]
+    kept = files_of(tmp_path / "out" / "missions")
+    assert dess(*command[3:], *missions)[0] == 0
+    assert dess(*command[3:-1], "undisturbed", *missions)[0] == 0
+    completed = files_of(tmp_path / "out")
+    assert kept.items() <= files_of(tmp_path / "out" / "missions").items()
+    assert len(kept) < len(files_of(tmp_path / "out" / "missions"))
+    assert completed == files_of(tmp_path / "undisturbed")
