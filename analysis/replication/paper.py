@@ -1,4 +1,4 @@
-"""The figures that the paper prints, to set ours beside, and how the two compare.
+"""The figures that the paper prints, to set those of the studies beside.
 
 The paper: the learned policy of its Section V on a 32 x 32 map.
 """

@@ -67,7 +67,7 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
 
     Args:
         studies: Results by the name of the study: ``table4``, ``fig4``, ``fig5``, ``sweet-spot``,
-            those there are.
+            as far as they have run.
         trainings: Learning curves, with the columns that ``questions.learning`` reads; may be
             empty.
 

@@ -46,7 +46,7 @@ def as_html(
     environment.filters |= {"figure": figure, "percent": numbers.percent}
     columns = [*zip(*(row.findings for row in rows), strict=True)]
     html = environment.get_template("scorecard.html").render(
-        sections=[(s, [*own]) for s, own in groupby(rows, key=lambda row: row.section)],
+        sections=[(s, [*of_section]) for s, of_section in groupby(rows, lambda row: row.section)],
         total=len(rows),
         policies=[*map(_usual_policy, columns)],
         counts=[_counts(findings) for findings in columns],

@@ -1,4 +1,4 @@
-"""The scorecard says what the results say, whatever results there are."""
+"""The scorecard follows from the results, complete or not: claims, verdicts and figures."""
 
 import json
 from dataclasses import replace
@@ -39,8 +39,8 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Results]:
         "sweet-spot": {"selection": RULE, "design": corners},
     }
     return {
-        name: run_study(load_study(name, policies=POLICIES, **own), folder / name)
-        for name, own in changes.items()
+        name: run_study(load_study(name, policies=POLICIES, **fields), folder / name)
+        for name, fields in changes.items()
     }
 
 
@@ -200,21 +200,21 @@ def test_other_figures_turn_verdicts(
     studies: dict[str, Results], ratio: float, verdict: str
 ) -> None:
     table4 = changed(studies["table4"], success=1, collection_ratio=ratio)
-    found = scorecard({"table4": table4}, NONE)
-    assert learned(found, "Collection ratio over random").verdict == verdict
-    assert learned(found, "Successful communication over random").verdict == HOLDS
+    judged = scorecard({"table4": table4}, NONE)
+    assert learned(judged, "Collection ratio over random").verdict == verdict
+    assert learned(judged, "Successful communication over random").verdict == HOLDS
 
 
 def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
     """Half of them collect nothing: the interval reaches far to both sides of the paper's."""
     halves = studies["table4"].missions["replication"] % 2
     table4 = changed(studies["table4"], success=halves, collection_ratio=halves)
-    found = scorecard({"table4": replace(table4, missions=table4.missions.head(60))}, NONE)
-    assert learned(found, "Successful communication over").verdict == REFUTED
+    judged = scorecard({"table4": replace(table4, missions=table4.missions.head(60))}, NONE)
+    assert learned(judged, "Successful communication over").verdict == REFUTED
     wide = changed(studies["table4"], collection_ratio=halves * 0.4 + 0.6)
     few = wide.missions[wide.missions["replication"] < 6]
-    found = scorecard({"table4": replace(wide, missions=few)}, NONE)
-    assert learned(found, "Collection ratio over").verdict == INCONCLUSIVE
+    judged = scorecard({"table4": replace(wide, missions=few)}, NONE)
+    assert learned(judged, "Collection ratio over").verdict == INCONCLUSIVE
 
 
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
@@ -252,22 +252,22 @@ def test_what_one_more_uav_changes(
     many = pd.concat(
         [fig4.missions.assign(replication=fig4.missions["replication"] + 4 * k) for k in range(9)]
     )
-    found = scorecard({"fig4": replace(fig4, missions=many)}, NONE)
-    assert learned(found, "dramatically").verdict == dramatic
-    assert learned(found, "further").verdict == further
-    assert learned(found, "All else given").verdict == best
-    change = learned(found, "dramatically").quantities[0]
+    judged = scorecard({"fig4": replace(fig4, missions=many)}, NONE)
+    assert learned(judged, "dramatically").verdict == dramatic
+    assert learned(judged, "further").verdict == further
+    assert learned(judged, "All else given").verdict == best
+    change = learned(judged, "dramatically").quantities[0]
     assert change.value == pytest.approx(ratios[2] - ratios[1])
-    printed = row_of(found, "dramatically").claim.printed
+    printed = row_of(judged, "dramatically").claim.printed
     assert printed and printed.value == pytest.approx(0.894 - 0.634)
 
 
 def test_any_policy_is_judged_by_the_same_rules(
     rows: list[Row], studies: dict[str, Results]
 ) -> None:
-    own = of_policy(studies, "ddqn", claims.FIG_5)
+    of_ddqn = of_policy(studies, "ddqn", claims.FIG_5)
     expected = [row for row in rows if row.section is claims.FIG_5]
-    assert [row.findings for row in own] == [row.findings[:1] for row in expected]
+    assert [row.findings for row in of_ddqn] == [row.findings[:1] for row in expected]
     others = of_policy(studies, "greedy", claims.FIG_5)
     assert {row.findings[0].policy for row in others} == {"greedy"}
 
@@ -294,8 +294,8 @@ def test_the_sweet_spot_is_judged_by_its_check(
     chosen = learned(rows, "sweet spot is one of").quantities[0]
     assert chosen.value == sweet.store.manifest.points[choice.best].values["uavs"]
     unchecked = replace(sweet, checks=sweet.checks[:0])
-    found = row_of(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
-    assert found.findings[0].verdict == NO_RESULTS
+    unjudged = learned(scorecard({"sweet-spot": unchecked}, NONE), "Collection ratio with every")
+    assert unjudged.verdict == NO_RESULTS
 
 
 def test_claims_on_where_uavs_fly_are_counted_from_the_event_logs(
@@ -361,9 +361,9 @@ def test_learning_that_fails_is_told() -> None:
 @pytest.mark.parametrize("tops", [(0.8, 0.4), (0.4, 0.8)])
 def test_short_trainings_cannot_tell(tops: tuple[float, float]) -> None:
     curves = trained({v: (0, top) for v, top in zip(module.VARIANTS, tops, strict=True)}, 12_000)
-    found = [row.findings[0] for row in scorecard({}, curves) if row.section is claims.FIG_3]
-    assert [each.verdict for each in found] == 3 * [INCONCLUSIVE]
-    assert all(each.note.endswith("too short to tell") for each in found)
+    findings = [row.findings[0] for row in scorecard({}, curves) if row.section is claims.FIG_3]
+    assert [finding.verdict for finding in findings] == 3 * [INCONCLUSIVE]
+    assert all(finding.note.endswith("too short to tell") for finding in findings)
 
 
 def test_the_best_learned_policy_is_judged(tmp_path: Path) -> None:
@@ -393,10 +393,10 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
         name: run_study(load_study(name, design=design, **changes), tmp_path / name)
         for name, design in designs.items()
     }
-    found = scorecard(others, NONE)
-    assert learned(found, "dramatically").verdict == NO_RESULTS
-    assert learned(found, "best with three UAVs").verdict == NO_RESULTS
-    assert learned(found, "two sectors").verdict in VERDICTS
+    judged = scorecard(others, NONE)
+    assert learned(judged, "dramatically").verdict == NO_RESULTS
+    assert learned(judged, "best with three UAVs").verdict == NO_RESULTS
+    assert learned(judged, "two sectors").verdict in VERDICTS
     small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
     assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
 
