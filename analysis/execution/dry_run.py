@@ -1,4 +1,4 @@
-"""What a run of a study would do: its missions, those that are there already, and the time."""
+"""The plan of a run of a study: its missions, those that are present already, and the time."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,7 @@ class Planned:
     Attributes:
         policy: The team.
         missions: Missions wanted; by a rule, at least that many.
-        present: Those that are there already.
+        present: Those that are in the results folder already.
         seconds: Estimated time of the others [s].
     """
 
@@ -89,7 +89,7 @@ def plan_study(
 
 
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
-    """Missions of a team that are not there, and all that are wanted for now."""
+    """Missions of a team that are missing, and all that are wanted for now."""
     manifest = store.manifest
     parts = parts_of(manifest.cells[team], manifest.missions[team])
     if (point := manifest.selected[team]) is not None and study.selection:

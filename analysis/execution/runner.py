@@ -41,7 +41,7 @@ class Round(NamedTuple):
     Attributes:
         number: Which, from 0.
         missions: Wanted of all rounds up to this one.
-        present: Of these, missions that are there already.
+        present: Of these, missions that the folder has already.
     """
 
     number: int
@@ -98,7 +98,7 @@ def run_study(
 
 
 def pool_of(workers: int, scheduler: str | None = None) -> Pool:
-    """Who does the jobs: this process, processes of this machine, or a cluster.
+    """The workers: this process, processes of this machine, or a cluster.
 
     Raises:
         InputError: If there is no worker, or the scheduler cannot be used.
@@ -118,7 +118,7 @@ def check_workers(workers: int) -> None:
 
 
 class _Run:
-    """A study on its way into its folder."""
+    """A run of a study into its folder, round by round."""
 
     def __init__(
         self,
@@ -172,7 +172,7 @@ class _Run:
         return self.store.samples(parts_of(self.store.manifest.cells[team], counts))
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
-        """Do what is missing of the parts, all of a round that is new, and the logs."""
+        """Do the missing missions of a round, whose parts these are, and the logs."""
         jobs, present = [*logs], 0
         for chunk in split(parts, CHUNK[self.study.engine]):
             missing = self.store.missing(chunk)
@@ -188,7 +188,7 @@ class _Run:
         self._do(jobs)
 
     def _log_jobs(self) -> list[Job]:
-        """The missions to fly anew whose event logs are wanted and not there."""
+        """The missions to simulate again, whose event logs are wanted and missing."""
         return [
             LogJob(
                 Chunk(cell.team, (Part(cell, range(replication, replication + 1)),)),
@@ -211,7 +211,7 @@ class _Run:
         )
 
     def _do(self, jobs: Sequence[Job]) -> None:
-        """Do the jobs and keep what comes of them."""
+        """Do the jobs and store their results."""
         failures = {}
         with closing(self.pool.run(jobs, self.progress)) as results:
             for number, result in results:
@@ -224,7 +224,7 @@ class _Run:
             raise ChunkError(failures)
 
     def _save(self, job: Job, result: Any) -> Problem | None:
-        """Keep what came of a job; what the store refuses at its door is a problem of the job."""
+        """Store the result of a job; a result that the store refuses is a problem of the job."""
         try:
             job.save(self.store, result)
         except ValueError as error:
@@ -232,7 +232,7 @@ class _Run:
         return None
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
-        """What is told of a job that failed; without a culprit, the same study does it again."""
+        """The failure of a job, with a command that reproduces it: a mission, or the study."""
         command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if mission := problem.mission:
             command = self.store.manifest.command(mission.cell, mission.replications[0])
@@ -241,7 +241,7 @@ class _Run:
 
 
 def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
-    """What is wanted beyond what was, each mission once, in the order of the study."""
+    """The missions wanted beyond those of before, each once, in the order of the study."""
     parts: list[Part] = []
     asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
     for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True):
@@ -321,7 +321,7 @@ def evaluate(
 
 
 def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
-    """What comes of all jobs, in their order.
+    """The results of all jobs, in their order.
 
     Raises:
         RuntimeError: If one failed.

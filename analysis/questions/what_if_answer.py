@@ -248,7 +248,7 @@ def commands(results: Results, policy: str, replication: int) -> list[str]:
     return [
         line
         for point, side in zip(points, SIDES, strict=True)
-        for line in (f"# {side}", results.replay(policy, point, replication))
+        for line in (f"# {side}", results.command(policy, point, replication))
     ]
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 from pydantic import TypeAdapter, ValidationError, field_validator, model_validator
 
 import dess
-from analysis.results.documents import Document, read_json
+from analysis.results.documents import read_json
 from analysis.results.provenance import (
     Acceptance,
     Origin,
@@ -21,7 +21,7 @@ from analysis.results.provenance import (
     library_versions,
     team_of,
 )
-from analysis.study.design import Design
+from analysis.study.design import Design, DesignPoint
 from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
@@ -50,13 +50,6 @@ class Cell(NamedTuple):
     point: int
     key: str
     first: int
-
-
-class DesignPoint(Document):
-    """A design point: what it sets of the scenario, and its first replication."""
-
-    values: dict[str, Any]
-    replication: int = 0
 
 
 class Manifest(Origin):

@@ -7,9 +7,10 @@ function of its fields, in their written order.
 
 import sys
 from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Annotated, Any, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
@@ -29,7 +30,8 @@ _INTEGERS = {
 }
 
 
-class DesignPoint(NamedTuple):
+@dataclass(frozen=True)
+class DesignPoint:
     """A design point: values of fields of the scenario, and the first of its replications."""
 
     values: dict[str, Any]

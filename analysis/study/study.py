@@ -131,7 +131,7 @@ class Study(BaseModel):
             )
 
     def _check_design(self) -> None:
-        designs = [values for values, _ in self._rows]
+        designs = [point.values for point in self._rows]
         for values in designs:
             if both := sorted(self.set.keys() & values.keys()):
                 raise ValueError(f"design: {both[0]} is also in set; allowed: either")
@@ -162,7 +162,9 @@ class Study(BaseModel):
     @cached_property
     def points(self) -> tuple[Point, ...]:
         """The design points in the order of the design."""
-        return tuple(Point(v, self._scenario_at(v), first) for v, first in self._rows)
+        return tuple(
+            Point(p.values, self._scenario_at(p.values), p.replication) for p in self._rows
+        )
 
     @property
     def _rows(self) -> tuple[DesignPoint, ...]:

@@ -164,7 +164,7 @@ display(
 
 # %%
 shown = [*worst["replication"], *lost["replication"]]
-lines = [f"{study.replay(policy, 0, n)} --figure mission-{n}.png" for n in shown]
+lines = [f"{study.command(policy, 0, n)} --figure mission-{n}.png" for n in shown]
 html.say("{commands}", commands=html.commands(lines))
 
 # %% [markdown]

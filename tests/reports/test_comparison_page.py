@@ -81,7 +81,7 @@ def test_the_worst_missions_can_be_simulated_again(text: str, results: Path) -> 
     study = load_results(results / NAME)
     missions = head_to_head.duels(study, head_to_head.pair_of(study))
     for number in head_to_head.worst(missions, 5)["replication"]:
-        assert f"{study.replay('ddqn', 0, number)} --figure mission-{number}.png" in text
+        assert f"{study.command('ddqn', 0, number)} --figure mission-{number}.png" in text
 
 
 def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:

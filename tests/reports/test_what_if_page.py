@@ -72,4 +72,4 @@ def test_the_missions_shown_can_be_simulated_again(text: str, results: Any) -> N
     policy = what_if_answer.best_policy(results, what_if.VARIATION)
     for choose in (what_if_answer.typical, what_if_answer.worst):
         for point in (what_if.BASELINE, what_if.VARIATION):
-            assert results.replay(policy, point, choose(results, policy)) in text
+            assert results.command(policy, point, choose(results, policy)) in text

@@ -120,15 +120,18 @@ BAD = {
     "missions = 9\nselection = {procedure = 'kn', indifference = 0.1}": [
         "missions: are decided by selection"
     ],
-    "selection = {procedure = 'ocba'}\nprecision.targets.success.absolute = 0.1": [
+    "selection = {procedure = 'kn', indifference = 0.1}\nprecision.targets.success.absolute = 0.1": [
         "precision: selection is there too"
     ],
     "selection = {procedure = 'kn', indifference = -0.1}": [
         "selection.indifference",
         "greater than 0",
     ],
-    "selection = {procedure = 'ocba', first = 9, budget = 8}": ["selection.budget: 8", "9 or more"],
-    "selection.procedure = 'best'": ["selection.procedure", "'kn'", "'ocba'"],
+    "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
+        "selection.budget: 8",
+        "9 or more",
+    ],
+    "selection.procedure = 'best'": ["selection.procedure", "'kn'", "'kn-bounded'"],
     "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
     "missions = 1\n[design": ["not valid TOML"],
