@@ -171,6 +171,12 @@ def tally(table: pd.DataFrame) -> str:
     return f"{numbers.words(counts)} of {len(table)}"
 
 
+def lowest(cells: pd.DataFrame) -> str:
+    """The lowest mean of ``across``, as ``+3.3 [+1.4, +5.2] at 3 and 70–72 (n = 155)``."""
+    row, *_ = cells.sort_values("mean", kind="stable").itertuples()
+    return f"{_points(row)} at {row.value} and {row.value_2} (n = {row.n:,})"
+
+
 def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
     """How the difference varies with every parameter, as a table to print.
 

@@ -129,6 +129,7 @@ if len(cells):
     shares = numbers.words([*map(numbers.percent, chosen["explained"])])
     caption = (
         f"{policy} is {regions.tally(cells)} cells, n = {numbers.span(cells['n'])} missions each. "
+        f"The lowest mean [points]: {regions.lowest(cells)}. "
         f"In the other half, these explain {shares} of the variance."
     )
     display(html.figure(figures.heat(cells, *chosen["field"]), alt, caption))

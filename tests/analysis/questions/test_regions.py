@@ -147,6 +147,13 @@ def test_the_strongest_two_are_chosen_on_the_half_that_is_not_shown():
     assert all(part.empty for part in regions.strongest(missions.head(1)))
 
 
+def test_the_lowest_cell_has_its_place_and_its_missions():
+    columns = ["value", "value_2", "mean", "low", "high", "n"]
+    rows = [("1", "70–72", 0.05, 0.04, 0.06, 90), ("3", "70–72", 0.033, 0.014, 0.052, 1155)]
+    cells = pd.DataFrame(rows, columns=columns)
+    assert regions.lowest(cells) == "+3.3 [+1.4, +5.2] at 3 and 70–72 (n = 1,155)"
+
+
 def test_verdicts_are_counted():
     table = pd.DataFrame({"verdict": [AHEAD, INCONCLUSIVE, AHEAD]})
     assert regions.tally(table) == "ahead in 2, behind in 0 and inconclusive in 1 of 3"
