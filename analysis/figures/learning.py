@@ -15,7 +15,16 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from analysis import numbers
-from analysis.figures.style import INK, LINES, MUTED, panels, round_ticks, style
+from analysis.figures.style import (
+    INK,
+    LINES,
+    MUTED,
+    note_at_right,
+    palette,
+    panels,
+    round_ticks,
+    style,
+)
 from analysis.names import METRICS
 from analysis.questions.learning import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
 
@@ -40,7 +49,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
         labels: The variants to draw, with their names in the legend.
     """
     averages = smoothed(curves[curves["variant"].isin(labels)], metric)
-    colours = dict(zip(labels, sns.color_palette("colorblind").as_hex(), strict=False))
+    colours = dict(zip(labels, palette(), strict=False))
     with style():
         figure, ax = panels(3.9)
         for number, (variant, label) in enumerate(labels.items()):
@@ -95,8 +104,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
             else:
                 _seeds(reached, row, y, ax)
             note = f"{row['mean']:.1%}, n = {row['n']}"
-            ax.annotate(note, (1, y), xycoords=("axes fraction", "data"), xytext=(4, 0),
-                        textcoords="offset points", va="center", fontsize=9)  # fmt: skip
+            note_at_right(note, y, ax)
         names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
         ax.set_yticks(range(len(table)), names)
         ax.set(title=METRICS[metric.removeprefix("final_")], ylim=(len(table) - 0.4, -0.6))
@@ -118,7 +126,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     kept = curve[curve["is_best"]].iloc[-1]
     with style():
         figure, ax = panels(3.9)
-        colours = sns.color_palette("colorblind").as_hex()
+        colours = palette()
         for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
             for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
                 ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
@@ -151,7 +159,7 @@ def _ends(table: pd.DataFrame, values: pd.Series, floor: float) -> tuple[float, 
 
 def _seeds(reached: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
     """The trainings of a variant, and above them their mean with its interval."""
-    colour = sns.color_palette("colorblind").as_hex()[0]
+    colour = palette()[0]
     if row["n"] > 1:
         arms = [[row["mean"] - row["low"]], [row["high"] - row["mean"]]]
         ax.errorbar(row["mean"], y - 0.14, xerr=arms, marker="D", markersize=5, color=colour,

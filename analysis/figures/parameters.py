@@ -18,6 +18,7 @@ from analysis.figures.style import (
     arms,
     dot,
     legend_below,
+    palette,
     panels,
     policy_colours,
     round_ticks,
@@ -77,7 +78,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         title: Of the figure.
     """
     rows = rows.reset_index(drop=True)
-    colour = sns.color_palette("colorblind").as_hex()[0]
+    colour = palette()[0]
     with style():
         figure, ax = panels(1.5 + 0.52 * len(rows))
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
