@@ -9,8 +9,8 @@ nox.options.default_venv_backend = "venv"
 nox.options.reuse_existing_virtualenvs = True
 nox.options.sessions = ["tests"]
 
-# What the reports are about. Where the default budget does not fly all policies of a study, these
-# take its place.
+# The studies that the reports read. Where the default budget is too small for all policies, these
+# are simulated.
 STUDIES: dict[str, list[str]] = {
     "fig1": [],
     "table4": [],
@@ -58,7 +58,7 @@ def lint(session: nox.Session) -> None:
 
 @nox.session
 def reports(session: nox.Session) -> None:
-    """Run the studies, then render the reports; ``-- --full`` flies all policies of each."""
+    """Run the studies, then render the reports; ``-- --full`` simulates all policies of each."""
     full = "--full" in session.posargs
     if session.posargs not in ([], ["--full"]):
         session.error(f"reports: {' '.join(session.posargs)} is unknown; allowed: --full")

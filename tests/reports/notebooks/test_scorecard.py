@@ -1,6 +1,5 @@
 """The page of the scorecard on small results: a row per claim, and a verdict for each."""
 
-
 import pytest
 
 from analysis.replication.rules import VERDICTS

@@ -123,7 +123,7 @@ def test_every_page_carries_the_evidence_of_its_studies(
             assert manifest.key in words_of(pages[f"{name}.html"])
 
 
-def test_pages_are_the_same_bytes_elsewhere(
+def test_all_pages_are_the_same_bytes_elsewhere(
     pages: dict[str, str],
     results: Path,
     out: Path,
