@@ -26,8 +26,7 @@ from analysis.results.provenance import (
     library_versions,
     members_of,
 )
-from dess import load_scenario, simulate, simulate_batch
-from dess.errors import InputError
+from dess import InputError, load_scenario, simulate, simulate_batch
 from dess.files import replacing
 from dess.scenario import ScenarioSpace, validation_line
 from dess.state import check_seed

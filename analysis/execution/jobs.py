@@ -10,8 +10,7 @@ import numpy as np
 from analysis.results.chunks import Chunk, Part
 from analysis.results.manifest import Cell
 from analysis.results.store import Store
-from dess import simulate, simulate_batch
-from dess.errors import InputError
+from dess import InputError, simulate, simulate_batch
 from dess.record import Records, empty_records
 from dess.scenario import ScenarioSpace
 from policies import load_team

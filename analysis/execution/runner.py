@@ -23,8 +23,7 @@ from analysis.results.manifest import Cell
 from analysis.results.store import Failure, Store
 from analysis.results.tables import Results, parts_of, results_of
 from analysis.study.study import CHECK, Study, load_study
-from dess import simulate_batch
-from dess.errors import InputError
+from dess import InputError, simulate_batch
 from dess.record import Records
 from dess.scenario import ScenarioSpace
 from policies import load_team

@@ -16,7 +16,7 @@ from typing import Any, Protocol, Self
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.results.chunks import Part
 from analysis.results.provenance import Member, engine_code, members_of
-from dess.errors import InputError
+from dess import InputError
 
 DEATHS = 2  # of workers that a job was alone with, after which it is given up
 

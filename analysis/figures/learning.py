@@ -26,7 +26,7 @@ from analysis.figures.style import (
     style,
 )
 from analysis.names import METRICS
-from analysis.questions.learning import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
+from analysis.questions.learning.curves import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
 # What is evaluated while training, and its name.
@@ -44,7 +44,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     line stands where the last begins.
 
     Args:
-        curves: Curves, as of ``analysis.questions.learning``.
+        curves: Curves, as of ``analysis.questions.learning.curves``.
         metric: One of ``NAMES``.
         labels: The variants to draw, with their names in the legend.
     """
@@ -85,8 +85,8 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     """What every variant reaches: its trainings as dots, their mean with interval as a diamond.
 
     Args:
-        table: Rows of ``analysis.questions.ablation.ablation``.
-        last: Rows of ``analysis.questions.ablation.finals``.
+        table: Rows of ``analysis.questions.learning.ablation.ablation``.
+        last: Rows of ``analysis.questions.learning.ablation.finals``.
         metric: The column of the final metric, ``final_`` and one of ``METRICS``.
         baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
             ``OFF`` times as much are an arrow at the edge.

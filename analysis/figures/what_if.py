@@ -23,7 +23,7 @@ from analysis.figures.style import (
     style,
 )
 from analysis.names import METRICS
-from analysis.questions.what_if import SIDES
+from analysis.questions.what_if.question import SIDES
 
 # Share of the missions that the second panel of ``spread`` shows.
 MIDDLE = 0.9

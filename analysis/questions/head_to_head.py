@@ -24,7 +24,7 @@ from analysis.stats.correction import for_choice
 from analysis.stats.intervals import wilson
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
-from dess.errors import InputError
+from dess import InputError
 
 AHEAD, BEHIND = "ahead", "behind"
 OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics

@@ -22,7 +22,7 @@ from analysis.results.tables import Results
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import paired
-from dess.errors import InputError
+from dess import InputError
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"

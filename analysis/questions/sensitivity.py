@@ -10,7 +10,7 @@ from analysis.names import MEANS, SHARES, parameter, value_text
 from analysis.names import METRICS as METRIC_NAMES
 from analysis.stats.intervals import LEVEL
 from analysis.study.design import NOISE, Saltelli
-from dess.errors import InputError
+from dess import InputError
 
 METRICS = (*SHARES, *MEANS)
 SMALL = 0.05  # share of the variance below which a parameter hardly matters

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.questions import learning, main_effects, summary
+from analysis.questions import main_effects, summary
+from analysis.questions.learning import curves as learning
 from analysis.replication.paper import CROSSING
 from analysis.results.tables import Results
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.names import RATIO, parameter, value_text
 from analysis.questions import main_effects, node_shares
-from analysis.questions.learning import Transfer
+from analysis.questions.learning.curves import Transfer
 from analysis.replication import paper
 from analysis.replication.evidence_of_policy import (
     EvidenceOfPolicy,

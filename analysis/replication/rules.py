@@ -18,7 +18,7 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.questions import main_effects
-from analysis.questions.learning import BAND, Transfer
+from analysis.questions.learning.curves import BAND, Transfer
 from analysis.questions.main_effects import Shape
 from analysis.replication.paper import CROSSING
 from analysis.stats.intervals import Interval

@@ -22,7 +22,7 @@ from analysis.replication.measures import Measured, Quantity
 from analysis.replication.rules import MARGIN, NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import INCONCLUSIVE, position
-from dess.errors import InputError
+from dess import InputError
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 import dess
-from dess.errors import InputError
+from dess import InputError
 
 _VERSIONS = ("version", "schema_version")
 

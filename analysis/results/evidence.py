@@ -20,7 +20,7 @@ from analysis.results.provenance import Origin
 from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from analysis.study.study import load_study, study_names
-from dess.errors import InputError
+from dess import InputError
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace, validation_line
 from policies.registry import TRAINED

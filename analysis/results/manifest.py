@@ -25,7 +25,7 @@ from analysis.study.design import Design, DesignPoint
 from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
-from dess.errors import InputError
+from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
 
 SCHEMA_VERSION = 3

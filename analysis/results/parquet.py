@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analysis.results.chunks import Chunk, short_hash
-from dess.errors import InputError
+from dess import InputError
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, Records
 from dess.state import END_NAMES

@@ -11,8 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.results.tables import Results
-from dess import simulate
-from dess.errors import InputError
+from dess import InputError, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.scenario import Scenario
 from dess.state import END_NAMES, sample_scenario

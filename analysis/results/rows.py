@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis.results.chunks import Part
-from dess.errors import InputError
+from dess import InputError
 
 
 def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:

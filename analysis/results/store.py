@@ -26,7 +26,7 @@ from analysis.results.chunks import Chunk, Part, gaps, name_of, short_hash
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.rows import rows_of
 from analysis.study.study import Study
-from dess.errors import InputError
+from dess import InputError
 from dess.files import replacing, writable
 from dess.record import Records
 

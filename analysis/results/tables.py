@@ -14,7 +14,7 @@ from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
 from analysis.study.selection import Choice, Selection
 from analysis.study.study import CHECK
-from dess.errors import InputError
+from dess import InputError
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 

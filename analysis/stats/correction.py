@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from dess.errors import InputError
+from dess import InputError
 
 Correction = Literal["holm", "fdr"]
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 from analysis.stats.bootstrap import bootstrap_interval, expanded_level
 from analysis.stats.intervals import LEVEL, Interval, check_columns, check_share, groups
-from dess.errors import InputError
+from dess import InputError
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

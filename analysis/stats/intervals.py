@@ -15,7 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.names import MEANS, SHARES
-from dess.errors import InputError
+from dess import InputError
 
 LEVEL = 0.95
 

@@ -17,7 +17,7 @@ from analysis.stats.correction import Correction, with_adjusted
 from analysis.stats.differences import differences_of, share_test, sign_test, smoothed, t_test
 from analysis.stats.intervals import LEVEL, check_share
 from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
-from dess.errors import InputError
+from dess import InputError
 
 # What the row of a comparison is about: trainings at large, or the only one.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"

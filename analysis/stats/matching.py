@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.stats.intervals import check_columns, groups
-from dess.errors import InputError
+from dess import InputError
 
 Treatment = Literal["policy", "point"]
 

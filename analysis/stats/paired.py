@@ -23,7 +23,7 @@ from analysis.stats.matching import (
     metrics_by_treatment,
     select,
 )
-from dess.errors import InputError
+from dess import InputError
 
 
 class Paired(NamedTuple):

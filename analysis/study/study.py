@@ -18,7 +18,7 @@ from pydantic import (
 from analysis.study.design import Design, DesignPoint, Saltelli
 from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision
-from dess.errors import InputError
+from dess import InputError
 from dess.files import Shipped
 from dess.scenario import (
     Integer,

@@ -10,7 +10,7 @@ from analysis.results.store import MANIFEST
 from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, Check
 from analysis.verification.logs import Log
-from dess.errors import InputError
+from dess import InputError
 
 EPSILON = np.finfo(float).eps
 

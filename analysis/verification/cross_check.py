@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from analysis.results.tables import Results
 from analysis.verification import lone_uav
-from dess import simulate
-from dess.errors import InputError
+from dess import InputError, simulate
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.state import END_NAMES

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import typer
 from typer.exceptions import TyperException
 
-from dess.errors import InputError
+from dess import InputError
 from reports.cli import console, evaluate, lists, report, simulate, study, train
 
 INTERRUPTED = 130  # what typer returns after Ctrl-C

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.errors import InputError
+from dess import InputError
 from reports.cli import console
 from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting, with_absolute_paths
 

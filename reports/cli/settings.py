@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess.errors import InputError
+from dess import InputError
 
 if TYPE_CHECKING:
     from dess import ScenarioSpace

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.errors import InputError
+from dess import InputError
 from reports.cli import console
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 

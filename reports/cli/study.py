@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.errors import InputError
+from dess import InputError
 from reports.cli import console, study_tables
 from reports.cli.settings import RESULTS, JsonOption, WorkersOption
 

@@ -26,8 +26,9 @@ from matplotlib.figure import Figure
 from analysis import numbers
 from analysis.figures import learning as figures
 from analysis.names import PRODUCT
-from analysis.questions import ablation, learning
-from analysis.questions import trained as policies
+from analysis.questions.learning import ablation
+from analysis.questions.learning import curves as learning
+from analysis.questions.learning import trained as policies
 from analysis.replication import paper, rules
 from policies.registry import TRAINED
 from reports.pages import html

@@ -33,7 +33,8 @@ from analysis import resimulate
 from analysis.figures import what_if as figures
 from analysis.figures.missions import mission_figure
 from analysis.names import METRICS
-from analysis.questions import what_if, what_if_answer
+from analysis.questions.what_if import answer as what_if_answer
+from analysis.questions.what_if import question as what_if
 from reports.pages import html
 
 # %%

@@ -9,7 +9,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from analysis.results.evidence import Evidence
-from dess.errors import InputError
+from dess import InputError
 from reports.pages import html
 from reports.pages.notebook import NAMES, SCORECARD, Report
 from reports.pages.template import fill

@@ -22,7 +22,7 @@ from nbclient.exceptions import CellExecutionError
 from nbconvert.filters import strip_ansi
 from nbformat import NotebookNode
 
-from dess.errors import InputError
+from dess import InputError
 from reports.pages.notebook import Report
 
 # Called after a cell with the cells run and the cells in all, of all reports, and the report.

@@ -19,7 +19,7 @@ import jupytext
 import nbformat
 from nbformat import NotebookNode
 
-from dess.errors import InputError
+from dess import InputError
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
 SCORECARD = "scorecard"  # the index shows all of it

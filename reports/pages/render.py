@@ -21,7 +21,7 @@ from pygments.lexers import PythonLexer
 
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
-from dess.errors import InputError
+from dess import InputError
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
 from reports.pages.notebook import SHIPPED, VALUES, Report, check_parameters, names_in, read

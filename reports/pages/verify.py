@@ -19,8 +19,7 @@ from analysis.results.provenance import code_behind, differing, library_versions
 from analysis.results.resimulate import difference
 from analysis.results.store import MANIFEST, Store
 from analysis.results.tables import results_of
-from dess import simulate
-from dess.errors import InputError
+from dess import InputError, simulate
 from policies import load_team
 from reports.pages.html import FILES, STUDY, embedded
 

@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis.figures.style import node_colours, uav_colours
 from analysis.results.event_log import battery_levels, residual_data, uav_slots
-from dess.errors import InputError
+from dess import InputError
 from dess.scenario import Scenario
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
+from dess import InputError
 from dess.batch import simulate_batch
-from dess.errors import InputError
 from dess.mission import simulate
 from dess.record import EVENT_NAMES, MissionRecord, Records
 from dess.scenario import Scenario, ScenarioSpace, load_scenario

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from dess import streams
+from dess import InputError, streams
 from dess.channel import world_of
-from dess.errors import InputError
 from dess.files import parse_toml
 from dess.scenario import (
     SAMPLED,

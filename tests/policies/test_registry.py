@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import policies
-from dess.errors import InputError
+from dess import InputError
 from dess.mission import simulate
 from dess.scenario import Scenario, load_scenario
 from policies import registry

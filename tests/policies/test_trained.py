@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import policies
-from dess.errors import InputError
+from dess import InputError
 from policies import registry
 from policies.heuristics import Greedy
 from reports.cli import main

@@ -16,7 +16,7 @@ import dess
 import policies
 from analysis.figures.style import node_colours
 from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
-from dess.errors import InputError
+from dess import InputError
 from dess.state import sample_scenario
 from reports.player import library, player
 from reports.player.mission_map import TRAIL

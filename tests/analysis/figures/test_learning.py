@@ -5,12 +5,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
+from tests.analysis.questions.test_learning import training
 
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
-from analysis.questions import ablation
-from analysis.questions import learning as curves
-from tests.analysis.questions.test_learning import training
+from analysis.questions.learning import ablation, curves
 
 METRIC = "evaluation_collection_ratio_and_communication"
 LABELS = {"one": "with", "two": "without"}

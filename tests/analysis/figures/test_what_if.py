@@ -6,7 +6,7 @@ import pytest
 
 from analysis.figures import what_if as figures
 from analysis.names import METRICS
-from analysis.questions import what_if_answer
+from analysis.questions.what_if import answer as what_if_answer
 from tests.analysis.small import asked
 
 POLICIES = ["random", "greedy"]

@@ -9,7 +9,7 @@ from analysis.names import PRODUCT, RATIO
 from analysis.questions import missions
 from analysis.results.tables import Results
 from analysis.stats.intervals import mean_interval
-from dess.errors import InputError
+from dess import InputError
 from dess.state import sample_scenario
 from tests.analysis.small import grid, small_study
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.questions import main_effects
-from analysis.questions.learning import Transfer
+from analysis.questions.learning.curves import Transfer
 from analysis.questions.main_effects import Shape
 from analysis.replication import paper, rules
 from analysis.replication.evidence_of_policy import Pairs, negated

@@ -6,7 +6,7 @@ import pytest
 
 from analysis.stats.bootstrap import bootstrap_interval
 from analysis.stats.distribution import distribution, quantile_interval, tail_mean
-from dess.errors import InputError
+from dess import InputError
 
 
 def test_the_median_lies_between_order_statistics():

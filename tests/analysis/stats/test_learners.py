@@ -10,7 +10,7 @@ from analysis.stats.correction import adjust
 from analysis.stats.intervals import mean_interval
 from analysis.stats.learners import compare_learners, crossed
 from analysis.stats.paired import compare
-from dess.errors import InputError
+from dess import InputError
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios, rng
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -8,7 +8,7 @@ from scipy import stats
 
 from analysis.stats.correction import adjust
 from analysis.stats.paired import compare, paired
-from dess.errors import InputError
+from dess import InputError
 from tests.analysis.stats.matched_missions import METRIC, STUDY, ratios, rng
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -120,9 +120,8 @@ BAD = {
     "missions = 9\nselection = {procedure = 'kn', indifference = 0.1}": [
         "missions: are decided by selection"
     ],
-    "selection = {procedure = 'kn', indifference = 0.1}\nprecision.targets.success.absolute = 0.1": [
-        "precision: selection is there too"
-    ],
+    "selection = {procedure = 'kn', indifference = 0.1}\n"
+    "precision.targets.success.absolute = 0.1": ["precision: selection is there too"],
     "selection = {procedure = 'kn', indifference = -0.1}": [
         "selection.indifference",
         "greater than 0",

@@ -7,8 +7,7 @@ import pytest
 from analysis.results.tables import Results
 from analysis.verification import cross_check
 from analysis.verification.cross_check import FILE, CrossCheck
-from dess import simulate
-from dess.errors import InputError
+from dess import InputError, simulate
 from policies import load_team
 
 

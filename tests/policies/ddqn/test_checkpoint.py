@@ -12,8 +12,8 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
+from dess import InputError
 from dess.batch import simulate_batch
-from dess.errors import InputError
 from dess.scenario import load_scenario
 from policies.ddqn import checkpoint
 from policies.ddqn.checkpoint import (

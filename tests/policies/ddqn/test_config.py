@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from dess.errors import InputError
+from dess import InputError
 from policies.ddqn.config import TrainingConfig, config_names, config_of, load_config
 from tests.policies.ddqn.tiny import PHASES, TINY, tiny, write_config
 

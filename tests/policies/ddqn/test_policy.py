@@ -9,8 +9,8 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from torch import Tensor, nn
 
+from dess import InputError
 from dess.batch import simulate_batch
-from dess.errors import InputError
 from dess.mission import simulate
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from policies.base import Policy

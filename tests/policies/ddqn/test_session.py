@@ -14,7 +14,7 @@ import pytest
 import torch
 
 import policies
-from dess.errors import InputError
+from dess import InputError
 from dess.scenario import load_scenario
 from policies.ddqn import session
 from policies.ddqn.checkpoint import CHECKPOINT, CONFIG, MODEL, load_training

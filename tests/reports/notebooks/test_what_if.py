@@ -9,7 +9,8 @@ from scipy import stats
 
 from analysis import load_results, numbers
 from analysis.names import METRICS
-from analysis.questions import what_if, what_if_answer
+from analysis.questions.what_if import answer as what_if_answer
+from analysis.questions.what_if import question as what_if
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
 

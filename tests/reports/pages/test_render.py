@@ -19,7 +19,7 @@ import pytest
 from nbclient import NotebookClient
 
 from analysis import load_results, run_study
-from dess.errors import InputError
+from dess import InputError
 from reports.pages import kernels
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
@@ -51,7 +51,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from analysis import load_results
-from dess.errors import InputError
+from dess import InputError
 from reports.pages import html
 
 study = load_results(Path(results) / "trial")

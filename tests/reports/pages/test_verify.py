@@ -12,7 +12,7 @@ import pytest
 from analysis import load_study, run_study
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import load_results
-from dess.errors import InputError
+from dess import InputError
 from policies.registry import TRAINED
 from reports.cli import main
 from reports.pages import html

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
-from dess.errors import InputError
+from dess import InputError
 from policies.ddqn.observations.maps import (
     BATTERY_SCALE,
     DATA,

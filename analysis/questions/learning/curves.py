@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.questions.ablation import difference
+from analysis.questions.learning.ablation import difference
 from analysis.stats.intervals import Interval, mean_interval
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 

@@ -2,7 +2,7 @@
 
     table = ablation(finals(curves), "final_reward", "quick")
 
-Curves are those of ``analysis.questions.learning``; trainings of a variant differ in their seed.
+Curves are those of ``learning.curves``; trainings of a variant differ in their seed.
 """
 
 from collections.abc import Sequence

@@ -25,8 +25,7 @@ from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.study import Study
-from dess import simulate_batch
-from dess.errors import InputError
+from dess import InputError, simulate_batch
 from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, validation_line
 from policies import load_team
 

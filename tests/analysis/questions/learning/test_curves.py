@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.questions import learning
+from analysis.questions.learning import curves as learning
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 
 METRIC = "evaluation_reward"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from analysis.questions import trained
+from analysis.questions.learning import trained
 from tests.policies.ddqn.tiny import tiny
 
 

@@ -8,8 +8,8 @@ import pytest
 from scipy import stats
 
 from analysis.names import METRICS, PRODUCT
-from analysis.questions import what_if_answer
-from analysis.questions.what_if import BASELINE, VARIATION
+from analysis.questions.what_if import answer as what_if_answer
+from analysis.questions.what_if.question import BASELINE, VARIATION
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE
 from tests.analysis.small import asked

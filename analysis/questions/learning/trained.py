@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from analysis import numbers
-from analysis.questions.learning import PRODUCT, settled, smoothed
+from analysis.questions.learning.curves import PRODUCT, settled, smoothed
 from policies.ddqn.config import TrainingConfig, config_of, learner_of
 
 
@@ -47,7 +47,7 @@ def several_trainings(policies: Iterable[Trained]) -> list[list[Trained]]:
 
 
 def curves_of(trainings: Iterable[Trained], variant: str) -> pd.DataFrame:
-    """The curves of trainings as those of one variant, as of ``analysis.questions.learning``."""
+    """The curves of trainings as those of one variant, as of ``learning.curves``."""
     return pd.concat(t.curve.assign(variant=variant, seed=t.config.seed) for t in trainings)
 
 

@@ -4,8 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from tests.analysis.questions.test_learning import several
 
-from analysis.questions.ablation import (
+from analysis.questions.learning.ablation import (
     ablation,
     ablation_table,
     difference,
@@ -13,7 +14,6 @@ from analysis.questions.ablation import (
     positions_in_words,
     significant_in_words,
 )
-from tests.analysis.questions.test_learning import several
 
 
 def test_the_difference_of_means_is_welchs():

@@ -7,10 +7,9 @@ import pandas as pd
 import pytest
 
 from analysis import load_study
-from analysis.questions import what_if
-from analysis.questions.what_if import BASELINE, VARIATION
-from dess import load_scenario
-from dess.errors import InputError
+from analysis.questions.what_if import question as what_if
+from analysis.questions.what_if.question import BASELINE, VARIATION
+from dess import InputError, load_scenario
 from tests.analysis.small import asked, files_of, write_scenario
 
 POLICIES = ["random", "greedy"]

@@ -15,7 +15,7 @@ from scipy import stats
 from analysis import numbers
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.questions import summary
-from analysis.questions.what_if import BASELINE, SIDES, VARIATION, settings_of
+from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, settings_of
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import compare

@@ -1,0 +1,1 @@
+"""Questions about training: learning curves, ablations, the trained policies in a folder."""
