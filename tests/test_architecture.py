@@ -4,6 +4,7 @@ import ast
 import json
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -116,6 +117,13 @@ def test_rooms_only_import_from_rooms_before_them(floor: str) -> None:
                 if imported.split(".")[0] == floor and imported.split(".")[1] not in allowed
             }
     assert not climbing
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_folders_have_at_most_twelve_modules(floor: str) -> None:
+    modules = [path for path in (ROOT / floor).rglob("*.py") if not path.name.startswith("__")]
+    folders = Counter(path.parent.relative_to(ROOT).as_posix() for path in modules)
+    assert not {folder for folder, count in folders.items() if count > 12}
 
 
 def test_no_modules_import_each_other() -> None:
