@@ -183,7 +183,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     Args:
         name_or_path: One of ``study_names()``, or the path of a TOML file. A file that names no
             study gives it its own name; its scenario, if a file, is looked for beside it.
-        **overrides: Fields of ``Study`` to set on top.
+        **overrides: Fields of ``Study`` to set on top. With fewer ``missions`` than the study keeps
+            event logs of, all of them keep their log.
 
     Raises:
         InputError: If there is no such study, or it is not valid.
@@ -194,7 +195,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     scenario = values.get("scenario")
     if isinstance(scenario, str) and scenario not in scenario_names():
         values["scenario"] = str(Path(text).parent / scenario)
-    values |= overrides
+    values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         allowed = ", ".join(Study.model_fields)
         raise InputError(f"{where}: {unknown[0]}: unknown key; allowed: {allowed}")
@@ -206,6 +207,14 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         raise InputError(f"{where}: {error}") from None
     study._origin = (text, overrides)
     return study
+
+
+def _with_fewer_logs(values: dict[str, Any], overrides: dict[str, Any]) -> dict[str, Any]:
+    """Overrides; fewer missions than the study keeps event logs of keep fewer logs."""
+    logged, missions = values.get("logged"), overrides.get("missions")
+    if isinstance(logged, int) and isinstance(missions, int) and 1 <= missions < logged:
+        return {"logged": missions} | overrides
+    return overrides
 
 
 def study_names() -> list[str]:

@@ -133,8 +133,7 @@ html.table(what_if_answer.pairing(answers), f"Differences of n = {missions:,} pa
 # ## Two missions to look at
 #
 # They are of the best policy in the variation, unless the parameter `shown` names another. Each is
-# simulated in the same realisation of the baseline and of the variation, and is an example (n = 1),
-# without intervals.
+# one example (n = 1), simulated in the same realisation of the baseline and of the variation.
 
 
 # %%
