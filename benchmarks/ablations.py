@@ -33,7 +33,7 @@ VARIANTS = {
         ("dess/channel.py", "if order[row, mission.nodes] == 0:", "if True:"),
     ),
     "no inlining: the rules are called": (
-        ("dess/compiled.py", "kernel(function, forceinline=True)", "kernel(function)"),
+        ("dess/code/kernels.py", "kernel(function, forceinline=True)", "kernel(function)"),
     ),
     "no batch: one mission at a time": (("dess/batch.py", "BATCH_SIZE = 256", "BATCH_SIZE = 1"),),
 }

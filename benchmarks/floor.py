@@ -10,7 +10,7 @@ import numpy as np
 
 from dess import channel, rules, streams
 from dess.channel import empty_scratch, world_of
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.scenario import ScenarioSpace
 from dess.state import constants_of, empty_state, ranges_of
 

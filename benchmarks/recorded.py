@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.view import View
 
 

@@ -14,6 +14,7 @@ from importlib import import_module, metadata
 from typing import Any
 
 _HOME = {
+    "InputError": "errors",
     "Scenario": "scenario",
     "ScenarioSpace": "scenario",
     "load_scenario": "scenario",
@@ -24,11 +25,7 @@ _HOME = {
     "batch_env": "env.batch",
 }
 
-__all__ = ["InputError", "__version__", *_HOME]
-
-
-class InputError(ValueError):
-    """Bad input: one line that says where, what, and what is allowed."""
+__all__ = ["__version__", *_HOME]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess import streams
-from dess.compiled import inlined, kernel
+from dess.code.kernels import inlined, kernel
 from dess.scenario import ScenarioSpace
 from dess.state import STEP_X, STEP_Y
 

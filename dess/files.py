@@ -13,7 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dess import InputError
+from dess.errors import InputError
 
 
 class Shipped(NamedTuple):

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.state import END_NAMES, QUOTA
 
 # One mission. Data in data units, rewards summed over the slots and the UAVs (eq. 14).

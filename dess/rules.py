@@ -17,7 +17,7 @@ import math
 import numpy as np
 
 from dess import channel, streams
-from dess.compiled import inlined, kernel
+from dess.code.kernels import inlined, kernel
 from dess.state import (
     ACTIVE,
     BATTERY,

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess import InputError
+from dess.errors import InputError
 from dess.files import Shipped
 
 Cell = tuple[int, int]

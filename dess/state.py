@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess import InputError, streams
-from dess.compiled import kernel
+from dess import streams
+from dess.code.kernels import kernel
+from dess.errors import InputError
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)

@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 
 # Streams: the purpose of a draw. They are disjoint parts of the counter space.
 PARAMETERS = 0  # the sampled parameters of a mission's scenario

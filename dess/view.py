@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dess.channel import World
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.rules import on_grid
 from dess.state import HOVER, STEP_X, STEP_Y, State
 

@@ -10,7 +10,7 @@ rules; below are compiled functions on one mission's arrays.
 
 import numpy as np
 
-from dess.compiled import inlined, kernel
+from dess.code.kernels import inlined, kernel
 from dess.rules import in_zone, on_grid, zone_cell, zone_number
 from dess.state import STEP_X, STEP_Y
 from dess.view import View

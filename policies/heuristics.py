@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from dess import streams
-from dess.compiled import inlined, kernel
+from dess.code.kernels import inlined, kernel
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 from policies.guard import (

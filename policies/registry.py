@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from dess import InputError
+from dess.errors import InputError
 from policies.base import Policy
 
 GROUP = "dess.policies"

@@ -1,7 +1,7 @@
 """What records are made with: the code of the engines and policies, libraries, the git commit.
 
-Code is told apart by hashes of the syntax trees of modules (``dess.sources``): of the modules that
-the engines import, and of those that a policy imports. Environments and drawings are not among
+Code is told apart by hashes of the syntax trees of modules (``dess.code.sources``): of the modules
+that the engines import, and of those that a policy imports. Environments and drawings are not among
 them, nor are comments and docstrings.
 """
 
@@ -18,7 +18,7 @@ from pydantic import Field
 
 import dess
 from analysis.results.documents import Document
-from dess.sources import OURS, code_of, combined
+from dess.code.sources import OURS, code_of, combined
 from policies import load_team
 from policies.base import Policy
 

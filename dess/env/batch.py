@@ -11,9 +11,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
-from dess import InputError
 from dess.env.observation import Observation, observation_names, observation_space, observe
 from dess.env.stepper import MissionStepper, checked_actions
+from dess.errors import InputError
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES
 from dess.view import View, acting_rows

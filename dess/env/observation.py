@@ -3,7 +3,7 @@
 import numpy as np
 from gymnasium import spaces
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES, HOVER, State, spaces_of
 from dess.view import legal_actions

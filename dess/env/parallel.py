@@ -13,7 +13,6 @@ import numpy as np
 from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
-from dess import InputError
 from dess.env.observation import (
     Observation,
     observation_bounds,
@@ -23,6 +22,7 @@ from dess.env.observation import (
 )
 from dess.env.render import draw
 from dess.env.stepper import REWARD_TERMS, MissionStepper, Outcome, checked_actions
+from dess.errors import InputError
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, HOVER

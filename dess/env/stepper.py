@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess import InputError, rules
+from dess import rules
 from dess.channel import empty_scratch, world_of
-from dess.compiled import kernel
+from dess.code.kernels import kernel
+from dess.errors import InputError
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (

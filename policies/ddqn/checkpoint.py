@@ -17,7 +17,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
-from dess import InputError
+from dess.errors import InputError
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace

@@ -18,7 +18,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess import InputError
+from dess.errors import InputError
 from dess.files import Shipped
 from dess.scenario import load_scenario, validation_line
 

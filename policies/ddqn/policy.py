@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from dess import InputError
+from dess.errors import InputError
 from dess.view import View
 from policies.ddqn.observations.states import Layout, compact_states, masks
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from policies.ddqn.observations.states import CompactStates, empty_states
 
 

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import torch
 
 import dess
-from dess import InputError
+from dess.errors import InputError
 from dess.files import writable
 from dess.scenario import load_scenario
 from policies.ddqn.checkpoint import (

@@ -12,10 +12,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from dess import InputError
 from dess.batch import simulate_batch
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
+from dess.errors import InputError
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig

@@ -6,8 +6,8 @@ the nodes and the UAVs; the centred map of eq. 19 is never built.
 
 import numpy as np
 
-from dess import InputError
-from dess.compiled import inlined, kernel
+from dess.code.kernels import inlined, kernel
+from dess.errors import InputError
 from policies.ddqn.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y
 
 # The layers of a map: the charging zone, residual data / 20 [data units], remaining flying time

@@ -6,7 +6,7 @@ once, not once per node.
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from policies.ddqn.observations.states import CompactStates, Layout, X, Y
 from policies.ddqn.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.rules import on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State

@@ -8,7 +8,7 @@ described one by one, and all of them affect the data that is left for this UAV.
 
 import numpy as np
 
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from dess.state import STEP_X, STEP_Y
 from policies.ddqn.observations.states import (
     ACTIVE,

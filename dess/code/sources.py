@@ -6,7 +6,7 @@ docstrings, layout and line numbers do not. Imports are read from the source, th
 included; nothing is executed. A module that is loaded by name (``import_module``) does not count.
 
     >>> sorted(code_of("dess.streams"))
-    ['dess.compiled', 'dess.sources', 'dess.streams']
+    ['dess.code.kernels', 'dess.code.sources', 'dess.streams']
 """
 
 import ast

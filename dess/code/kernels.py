@@ -3,7 +3,7 @@
 Numba keeps a compiled function as long as the file that defines it stays the same. Our functions
 inline one another across files, so a cached engine would outlive a change of the rules. Here a
 cached function is valid while the code of its module, and of all that this imports, is unchanged
-(``dess.sources``): comments and line numbers make no difference.
+(``dess.code.sources``): comments and line numbers make no difference.
 """
 
 import inspect
@@ -15,7 +15,7 @@ from typing import Any
 from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
-from dess.sources import code_of, combined
+from dess.code.sources import code_of, combined
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dess.sources import code_of, combined
+from dess.code.sources import code_of, combined
 
 ROOT = Path(__file__).parents[2]
 ENGINES = ("dess.batch", "dess.mission")
@@ -24,7 +24,7 @@ def tree(tmp_path: Path) -> Path:
 
 def hashes(tree: Path, *modules: str) -> dict[str, str]:
     """``code_of`` the modules of a source tree, by a process of its own."""
-    script = "import json, sys; from dess.sources import code_of; "
+    script = "import json, sys; from dess.code.sources import code_of; "
     script += "print(json.dumps(code_of(*sys.argv[1:])))"
     command = [sys.executable, "-c", script, *modules]
     done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=True, env={})

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 CALLER = """
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 from callee import inner
 
 @kernel
@@ -19,7 +19,7 @@ if __name__ == "__main__":
 """
 
 CALLEE = """
-from dess.compiled import kernel
+from dess.code.kernels import kernel
 
 @kernel
 def inner(x):

@@ -1,0 +1,5 @@
+"""The one exception for bad input."""
+
+
+class InputError(ValueError):
+    """Bad input: one line that says where, what, and what is allowed."""
