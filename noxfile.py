@@ -69,7 +69,6 @@ def reports(session: nox.Session) -> None:
         out = ["--out", str(results / study), "--workers", "2"]
         session.run("dess", "study", "run", study, *out, *policies)
     session.run("dess", "timing", "--out", str(results / "timing"))
-    session.run("dess", "cross-check", "--results", str(results))
     session.run("dess", "report", "--results", str(results), "--out", str(reports))
     session.log(f"The reports are at {(reports / 'index.html').resolve().as_uri()}")
 

@@ -11,6 +11,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 
 from analysis import numbers
 from analysis.execution.decision_time import Cost
+from analysis.figures.missions import mission_figure
 from analysis.figures.style import (
     INK,
     MUTED,
@@ -22,12 +23,28 @@ from analysis.figures.style import (
 )
 from analysis.names import parameter
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
+from analysis.questions.missions import LoggedMission
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
 
 # Blue is ahead, orange behind, on all figures; an inconclusive mean is hollow.
 COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: MUTED}
 EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
+
+
+def maps(missions: Sequence[LoggedMission]) -> list[list[tuple[Figure, str, str]]]:
+    """Missions drawn, those of one replication together, with alternative texts and captions."""
+    replications = dict.fromkeys(mission.row["replication"] for mission in missions)
+    return [
+        [_map(mission) for mission in missions if mission.row["replication"] == replication]
+        for replication in replications
+    ]
+
+
+def _map(mission: LoggedMission) -> tuple[Figure, str, str]:
+    name, number = mission.row["policy"], mission.row["replication"]
+    alt = f"Map of mission {number} by {name}; battery, residual data and charging"
+    return mission_figure(mission.log, mission.scenario), alt, mission.caption
 
 
 def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:

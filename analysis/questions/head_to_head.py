@@ -237,6 +237,12 @@ def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
 
 
+def drawn(missions: pd.DataFrame, pair: Pair, count: int = 2) -> list[tuple[str, int]]:
+    """The missions to draw, by policy and replication: the worst of ``duels``, by both policies."""
+    replications = worst(missions, count)["replication"]
+    return [(policy, int(n)) for n in replications for policy in (pair.policy, pair.baseline)]
+
+
 def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     """The missions of ``duels`` in which the policy is furthest behind, if it is behind."""
     lost = missions[missions["difference"] < 0]

@@ -2,20 +2,29 @@
 
 mission = logged_mission(results, "greedy", point=0, replication=0)
 outcome_table([mission])
+
+Event logs that the study has not kept are made by simulating its missions again. They are kept in
+another folder, under the keys of their cells, so those of other results are never read.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
 from analysis import numbers
 from analysis.names import PRODUCT, RATIO
+from analysis.results import parquet
+from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary
+from dess import InputError
 from dess.scenario import SAMPLED, Scenario
 
+FOLDER = "cross-check"  # of missions simulated again, beside the results folders of the studies
 ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
 
 
@@ -41,6 +50,29 @@ class LoggedMission:
         total = self.row["initial"] + self.row["arrived"]
         return f"{self.row['collected']:.0f} of {total:.0f} data units collected"
 
+    @property
+    def depletions(self) -> str:
+        """Which batteries were depleted, when and how far from the zone, for a sentence."""
+        left, top, width, height = self.scenario.zone
+        parts = []
+        depleted = self.log[self.log["event"] == "battery_empty"]
+        for row in depleted.astype({"time": int, "x": int, "y": int}).itertuples():
+            moves = max(left - row.x, 0, row.x - left - width + 1)
+            moves += max(top - row.y, 0, row.y - top - height + 1)
+            away = f"{moves} move{'s' * (moves != 1)} from" if moves else "in"
+            where = f"in slot {row.time} at ({row.x}, {row.y}), {away} the charging zone"
+            parts.append(f"the battery of UAV {row.uav + 1} is depleted {where}")
+        return "; ".join(parts) or "no battery is depleted"
+
+    @property
+    def caption(self) -> str:
+        """What happened, for a figure of it."""
+        policy, replication = self.row["policy"], self.row["replication"]
+        return (
+            f"{policy} in mission {replication}, a single one (n = 1): {self.depletions}. "
+            f"{self.collected} in {self.row['slots']} mission slots."
+        )
+
 
 def logged_mission(
     results: Results, policy: str, point: int = 0, replication: int = 0
@@ -50,7 +82,70 @@ def logged_mission(
     Raises:
         InputError: If its event log has not been kept.
     """
-    log = results.events(policy, point, replication)
+    return _mission(results, policy, point, replication, results.events(policy, point, replication))
+
+
+def keep_logs(
+    results: Results,
+    wanted: Sequence[tuple[str, int]],
+    folder: str | Path,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Simulate missions again whose event logs are not in ``FOLDER``, and keep the logs there.
+
+    A mission whose record is then another one, because other code simulated it, gets none.
+
+    Args:
+        results: The study.
+        wanted: Policies and replications of missions of the first design point.
+        folder: Holds a results folder per study.
+        progress: Called with the missions done and the missions in all.
+
+    Raises:
+        InputError: If a log cannot be written.
+    """
+    for done, (policy, replication) in enumerate(wanted, 1):
+        if _kept_log(results, policy, replication, folder) is None:
+            _keep_log(results, policy, replication, folder)
+        if progress:
+            progress(done, len(wanted))
+
+
+def kept_missions(
+    results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
+) -> list[LoggedMission]:
+    """Those of the missions whose event logs ``keep_logs`` has kept."""
+    return [
+        _mission(results, policy, 0, replication, log)
+        for policy, replication in wanted
+        if (log := _kept_log(results, policy, replication, folder)) is not None
+    ]
+
+
+def _keep_log(results: Results, policy: str, replication: int, folder: str | Path) -> None:
+    try:
+        events = resimulate(results, policy, 0, replication).events
+    except InputError:  # the record is another one
+        return
+    table = pa.table({name: events[name] for name in events})
+    parquet.write(Path(folder, FOLDER), _name(results, policy, replication), table)
+
+
+def _kept_log(
+    results: Results, policy: str, replication: int, folder: str | Path
+) -> pd.DataFrame | None:
+    files = sorted(Path(folder, FOLDER).glob(f"{_name(results, policy, replication)}-*.parquet"))
+    tables = (parquet.read(path) for path in files)
+    return next((table.to_pandas() for table in tables if table is not None), None)
+
+
+def _name(results: Results, policy: str, replication: int) -> str:
+    return f"{results.cell(policy, 0).key}-{replication:06}"
+
+
+def _mission(
+    results: Results, policy: str, point: int, replication: int, log: pd.DataFrame
+) -> LoggedMission:
     of_mission = "policy == @policy and point == @point and replication == @replication"
     row = results.missions.query(of_mission).iloc[0]
     sampled = {key: int(row[key]) for key in SAMPLED}

@@ -59,7 +59,7 @@ class Results:
         Raises:
             InputError: If it has not been kept.
         """
-        cell = self._cell(policy, point)
+        cell = self.cell(policy, point)
         log = self.store.load_log(cell, replication)
         if log is None:
             logged = self.store.manifest.study["logged"]
@@ -71,7 +71,7 @@ class Results:
 
     def command(self, policy: str, point: int, replication: int) -> str:
         """The command that simulates a mission of the study again."""
-        return self.store.manifest.command(self._cell(policy, point), replication)
+        return self.store.manifest.command(self.cell(policy, point), replication)
 
     replay = command
 
@@ -83,7 +83,12 @@ class Results:
         rule = Selection.model_validate_json(json.dumps(manifest.study["selection"]))
         return rule.choice(self.store.samples(_parts(manifest, self.policies.index(policy))))
 
-    def _cell(self, policy: str, point: int) -> Cell:
+    def cell(self, policy: str, point: int) -> Cell:
+        """A policy at a design point; its key is a hash of all that its records depend on.
+
+        Raises:
+            InputError: If the study has no such policy or point.
+        """
         if policy not in self.policies:
             allowed = ", ".join(self.policies)
             raise InputError(f"policy: {policy!r} is not in the study; allowed: {allowed}")

@@ -1,8 +1,9 @@
-"""Missions that only the page of the verification needs: simulated by a command, kept in a file.
+"""Missions that only the page of the verification needs: simulated before it, kept in a file.
 
-``dess cross-check`` simulates missions of the study ``verification`` again with the SimPy engine,
-and a lone UAV with both engines; pages read them, and simulate nothing::
+``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and a
+lone UAV with both engines; the page reads them, and simulates nothing::
 
+    make("results", results)
     missions = read("results", results)
     records.engine_check(results, missions)
 """
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from analysis.questions.missions import FOLDER
 from analysis.results.tables import Results
 from analysis.verification import lone_uav
 from dess import InputError, simulate
@@ -23,7 +25,7 @@ from dess.state import END_NAMES
 from policies import load_team
 
 STUDY = "verification"
-FILE = Path("cross-check/missions.json")  # in the folder of all results
+FILE = Path(FOLDER, "missions.json")  # in the folder of all results
 MISSIONS = 50  # of every policy that are simulated again, spread over its replications
 
 # Called with the steps done and the steps in all.
@@ -95,6 +97,23 @@ def _uavs(record: MissionRecord) -> Iterator[Fields]:
         yield {"uav": number, **fields, "end": END_NAMES[uav["end"]]}
 
 
+def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+    """Simulate the missions and write them, unless those of the results are in the folder.
+
+    Args:
+        folder: Holds a results folder per study.
+        results: Of the study.
+        progress: Called after every mission.
+
+    Raises:
+        InputError: If they cannot be written.
+    """
+    try:
+        read(folder, results)
+    except InputError:
+        write(simulate_missions(results, progress=progress), folder)
+
+
 def write(missions: CrossCheck, folder: str | Path) -> Path:
     """Write missions, in place of earlier ones; returns the file.
 
@@ -124,7 +143,7 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
         InputError: If there are none, or they are damaged or of other results.
     """
     path = Path(folder) / FILE
-    allowed = "allowed: what is made by: dess cross-check"
+    allowed = "allowed: what is made by: dess report verification"
     try:
         missions = CrossCheck.model_validate_json(path.read_bytes())
     except (OSError, ValidationError):

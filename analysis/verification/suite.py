@@ -32,7 +32,7 @@ class Suite:
         study: The study of the verification.
         others: The other studies, by their names.
         damaged: The names of the studies that cannot be loaded.
-        again: Missions that ``dess cross-check`` has simulated.
+        again: Missions that ``dess report`` has simulated for this page.
     """
 
     study: Results

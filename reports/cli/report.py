@@ -1,4 +1,4 @@
-"""``dess report`` and ``dess verify``: pages and checks of them; what pages need beside studies."""
+"""``dess report`` and ``dess verify``: pages and checks of them; ``dess timing``: of decisions."""
 
 import json
 from dataclasses import asdict
@@ -60,7 +60,7 @@ def report(
     from reports.pages.render import ReportError, render
 
     try:
-        with console.counted_bar("cell") as progress:
+        with console.compile_notice(), console.counted_bar("step") as progress:
             print(render(names or [], results, out, progress=progress, parameters=values))
     except ReportError as error:
         raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
@@ -138,18 +138,3 @@ def timing(
         for cost in read(out).costs
     ]
     console.print_table(["policy", "median", "95 % below", "in a batch, per UAV"], rows)
-
-
-@app.command(name="cross-check")
-def cross_check(
-    results: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder with the results of the study verification.")
-    ] = RESULTS,
-) -> None:
-    """Simulate missions of the study verification again, and a lone UAV, for its page."""
-    from analysis.results.tables import load_results
-    from analysis.verification.cross_check import STUDY, simulate_missions, write
-
-    study = load_results(results / STUDY)
-    with console.compile_notice(), console.counted_bar("mission") as progress:
-        print(write(simulate_missions(study, progress=progress), results))

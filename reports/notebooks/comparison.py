@@ -28,6 +28,7 @@ from analysis import load_results, numbers
 from analysis.execution import decision_time
 from analysis.figures import comparison as figures
 from analysis.questions import decision_costs, head_to_head, regions, summary
+from analysis.questions.missions import kept_missions
 from reports.pages import html
 
 # %%
@@ -64,10 +65,9 @@ html.say(head_to_head.standings(learners))
 html.say(head_to_head.standing_of_pair(missions, pair))
 
 # %%
-every = head_to_head.by_metric(summary.comparisons(study))
 display(
     html.table(head_to_head.by_metric(learners, "learner"), "Every learner and the best heuristic"),
-    html.table(every, "Every policy and the best one"),
+    html.table(head_to_head.by_metric(summary.comparisons(study)), "Every policy and the best one"),
 )
 
 # %% [markdown]
@@ -151,7 +151,8 @@ html.table(regions.listed(leaves, policy), f"{policy} is {regions.tally(leaves)}
 #
 # Those with the lowest product, of equal ones those with less collected; and of all others those
 # in which the policy is furthest behind. Points are the difference in the product. The commands
-# simulate a mission again and draw it; another `--policy` acts in the same mission.
+# simulate a mission again and draw it; another `--policy` acts in the same mission. The first two
+# are drawn below, by both policies, if their records are still the same when simulated again.
 
 # %%
 worst = head_to_head.worst(missions, 5)
@@ -166,7 +167,8 @@ display(
 # %%
 shown = [*worst["replication"], *lost["replication"]]
 lines = [f"{study.command(policy, 0, n)} --figure mission-{n}.png" for n in shown]
-html.say("{commands}", commands=html.commands(lines))
+maps = figures.maps(kept_missions(study, head_to_head.drawn(missions, pair), results))
+display(html.say("{commands}", commands=html.commands(lines)), *map(html.gallery, maps))
 
 # %% [markdown]
 # ## What a decision costs
@@ -180,18 +182,16 @@ html.say("{commands}", commands=html.commands(lines))
 
 # %%
 costs = decision_costs.timed(times, study.policies)
-html.say(decision_costs.remarks(times, study, pair))
-
-# %%
-html.figure(
-    figures.decision_time(costs, study.policies),
-    "Time of a decision of every policy, for one mission and in the batch",
+alt = "Time of a decision of every policy, for one mission and in the batch"
+caption = (
     f"n = {min(cost.calls for cost in costs):,} calls or more per policy. A line goes from the "
-    "median to what 95 % of the calls keep below: the spread of the calls, no interval of a mean.",
+    "median to what 95 % of the calls keep below: the spread of the calls, no interval of a mean."
 )
-
-# %%
-html.table(decision_costs.listed(times, costs), "Times of decisions, and the speed they allow")
+display(
+    html.say(decision_costs.remarks(times, study, pair)),
+    html.figure(figures.decision_time(costs, study.policies), alt, caption),
+    html.table(decision_costs.listed(times, costs), "Times of decisions, and the speed they allow"),
+)
 
 # %% [markdown]
 # ## Where the figures come from

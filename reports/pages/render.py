@@ -22,6 +22,7 @@ from pygments.lexers import PythonLexer
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess import InputError
+from reports.pages import missions
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
 from reports.pages.notebook import SHIPPED, VALUES, Report, check_parameters, names_in, read
@@ -53,7 +54,7 @@ def render(
         names: The reports; all if empty.
         results: The folder that holds a results folder per study.
         out: The folder to write to.
-        progress: Called after every cell.
+        progress: Called after every mission that the pages need beside the results, and every cell.
         parameters: Values for the parameters of the notebooks, beside ``results``.
         notebooks: The folder of the notebooks.
 
@@ -75,6 +76,7 @@ def render(
         report.set({"results": ".", **values})
     needed = [out] + [results for report in reports if "results" in report.parameters]
     with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
+        missions.make([report.name for report in reports], results, values, progress)
         Kernels(results, progress).run(reports)
         files = {report.page: _page(report) for report in reports}
         complete = [report for report in reports if not report.failure]

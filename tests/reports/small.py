@@ -48,7 +48,7 @@ STUDIES: dict[str, dict[str, Any]] = {
 def run_small_studies(folder: Path, *names: str) -> Path:
     """Run the studies, all or some, each into a folder of its name; with all, a timing.
 
-    Beside the study verification stand the missions of its cross-check.
+    Beside the study verification stand missions of its cross-check, fewer than a page has.
     """
     for name in names or STUDIES:
         study = run_study(load_study(name, **STUDIES[name]), folder / name)

@@ -192,6 +192,10 @@ def test_the_worst_missions_and_the_most_lost():
         difference=[-0.9, 0.1, -0.2, -0.3],
     )
     assert head_to_head.worst(missions, 3)["replication"].tolist() == [2, 0, 1]
+    assert head_to_head.drawn(missions, Pair("ours", "theirs", 1)) == [
+        *(("ours", 2), ("theirs", 2)),
+        *(("ours", 0), ("theirs", 0)),
+    ]
     assert head_to_head.most_lost(missions, 2)["replication"].tolist() == [0, 3]
     assert head_to_head.most_lost(missions, 9)["replication"].tolist() == [0, 3, 2]
 

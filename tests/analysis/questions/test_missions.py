@@ -1,5 +1,8 @@
 """Tables of single missions agree with the records and the event logs."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -37,6 +40,68 @@ def test_a_mission_has_the_scenario_of_its_replication(
 def test_a_mission_without_a_log_is_refused(results: Results) -> None:
     with pytest.raises(InputError, match="no event log of greedy, point 0, replication 5"):
         missions.logged_mission(results, "greedy", 0, 5)
+
+
+# --- missions simulated again ---
+
+WANTED = [("greedy", 1), ("random", 0)]
+
+
+def test_kept_logs_are_those_that_the_study_keeps(results: Results, tmp_path: Path) -> None:
+    """They are kept: a second call writes nothing, but in place of a damaged file."""
+    assert missions.kept_missions(results, WANTED, tmp_path) == []
+    steps: list[tuple[int, int]] = []
+    missions.keep_logs(results, WANTED, tmp_path, lambda *step: steps.append(step))
+    assert steps == [(1, 2), (2, 2)]
+    kept = missions.kept_missions(results, WANTED, tmp_path)
+    for (policy, replication), mission in zip(WANTED, kept, strict=True):
+        same = missions.logged_mission(results, policy, 0, replication)
+        pd.testing.assert_frame_equal(mission.log, same.log)
+        assert mission.row.equals(same.row) and mission.scenario == same.scenario
+    files = {path: path.read_bytes() for path in (tmp_path / missions.FOLDER).iterdir()}
+    damaged = min(files)
+    damaged.write_bytes(b"damaged")
+    before = max(files).stat().st_mtime_ns
+    missions.keep_logs(results, WANTED, tmp_path)
+    assert {path: path.read_bytes() for path in files} == files
+    assert max(files).stat().st_mtime_ns == before
+
+
+def test_logs_of_other_results_and_of_other_records_are_not_shown(
+    results: Results, tmp_path: Path
+) -> None:
+    missions.keep_logs(results, WANTED, tmp_path)
+    other = run_study(small_study(tmp_path, seed=8, missions=2), tmp_path / "other")
+    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+    other.missions["slots"] += 1  # as of other code
+    missions.keep_logs(other, WANTED[:1], tmp_path)
+    assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_written_is_named(results: Results, tmp_path: Path) -> None:
+    (tmp_path / missions.FOLDER).write_text("a file")
+    with pytest.raises(InputError, match="cross-check/.*parquet: cannot be written: .*; allowed"):
+        missions.keep_logs(results, WANTED, tmp_path)
+
+
+def test_a_caption_says_where_batteries_are_depleted(shown: list[missions.LoggedMission]) -> None:
+    """The charging zone reaches from its corner over its width and height, both included."""
+    mission = shown[1]
+    x, y, width, height = mission.scenario.zone
+    kept = mission.log[mission.log["event"] != "battery_empty"]
+    assert ": no battery is depleted. " in replace(mission, log=kept).caption
+    cells = [(x + width - 1, y), (x + width, y + height - 1), (x + width + 1, y + height)]
+    empty = [
+        {"time": 7.0 + n, "event": "battery_empty", "uav": n, "x": cell[0], "y": cell[1]}
+        for n, cell in enumerate(cells)
+    ]
+    log = pd.concat([kept, pd.DataFrame(empty)])
+    text = replace(mission, log=log).caption
+    for n, where in enumerate(("in", "1 move from", "3 moves from")):
+        x, y = cells[n]
+        part = f"UAV {n + 1} is depleted in slot {7 + n} at ({x}, {y}), {where} the charging zone"
+        assert part in text
+    assert f"{mission.collected} in {mission.row['slots']} mission slots." in text
 
 
 def test_outcomes_are_those_of_the_record(shown: list[missions.LoggedMission]) -> None:

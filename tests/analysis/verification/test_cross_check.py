@@ -40,7 +40,7 @@ def test_a_file_keeps_missions_to_the_last_bit(
 def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
     results: Results, again: CrossCheck, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match="missing or damaged.*dess cross-check"):
+    with pytest.raises(InputError, match="missing or damaged.*dess report verification"):
         cross_check.read(tmp_path, results)
     (tmp_path / FILE).parent.mkdir()
     (tmp_path / FILE).write_text("{")
@@ -49,3 +49,23 @@ def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
     cross_check.write(again.model_copy(update={"study": "another"}), tmp_path)
     with pytest.raises(InputError, match="other results"):
         cross_check.read(tmp_path, results)
+
+
+def test_missions_are_simulated_only_if_they_are_missing_or_of_other_results(
+    results: Results, again: CrossCheck, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cross_check.write(again, tmp_path)
+    cross_check.make(tmp_path, results)
+    assert cross_check.read(tmp_path, results) == again
+    cross_check.write(again.model_copy(update={"study": "another"}), tmp_path)
+    monkeypatch.setattr(cross_check, "simulate_missions", lambda results, progress: again)
+    cross_check.make(tmp_path, results)
+    assert cross_check.read(tmp_path, results) == again
+
+
+def test_a_folder_that_cannot_be_written_is_named(
+    results: Results, again: CrossCheck, tmp_path: Path
+) -> None:
+    (tmp_path / FILE.parent).write_text("a file")
+    with pytest.raises(InputError, match="cross-check/.*: cannot be written: .*; allowed"):
+        cross_check.write(again, tmp_path)

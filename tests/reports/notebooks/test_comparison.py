@@ -12,8 +12,10 @@ from scipy import stats
 from analysis import load_results, load_study, numbers, run_study
 from analysis.execution import decision_time as timing
 from analysis.questions import head_to_head, regions, summary
+from analysis.questions.missions import FOLDER
 from dess import InputError
-from tests.reports.small import said_by
+from reports.pages import missions as missions_of_pages
+from tests.reports.small import said_by, shown_by
 
 NAME = "comparison"
 POLICIES = ["random", "greedy", "nearest", "ddqn"]
@@ -82,6 +84,28 @@ def test_the_worst_missions_can_be_simulated_again(text: str, results: Path) -> 
     missions = head_to_head.duels(study, head_to_head.pair_of(study))
     for number in head_to_head.worst(missions, 5)["replication"]:
         assert f"{study.command('ddqn', 0, number)} --figure mission-{number}.png" in text
+
+
+def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: Path) -> None:
+    """Captions have the numbers of the files; pages have the maps of missions that are kept."""
+    assert "a single one (n = 1)" not in said(results)
+    (tmp_path / NAME).symlink_to(results / NAME)
+    (tmp_path / "timing").symlink_to(results / "timing")
+    for chosen in ({}, {"learned": "random", "heuristic": "nearest"}):
+        missions_of_pages.make([NAME, "learning"], tmp_path, chosen)
+        shown = shown_by(NAME, results=str(tmp_path), **chosen)
+        assert shown.count('alt="Map of mission ') == 4
+    assert len([*(tmp_path / FOLDER).iterdir()]) == 8
+    columns = ["policy", "replication", "collected", "initial", "arrived", "slots"]
+    records = pd.read_parquet(results / NAME / "missions").astype({"policy": str})
+    product = ["collection_ratio_and_communication", "collection_ratio"]
+    of_random = records[records["policy"] == "random"].sort_values([*product, "replication"])
+    worst = of_random["replication"].head(2)
+    drawn = records[records["policy"].isin(["random", "nearest"])]
+    for row in drawn.loc[drawn["replication"].isin(worst), columns].itertuples():
+        assert f"{row.policy} in mission {row.replication}, a single one (n = 1): " in shown
+        total = row.initial + row.arrived
+        assert f"{row.collected:.0f} of {total:.0f} data units collected in {row.slots} " in shown
 
 
 def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:

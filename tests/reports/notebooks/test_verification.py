@@ -15,7 +15,7 @@ from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.verification.cross_check import simulate_missions, write
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports.cli import main
+from reports.pages import missions
 from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"
@@ -36,7 +36,7 @@ def run(folder: Path, **changes: Any) -> Path:
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     run_study(load_study(NAME, **SMALL), folder / NAME)
-    assert main(["cross-check", "--results", str(folder)]) == 0
+    missions.make([NAME], folder, {})
     run_study(load_study("fig4", policies=["random"], missions=2, logged=1), folder / "fig4")
     return folder
 

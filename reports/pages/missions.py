@@ -1,0 +1,50 @@
+"""Missions that pages show beside the records of their studies.
+
+Notebooks do not simulate: before they run, these missions are simulated again and kept in the
+folder ``cross-check`` beside the results. What is there of the same results stays::
+
+    make(["verification"], Path("results"), {})
+"""
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any
+
+from analysis.questions import head_to_head
+from analysis.questions.missions import keep_logs
+from analysis.results.tables import load_results
+from analysis.verification import cross_check
+from reports.pages.kernels import Progress
+
+COMPARISON, VERIFICATION = "comparison", "verification"  # the pages, and the studies of them
+
+
+def make(
+    pages: Collection[str],
+    results: Path,
+    parameters: Mapping[str, Any],
+    progress: Progress | None = None,
+) -> None:
+    """Simulate the missions that are missing.
+
+    Args:
+        pages: Names of reports; those that need no missions are ignored.
+        results: The folder that holds a results folder per study.
+        parameters: Values for the parameters of the notebooks.
+        progress: Called after every mission.
+
+    Raises:
+        InputError: If results are damaged, a parameter is refused or nothing can be written.
+    """
+
+    def show(done: int, total: int) -> None:
+        if progress:
+            progress(done, total, "missions")
+
+    if COMPARISON in pages:
+        study = load_results(results / COMPARISON)
+        pair = head_to_head.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
+        drawn = head_to_head.drawn(head_to_head.duels(study, pair), pair)
+        keep_logs(study, drawn, results, show)
+    if VERIFICATION in pages:
+        cross_check.make(results, load_results(results / VERIFICATION), show)
