@@ -10,7 +10,7 @@ import pytest
 
 from dess.code.sources import code_of, combined
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 ENGINES = ("dess.batch", "dess.mission")
 
 
