@@ -15,7 +15,6 @@ _HOME = {
     "Results": "results.tables",
     "load_results": "results.tables",
     "resimulate": "results.resimulate",
-    "fly": "results.resimulate",
     "summary": "stats.intervals",
     "distribution": "stats.distribution",
     "bootstrap_interval": "stats.bootstrap",

@@ -54,7 +54,7 @@ SOURCES = {
 LIBRARY = {name: tree for name, tree in SOURCES.items() if ".notebooks." not in name}
 NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").glob("*.py"))
 # Functions that simulate missions; of the notebooks only what_if calls one.
-SIMULATING = {"simulate", "simulate_batch", "evaluate", "fly", "run_study", "measure"}
+SIMULATING = {"simulate", "simulate_batch", "evaluate", "resimulate", "run_study", "measure"}
 
 
 def imports_of(name: str) -> set[str]:

@@ -13,11 +13,11 @@ from time import perf_counter
 from typing import Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 from threadpoolctl import threadpool_limits
 
 import dess
-from analysis.results.documents import Document, read_json
+from analysis.results.documents import Document
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import (
     Member,
@@ -28,7 +28,7 @@ from analysis.results.provenance import (
 )
 from dess import InputError, load_scenario, simulate, simulate_batch
 from dess.files import replacing
-from dess.scenario import ScenarioSpace, validation_line
+from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.view import View
 from policies import load_team
@@ -207,13 +207,7 @@ def read(folder: str | Path) -> Timing:
     """
     path = Path(folder) / FILE
     allowed = f"allowed: what is made by: dess timing --out {Path(folder).resolve()}"
-    data = read_json(path, SCHEMA_VERSION, allowed, allowed)
-    try:
-        return Timing.model_validate(data)
-    except ValidationError as error:
-        raise InputError(f"{validation_line(error, str(path), Timing)}; {allowed}") from None
-    except InputError as error:
-        raise InputError(f"{path}: {error}; {allowed}") from None
+    return Timing.load(path, SCHEMA_VERSION, allowed, allowed)
 
 
 def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bool:

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple, Self
 from pydantic import TypeAdapter, ValidationError, field_validator, model_validator
 
 import dess
-from analysis.results.documents import read_json
+from analysis.results.documents import Document
 from analysis.results.provenance import (
     Acceptance,
-    Origin,
+    Team,
     code_behind,
     commit_of_source,
     differing,
@@ -26,7 +26,7 @@ from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
 from dess import InputError
-from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 
 SCHEMA_VERSION = 3
 
@@ -52,6 +52,76 @@ class Cell(NamedTuple):
     first: int
 
 
+class Origin(Document):
+    """What results were made with; manifests, and what pages carry, have these fields.
+
+    Attributes:
+        version: Of dess.
+        code: A hash of every module that the records depend on, as of the last run.
+        engine_code: A hash of the code of the engines, as of the first run; it is part of the keys
+            of the cells, like the code of the policies.
+        accepted: The changes of code between the runs, in their order.
+        commit: Of the source tree, if it is one of git.
+        libraries: Their versions, by name.
+        seed: Of the missions.
+        scenario: The whole scenario that the design points change.
+        policies: The teams, with the code and weights that the cells are keyed by.
+        study: The data of the study.
+    """
+
+    version: str
+    code: dict[str, str]
+    engine_code: str
+    accepted: list[Acceptance]
+    commit: str | None
+    libraries: dict[str, str]
+    seed: int
+    scenario: dict[str, Any]
+    policies: list[Team]
+    study: dict[str, Any]
+
+    @field_validator("study")
+    @classmethod
+    def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
+        numbers = (study.get("missions"), study.get("logged"))
+        if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
+            raise ValueError("is not the data of a study")
+        for field, part in _PARTS.items():
+            try:
+                part.validate_json(json.dumps(study[field]))
+            except ValidationError:
+                raise ValueError(f"has a {field} that is none") from None
+        return study
+
+    def space(self, values: dict[str, Any]) -> ScenarioSpace:
+        """The scenario with the values of a design point.
+
+        Raises:
+            InputError: If it is not valid.
+        """
+        return ScenarioSpace.of(**self.scenario | values)
+
+    def simulate_command(self, policy: str, values: dict[str, Any], replication: int) -> str:
+        """The command that simulates a mission again.
+
+        Where the scenario is not a shipped one, its file may be anywhere: the command sets all that
+        differs from the paper's scenario.
+
+        Args:
+            policy: The team.
+            values: Of the mission's design point.
+            replication: Of the mission.
+        """
+        name, changes = self.study["scenario"], self.study["set"] | values
+        if name not in scenario_names():
+            name, paper = "paper", load_scenario("paper").model_dump(mode="json")
+            fields = self.space(values).model_dump(mode="json")
+            changes = {key: value for key, value in fields.items() if value != paper[key]}
+        settings = [word for k, v in changes.items() for word in ("--set", f"{k}={json.dumps(v)}")]
+        which = ["--policy", policy, "--seed", str(self.seed), "--replication", str(replication)]
+        return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
+
+
 class Manifest(Origin):
     """What a results folder is about. No clock and no path: equal runs have equal manifests.
 
@@ -62,24 +132,10 @@ class Manifest(Origin):
     """
 
     schema_version: int
-    study: dict[str, Any]
     points: list[DesignPoint]
     missions: list[list[int]]
     selected: list[int | None]
     complete: bool
-
-    @field_validator("study")
-    @classmethod
-    def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
-        numbers = (study.get("missions"), study.get("logged"))
-        if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
-            raise ValueError("is not the data of a study")
-        for field in ("set", "design", "precision", "selection"):
-            try:
-                _PARTS[field].validate_json(json.dumps(study[field]))
-            except ValidationError:
-                raise ValueError(f"has a {field} that is none") from None
-        return study
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -124,18 +180,14 @@ class Manifest(Origin):
         )
 
     @classmethod
-    def read(cls, path: Path) -> "Manifest":
+    def read(cls, path: Path) -> Self:
         """Read a manifest of this version.
 
         Raises:
             InputError: If there is none, or it is damaged or of another version.
         """
         absent = "allowed: a results folder, made by dess study run"
-        data = read_json(path, SCHEMA_VERSION, absent, _ALLOWED)
-        try:
-            return cls.model_validate(data)
-        except ValidationError as error:
-            raise InputError(f"{validation_line(error, str(path))}; {_ALLOWED}") from None
+        return cls.load(path, SCHEMA_VERSION, absent, _ALLOWED)
 
     def extended_to(self, new: "Manifest", path: Path, accepting: int | None) -> "Manifest":
         """The manifest of a folder that holds these results and is to hold a new run's as well.
@@ -191,14 +243,8 @@ class Manifest(Origin):
 
     def command(self, cell: Cell, replication: int) -> str:
         """The command that simulates a mission of a cell again."""
-        return simulate_command(
-            self.study["scenario"],
-            self.study["set"] | self.points[cell.point].values,
-            self.scenarios[cell.point],
-            self.policies[cell.team].policy,
-            self.seed,
-            replication,
-        )
+        policy, values = self.policies[cell.team].policy, self.points[cell.point].values
+        return self.simulate_command(policy, values, replication)
 
     @property
     def key(self) -> str:
@@ -211,7 +257,7 @@ class Manifest(Origin):
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:
         """The scenario of every design point."""
-        return tuple(ScenarioSpace.of(**self.scenario | point.values) for point in self.points)
+        return tuple(self.space(point.values) for point in self.points)
 
     @cached_property
     def _point_keys(self) -> list[str]:
@@ -245,30 +291,3 @@ _ALLOWED = "allowed: another --out, or remove the folder"
 
 def _canonical(data: Any) -> str:
     return json.dumps(data, sort_keys=True)
-
-
-def simulate_command(
-    name: str,
-    values: dict[str, Any],
-    scenario: ScenarioSpace,
-    policy: str,
-    seed: int,
-    replication: int,
-) -> str:
-    """The command that simulates a mission again.
-
-    Args:
-        name: Of the scenario.
-        values: What is set of it.
-        scenario: What it is with these, told where the name is not that of a shipped one.
-        policy: The team.
-        seed: Of the mission.
-        replication: Its number.
-    """
-    if name not in scenario_names():  # its file may be anywhere: say what it changes
-        name, usual = "paper", load_scenario("paper").model_dump(mode="json")
-        ours = scenario.model_dump(mode="json")
-        values = {key: value for key, value in ours.items() if value != usual[key]}
-    settings = [word for k, v in values.items() for word in ("--set", f"{k}={json.dumps(v)}")]
-    which = ["--policy", policy, "--seed", str(seed), "--replication", str(replication)]
-    return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])

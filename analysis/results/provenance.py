@@ -12,7 +12,6 @@ from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 from platform import python_version
-from typing import Any
 
 from pydantic import Field
 
@@ -66,33 +65,6 @@ class Acceptance(Document):
     def text(self) -> str:
         """The change in words."""
         return f"other code of {', '.join(self.modules)} after {self.missions:,} missions"
-
-
-class Origin(Document):
-    """What results were made with; manifests, and what pages carry, have these fields.
-
-    Attributes:
-        version: Of dess.
-        code: A hash of every module that the records depend on, as of the last run.
-        engine_code: A hash of the code of the engines, as of the first run; it is part of the keys
-            of the cells, like the code of the policies.
-        accepted: The changes of code between the runs, in their order.
-        commit: Of the source tree, if it is one of git.
-        libraries: Their versions, by name.
-        seed: Of the missions.
-        scenario: The whole scenario that the design points change.
-        policies: The teams, with the code and weights that the cells are keyed by.
-    """
-
-    version: str
-    code: dict[str, str]
-    engine_code: str
-    accepted: list[Acceptance]
-    commit: str | None
-    libraries: dict[str, str]
-    seed: int
-    scenario: dict[str, Any]
-    policies: list[Team]
 
 
 def team_of(policy: str) -> Team:

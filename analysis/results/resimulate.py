@@ -4,7 +4,7 @@
 >>> mission.record.metrics["slots"], mission.events
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,20 +38,16 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> R
     Raises:
         InputError: If the study has no such mission, or its record is another one.
     """
-    manifest = results.store.manifest
-    space = results.scenario(point)
-    record = simulate(space, load_team(policy), manifest.seed, replication, events=True)
+    space, seed = results.scenario(point), results.store.manifest.seed
+    record = simulate(space, load_team(policy), seed, replication, events=True)
     if changed := difference(record, recorded(results, policy, point, replication)):
         raise InputError(
             f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
             f"{changed}; allowed: results of this very code"
         )
     assert record.events is not None
-    scenario = sample_scenario(space, manifest.seed, replication)
-    return Resimulated(scenario, record, pd.DataFrame(record.events.columns()))
-
-
-fly = resimulate  # the former name, for notebooks that still use it
+    events = pd.DataFrame(record.events.columns())
+    return Resimulated(sample_scenario(space, seed, replication), record, events)
 
 
 def recorded(results: Results, policy: str, point: int, replication: int) -> dict[str, Any]:
@@ -62,14 +58,11 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     Raises:
         InputError: If the study has no such mission.
     """
-    where = {"policy": policy, "point": point, "replication": replication}
-    for missions in (results.missions, results.checks):
-        if len(row := _rows(missions, where)):
-            fields = {name: row[name].item() for name in MISSION_RECORD.names or ()}
-            uavs = _rows(results.uavs, where) if missions is results.missions else row[:0]
-            for number, uav in enumerate(uavs.to_dict("records"), 1):
-                fields |= {f"uav {number} {name}": uav[name] for name in UAV_RECORD.names or ()}
-            return fields
+    mission = {"policy": policy, "point": point, "replication": replication}
+    tables = (results.missions, results.checks, results.uavs)
+    missions, checks, uavs = (_rows(table, mission) for table in tables)
+    if missions or checks:
+        return _by_field((missions or checks)[0], uavs)
     raise InputError(
         f"{results.store.folder}: no mission of {policy}, point {point}, replication "
         f"{replication}; allowed: a mission of the study"
@@ -78,23 +71,24 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
 
 def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     """The recorded fields that are not, bit for bit, those of the record; empty if all are."""
-    again = _fields(record)
-    changed = [name for name in fields if again.get(name) != fields[name]]
+    uavs = pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
+    simulated = _by_field(record.metrics, uavs.to_dict("records"))
+    changed = [name for name in fields if simulated.get(name) != fields[name]]
     if not changed:
         return ""
-    first = changed[0]
-    more = f", and {len(changed) - 1} more" if changed[1:] else ""
-    return f"{first} is {fields[first]} and {again.get(first)} when simulated again{more}"
+    first, more = changed[0], f", and {len(changed) - 1} more" if changed[1:] else ""
+    return f"{first} is {fields[first]} and {simulated.get(first)} when simulated again{more}"
 
 
-def _fields(record: MissionRecord) -> dict[str, Any]:
-    fields = {name: record.metrics[name].item() for name in MISSION_RECORD.names or ()}
-    for number, uav in enumerate(record.uavs, 1):
-        fields |= {f"uav {number} {name}": uav[name].item() for name in UAV_RECORD.names or ()}
-        fields[f"uav {number} end"] = END_NAMES[uav["end"]]
+def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]:
+    """A record by field, from the row of the mission and those of its UAVs."""
+    fields = {name: mission[name] for name in MISSION_RECORD.names or ()}
+    for number, uav in enumerate(uavs, 1):
+        fields |= {f"uav {number} {name}": uav[name] for name in UAV_RECORD.names or ()}
     return fields
 
 
-def _rows(table: pd.DataFrame, where: Mapping[str, Any]) -> pd.DataFrame:
-    alike = [table[name].to_numpy() == value for name, value in where.items()]
-    return table[np.logical_and.reduce(alike)]
+def _rows(table: pd.DataFrame, mission: Mapping[str, Any]) -> list[dict[Any, Any]]:
+    """The rows of a mission."""
+    equal = [table[name].to_numpy() == value for name, value in mission.items()]
+    return table[np.logical_and.reduce(equal)].to_dict("records")

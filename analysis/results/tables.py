@@ -73,8 +73,6 @@ class Results:
         """The command that simulates a mission of the study again."""
         return self.store.manifest.command(self.cell(policy, point), replication)
 
-    replay = command
-
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected for a policy, and what is known of it."""
         manifest = self.store.manifest

@@ -1,6 +1,7 @@
 """Studies: policies x design points x replications, as data."""
 
 from collections import Counter
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Self
@@ -220,6 +221,24 @@ def _with_fewer_logs(values: dict[str, Any], overrides: dict[str, Any]) -> dict[
 def study_names() -> list[str]:
     """The names of the shipped studies."""
     return _STUDIES.names()
+
+
+def budget_of(study: Mapping[str, Any]) -> str:
+    """How the data of a study differ from the shipped study of its name, in words."""
+    if study["name"] not in study_names():
+        return "as asked"
+    shipped = load_study(study["name"]).model_dump(mode="json")
+    policies, missions = study["policies"], study["missions"]
+    words = []
+    if {*policies} < {*shipped["policies"]}:
+        words.append(f"{len(policies)} of {len(shipped['policies'])} policies")
+    elif {*policies} != {*shipped["policies"]}:
+        words.append("other policies")
+    if missions != shipped["missions"]:
+        words.append(f"{missions:,} instead of {shipped['missions']:,} missions")
+    others = [key for key in shipped if key not in ("policies", "missions", "description")]
+    words += [f"another {key}" for key in others if study[key] != shipped[key]]
+    return ", ".join(words) or "full"
 
 
 def _shown(values: dict[str, Any]) -> str:

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from analysis.numbers import span
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import Results
+from analysis.study.study import budget_of
 
 SHORT = 12  # characters of a hash that are shown
 STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that hold evidence
@@ -50,23 +51,23 @@ def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
         evidence: Of the studies.
         files: Lists of files, as JSON, to hide in the page as well.
     """
-    hidden = [_embedded(STUDY, of_study.text) for of_study in evidence]
+    hidden = [_embedded(STUDY, json.dumps(of_study.data)) for of_study in evidence]
     hidden += [_embedded(FILES, text) for text in files]
     return HTML((_origins(evidence).data if evidence else "") + "".join(hidden))
 
 
 def _origins(evidence: Sequence[Evidence]) -> HTML:
-    names = [of_study.study for of_study in evidence]
+    names = [of_study.study["name"] for of_study in evidence]
     columns = {
-        e.study if names.count(e.study) == 1 else f"{e.study} {e.key}": {
-            "Scenario": e.scenario_name,
+        name if names.count(name) == 1 else f"{name} {e.key}": {
+            "Scenario": e.study["scenario"],
             "Policies": ", ".join(team.policy for team in e.policies),
             "Weights": ", ".join(_weights(e)) or "none",
             "Design points": f"{e.points:,}",
             "Missions per policy and point": span(e.missions),
-            "Budget": e.budget,
+            "Budget": budget_of(e.study),
             "Seed": e.seed,
-            "Engine": e.engine,
+            "Engine": e.study["engine"],
             "Study key": e.key,
             "dess": e.version,
             "Code": e.engine_code[:SHORT],
@@ -74,7 +75,7 @@ def _origins(evidence: Sequence[Evidence]) -> HTML:
             "Commit": (e.commit or "unknown")[:SHORT],
             "Libraries": ", ".join(f"{name} {version}" for name, version in e.libraries.items()),
         }
-        for e in evidence
+        for name, e in zip(names, evidence, strict=True)
     }
     frame = pd.DataFrame(columns).rename_axis("Study")
     if not any(e.accepted for e in evidence):

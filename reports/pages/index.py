@@ -79,7 +79,10 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
     """The evidence that pages carry of their studies, without duplicates."""
     texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
-    return [Evidence.parse(text, "page") for text in dict.fromkeys(texts)]
+    return [
+        Evidence.parse(text, "page", "allowed: a page of dess report")
+        for text in dict.fromkeys(texts)
+    ]
 
 
 def _thumbnail(content: str) -> Markup:

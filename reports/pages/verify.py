@@ -5,13 +5,13 @@ were made with, and some of their missions. Results have all missions, and a has
 name. Whoever forges both is found by simulating missions again.
 """
 
-import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
 import pandas as pd
+from pydantic import TypeAdapter, ValidationError
 
 import dess
 from analysis.results.evidence import Evidence, chosen, learned_files
@@ -25,6 +25,7 @@ from reports.pages.html import FILES, STUDY, embedded
 
 # Where a page carries the checksum of all the rest of it.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
+_ALLOWED = "allowed: a page of dess report, or a results folder"
 
 
 @dataclass(frozen=True)
@@ -40,19 +41,19 @@ class Check:
 
     what: str
     compared: int
-    differing: list[str]
-    notes: list[str]
+    differing: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 def sealed(html: str) -> str:
     """A page with its checksum filled in."""
-    return _SEAL.sub(rf"\g<1>{_checksum(html)}\g<3>", html, count=1)
+    checksum = sha256(_SEAL.sub(r"\g<1>\g<3>", html, count=1).encode()).hexdigest()
+    return _SEAL.sub(rf"\g<1>{checksum}\g<3>", html, count=1)
 
 
 def is_sealed(html: str) -> bool:
     """Whether a page has a checksum, and it is that of the page."""
-    seal = _SEAL.search(html)
-    return seal is not None and seal[2] == _checksum(html)
+    return _SEAL.search(html) is not None and sealed(html) == html
 
 
 def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
@@ -73,15 +74,17 @@ def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
     if not _SEAL.search(html):
         raise InputError(f"{path}: is no page of dess; {_ALLOWED}")
     altered = [] if is_sealed(html) else ["the page has been altered"]
-    carried = [_files(text, path) for text in embedded(FILES, html)]
-    studies = [Evidence.parse(text, str(path)) for text in embedded(STUDY, html)]
+    files = [_check_files(text, path) for text in embedded(FILES, html)]
+    studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
     notes = [] if studies else ["carries no missions to simulate again"]
     records = [check_records(evidence, missions, seed) for evidence in studies]
-    return [Check("page", 1, altered, notes), *carried, *records]
+    return [Check("page", 1, altered, notes), *files, *records]
 
 
 def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
     """Check results: the bytes of all files, and missions drawn at random, with logs and without.
+
+    Of several folders, one that cannot be read differs, and an incomplete one is noted.
 
     Args:
         folder: A results folder, or one that holds such.
@@ -95,28 +98,23 @@ def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
     if not folders:
         raise InputError(f"{folder}: holds no results and is no page; {_ALLOWED}")
     if folders == [folder]:
-        return _check_study(folder, missions, seed)
-    return [check for each in folders for check in _check_one_of(each, missions, seed)]
+        return _check_study(Store.read(folder), missions, seed)
+    checks = []
+    for path in folders:
+        try:
+            if (store := Store.read(path)).manifest.complete:
+                checks += _check_study(store, missions, seed)
+            else:
+                checks.append(Check(str(path), 0, notes=["incomplete, so not checked"]))
+        except InputError as error:
+            checks.append(Check(str(path), 0, [str(error)]))
+    return checks
 
 
-_ALLOWED = "allowed: a page of dess report, or a results folder"
-
-
-def _check_one_of(folder: Path, missions: int, seed: int) -> list[Check]:
-    """Check one of several: what cannot be read differs, what is incomplete is noted."""
-    try:
-        if not Store.read(folder).manifest.complete:
-            return [Check(str(folder), 0, [], ["incomplete, so not checked"])]
-        return _check_study(folder, missions, seed)
-    except InputError as error:
-        return [Check(str(folder), 0, [str(error)], [])]
-
-
-def _check_study(folder: Path, missions: int, seed: int) -> list[Check]:
-    store = Store.read(folder)
+def _check_study(store: Store, missions: int, seed: int) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: is not what was written" for path in store.damaged]
-        return [Check(store.manifest.study["name"], 0, lines, [])]
+        return [Check(store.manifest.study["name"], 0, lines)]
     records = check_records(Evidence.of(results_of(store), missions, seed), missions, seed)
     return [records, _check_logs(store, missions, seed)] if store.logged else [records]
 
@@ -132,29 +130,30 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
     Raises:
         InputError: If a policy does not exist, or a scenario is not valid.
     """
-    notes, lines = _notes(evidence), []
-    numbers = chosen(len(evidence.sample), missions, seed)
+    lines, numbers = [], chosen(len(evidence.sample), missions, seed)
     for mission in (evidence.sample[number] for number in numbers):
-        team = load_team(mission.policy)
-        record = simulate(evidence.space(mission), team, evidence.seed, mission.replication)
+        policy, values, replication = mission.policy, mission.values, mission.replication
+        record = simulate(evidence.space(values), load_team(policy), evidence.seed, replication)
         if changed := difference(record, mission.record):
-            lines.append(f"{changed}; command: {evidence.command(mission)}")
-    return Check(evidence.study, len(numbers), lines, notes)
+            command = evidence.simulate_command(policy, values, replication)
+            lines.append(f"{changed}; command: {command}")
+    return Check(evidence.study["name"], len(numbers), lines, _notes(evidence))
 
 
 def _check_logs(store: Store, missions: int, seed: int) -> Check:
     """Simulate some of the missions again whose event logs are kept, and compare the logs."""
     manifest, logged, lines = store.manifest, store.logged, []
-    for cell, replication in (logged[n] for n in chosen(len(logged), missions, seed)):
+    numbers = chosen(len(logged), missions, seed)
+    for cell, replication in (logged[number] for number in numbers):
         team = load_team(manifest.policies[cell.team].policy)
         space = manifest.scenarios[cell.point]
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
-            line = "the event log is another one when simulated again"
-            lines.append(f"{line}; command: {manifest.command(cell, replication)}")
-    return Check(f"{manifest.study['name']}, event logs", min(len(logged), missions), lines, [])
+            command = manifest.command(cell, replication)
+            lines.append(f"the event log is another one when simulated again; command: {command}")
+    return Check(f"{manifest.study['name']}, event logs", len(numbers), lines)
 
 
 def _notes(evidence: Evidence) -> list[str]:
@@ -172,17 +171,14 @@ def _notes(evidence: Evidence) -> list[str]:
     return notes
 
 
-def _files(text: str, path: Path) -> Check:
+def _check_files(text: str, path: Path) -> Check:
+    """Compare the hashes of the learned policies on a page with those of the files here."""
     try:
-        files = {str(name): str(digest) for name, digest in json.loads(text).items()}
-    except (ValueError, AttributeError):
+        files = TypeAdapter(dict[str, str]).validate_json(text)
+    except ValidationError:
         raise InputError(f"{path}: its list of files is none; {_ALLOWED}") from None
     shipped = learned_files()
-    others = [name for name in files if shipped.get(name) != files[name]]
+    others = [name for name, digest in files.items() if shipped.get(name) != digest]
     return Check(
-        "learned policies", len(files), [f"{name}: is another one here" for name in others], []
+        "learned policies", len(files), [f"{name}: is another one here" for name in others]
     )
-
-
-def _checksum(html: str) -> str:
-    return sha256(_SEAL.sub(r"\g<1>\g<3>", html, count=1).encode()).hexdigest()

@@ -7,10 +7,10 @@ from analysis import load_results, run_study
 from analysis.execution.jobs import MissionsJob
 from analysis.execution.runner import ChunkError
 from analysis.execution.workers import _checked
+from analysis.results import parquet
 from analysis.results.chunks import Chunk, Part
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, members_of
-from analysis.results.store import Store
 from dess import InputError
 from tests.analysis import troublesome
 from tests.analysis.small import files_of, small_study
@@ -75,11 +75,11 @@ def test_a_policy_that_raises_leaves_the_others_whole(plugin, tmp_path):
 
 
 def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
-    def refuse_the_second(store, chunk, missions):
+    def refuse_the_second(missions, chunk, seed):
         if chunk.team == 1 and chunk.parts[0].replications.start == 4:
             raise ValueError("not what was asked for")
 
-    monkeypatch.setattr(Store, "_check", refuse_the_second)
+    monkeypatch.setattr(parquet, "check", refuse_the_second)
     failure = failing(small_study(tmp_path), tmp_path / "out")
     assert (failure.policy, failure.missions) == ("random", 4)
     assert failure.error == "ValueError: not what was asked for"
