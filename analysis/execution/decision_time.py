@@ -4,7 +4,6 @@ A time differs whenever it is measured, so no report measures any.
 """
 
 import json
-import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ from pathlib import Path, PurePath
 from time import perf_counter
 from typing import Any, Self
 
+import joblib
 import numpy as np
 from pydantic import Field, model_validator
 from threadpoolctl import threadpool_limits
@@ -27,7 +27,7 @@ from analysis.results.provenance import (
     members_of,
 )
 from dess import InputError, load_scenario, simulate, simulate_batch
-from dess.files import replacing
+from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.view import View
@@ -162,7 +162,7 @@ def measure(
         commit=commit_of_source(),
         libraries=library_versions(),
         processor=_processor(),
-        cores=_cores(),
+        cores=joblib.cpu_count(),
         threads=THREADS,
         scenario=PurePath(scenario).name,
         constants=space.model_dump(mode="json"),
@@ -180,23 +180,10 @@ def writing(folder: str | Path) -> Iterator[Path]:
         InputError: At once, if none can be written there.
     """
     path = Path(folder) / FILE
-    try:
+    with writable(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     with replacing(path) as temporary:
         yield temporary
-
-
-def write(timing: Timing, folder: str | Path) -> Path:
-    """Write a timing into a folder, over the one that is there; returns its file.
-
-    Raises:
-        InputError: If it cannot be written.
-    """
-    with writing(folder) as path:
-        path.write_text(timing.text, "utf-8")
-    return Path(folder) / FILE
 
 
 def read(folder: str | Path) -> Timing:
@@ -235,38 +222,28 @@ def unlike(timing: Timing, manifest: Manifest) -> list[str]:
 
 
 class _Timed:
-    """A policy, and the time [s] and the rows of each of its calls."""
+    """A policy that notes the time [s] and the rows of each of its calls."""
 
-    def __init__(self, policy: Any, clock: Clock):
-        self.name, self.policy, self.clock = policy.name, policy, clock
-        self.seconds: list[float] = []
-        self.rows: list[int] = []
+    def __init__(self, policy: Any, clock: Clock, calls: list[tuple[float, int]]):
+        self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
 
     def act(self, view: View) -> np.ndarray:
         """Choose as the policy does."""
         start = self.clock()
         actions = self.policy.act(view)
-        self.seconds.append(self.clock() - start)
-        self.rows.append(len(view))
+        self.calls.append((self.clock() - start, len(view)))
         return actions
 
 
 class _Team:
-    """A team that is timed."""
+    """A team that is timed; a time [s] is kept with the number of rows that it was spent on."""
 
     def __init__(self, name: str, clock: Clock):
         self.name = name
-        self.policies = [_Timed(policy, clock) for policy in load_team(name)]
-        self.single: list[tuple[float, int]] = []  # (time, rows) of every call
-        self.rounds: list[tuple[float, int]] = []  # of every round of the batch
-
-    def taken(self) -> list[tuple[float, int]]:
-        """The calls since the last time, as (time, rows)."""
-        calls: list[tuple[float, int]] = []
-        for timed in self.policies:
-            calls += zip(timed.seconds, timed.rows, strict=True)
-            timed.seconds, timed.rows = [], []
-        return calls
+        self.calls: list[tuple[float, int]] = []  # of the mission or round that is simulated
+        self.policies = [_Timed(policy, clock, self.calls) for policy in load_team(name)]
+        self.single: list[tuple[float, int]] = []  # every call of the SimPy engine
+        self.rounds: list[tuple[float, int]] = []  # every round of the batch engine
 
     def cost(self) -> Cost:
         """What it has cost."""
@@ -290,14 +267,15 @@ def _steps(
     """Simulate all that is measured, step by step."""
     for number, replication in enumerate([0, *range(missions)]):
         for team in teams:
+            team.calls.clear()
             simulate(space, team.policies, seed, replication)
-            calls = team.taken()
-            team.single += calls if number else []
+            team.single += team.calls if number else []
             yield
     for number in range(1 + ROUNDS):
         for team in teams:
+            team.calls.clear()
             simulate_batch(space, team.policies, seed, missions)
-            times, rows = zip(*team.taken(), strict=True)
+            times, rows = zip(*team.calls, strict=True)
             team.rounds += [(sum(times), sum(rows))] if number else []
             yield
 
@@ -310,10 +288,3 @@ def _processor() -> str:
         lines = []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return models[0] if models else platform.processor() or platform.machine() or "unknown"
-
-
-def _cores() -> int:
-    """The cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.execution.runner import CHUNK, check_workers
-from analysis.results.chunks import Part, split
+from analysis.results.chunks import check_parts, parts_of, split
 from analysis.results.store import Store
-from analysis.results.tables import parts_of
-from analysis.study.study import CHECK, Study
+from analysis.study.study import Study
 from dess import simulate, simulate_batch
 from policies import load_team
 
@@ -91,10 +90,7 @@ def plan_study(
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
     """Missions of a team that are missing, and all that are wanted for now."""
     manifest = store.manifest
-    parts = parts_of(manifest.cells[team], manifest.missions[team])
-    if (point := manifest.selected[team]) is not None and study.selection:
-        checks = range(CHECK, CHECK + study.selection.check)
-        parts.append(Part(manifest.cells[team][point], checks))
+    parts = parts_of(manifest, team) + check_parts(manifest, team, manifest.selected[team])
     missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
     wanted = sum(len(part.replications) for part in parts)
     return sum(chunk.missions for chunk in missing if chunk), wanted

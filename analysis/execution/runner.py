@@ -18,11 +18,11 @@ import numpy as np
 
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.workers import Cluster, Here, Pool
-from analysis.results.chunks import Chunk, Part, gaps, split
+from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
 from analysis.results.manifest import Cell
-from analysis.results.store import Failure, Store
-from analysis.results.tables import Results, parts_of, results_of
-from analysis.study.study import CHECK, Study, load_study
+from analysis.results.store import Store
+from analysis.results.tables import Results, results_of
+from analysis.study.study import Study, load_study
 from dess import InputError, simulate_batch
 from dess.record import Records
 from dess.scenario import ScenarioSpace
@@ -91,19 +91,11 @@ def run_study(
     """
     if not isinstance(study, Study):
         study = load_study(study)
-    with pool_of(workers, scheduler) as pool, Store.open(study, out, accept_code) as store:
+    check_workers(workers)
+    pool = Cluster(scheduler) if scheduler else Here(workers)
+    with pool, Store.open(study, out, accept_code) as store:
         _Run(study, store, pool, progress, announce).complete()
         return results_of(store)
-
-
-def pool_of(workers: int, scheduler: str | None = None) -> Pool:
-    """The workers: this process, processes of this machine, or a cluster.
-
-    Raises:
-        InputError: If there is no worker, or the scheduler cannot be used.
-    """
-    check_workers(workers)
-    return Cluster(scheduler) if scheduler else Here(workers)
 
 
 def check_workers(workers: int) -> None:
@@ -116,20 +108,17 @@ def check_workers(workers: int) -> None:
         raise InputError(f"workers: {workers} is out of range; allowed: 1 or more")
 
 
+@dataclass
 class _Run:
     """A run of a study into its folder, round by round."""
 
-    def __init__(
-        self,
-        study: Study,
-        store: Store,
-        pool: Pool,
-        progress: Progress | None,
-        announce: Callable[[Round], object] | None,
-    ):
-        self.study, self.store, self.pool = study, store, pool
-        self.progress, self.announce = progress, announce
-        self.rounds = self.asked = 0  # so far; missions of all rounds
+    study: Study
+    store: Store
+    pool: Pool
+    progress: Progress | None
+    announce: Callable[[Round], object] | None
+    rounds: int = 0  # so far
+    asked: int = 0  # missions of these rounds
 
     def complete(self) -> None:
         """Do what is missing, round by round.
@@ -146,7 +135,8 @@ class _Run:
             before, logs = wanted, []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
-        checks = [self._check(team, best) for team, best in enumerate(selected) if best is not None]
+        manifest = self.store.manifest
+        checks = [part for team in teams for part in check_parts(manifest, team, selected[team])]
         if any(part.replications for part in checks):
             self._round(checks, [])
         self.store.finish(wanted, selected)
@@ -161,14 +151,8 @@ class _Run:
         rule = self.study.selection
         return rule.choice(self._samples(team, counts)).best if rule else None
 
-    def _check(self, team: int, best: int) -> Part:
-        """The missions that check what is selected, none of which selected it."""
-        assert self.study.selection
-        cell = self.store.manifest.cells[team][best]
-        return Part(cell, range(CHECK, CHECK + self.study.selection.check))
-
     def _samples(self, team: int, counts: list[int]) -> list[dict[str, np.ndarray]]:
-        return self.store.samples(parts_of(self.store.manifest.cells[team], counts))
+        return self.store.samples(parts_of(self.store.manifest, team, counts))
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
         """Do the missing missions of a round, whose parts these are, and the logs."""

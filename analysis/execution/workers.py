@@ -7,49 +7,40 @@ done again; a job that kills its worker each time has a ``Problem`` too.
 import os
 import signal
 import time
+from abc import abstractmethod
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from dataclasses import replace
 from threading import Thread
-from typing import Any, Protocol, Self
+from typing import Any
 
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.results.chunks import Part
 from analysis.results.provenance import Member, engine_code, members_of
 from dess import InputError
 
+Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 DEATHS = 2  # of workers that a job was alone with, after which it is given up
 
 
-class Pool(Protocol):
+class Pool(AbstractContextManager["Pool"]):
     """Does jobs, in a ``with`` block."""
 
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-    def run(
-        self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Generator[tuple[int, Any], None, None]:
+    @abstractmethod
+    def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
         """Do the jobs; their numbers and results as they come in."""
-        ...
 
 
-class Here:
+class Here(Pool):
     """This machine: this process, or joblib workers."""
 
     def __init__(self, workers: int):
         self.workers = workers
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         pass
 
-    def run(
-        self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
         """Do the jobs; their numbers and results as they come in."""
         if self.workers == 1:
             for number, job in enumerate(jobs):
@@ -153,7 +144,7 @@ def _live_and_die_with(parent: int) -> None:
     Thread(target=watch, daemon=True).start()
 
 
-class Cluster:
+class Cluster(Pool):
     """A dask.distributed cluster, whose workers must have this code."""
 
     def __init__(self, address: str):
@@ -172,15 +163,10 @@ class Cluster:
                 f"scheduler: {address} cannot be reached: {error}; allowed: tcp://HOST:PORT"
             ) from None
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.client.close()
 
-    def run(
-        self, jobs: Sequence[Job], progress: Progress | None = None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
         """Do the jobs; their numbers and results as they come in."""
         from distributed import as_completed
 

@@ -16,7 +16,8 @@ import pandas as pd
 from analysis import numbers
 from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES
 from analysis.questions.sensitivity import sensitivity
-from analysis.results.tables import Results, parts_of
+from analysis.results.chunks import parts_of
+from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.distribution import distribution
 from analysis.stats.intervals import groups, summary
@@ -178,8 +179,7 @@ def precisions(results: Results) -> pd.DataFrame:
     rule = Precision.model_validate_json(json.dumps(data))
     tables = []
     for team, policy in enumerate(results.policies):
-        parts = parts_of(manifest.cells[team], manifest.missions[team])
-        table = pd.DataFrame(rule.reached(results.store.samples(parts)))
+        table = pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
         table.insert(0, "policy", policy)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
-from analysis.results.manifest import Cell
+from analysis.results.manifest import Cell, Manifest
+from analysis.study.study import CHECK
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,42 @@ class Chunk:
     def name(self) -> str:
         """A hash of what it holds."""
         return name_of(self.rows)
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A chunk that could not be computed.
+
+    Attributes:
+        policy: The team.
+        missions: How many missions are missing for it.
+        error: What went wrong, in a line.
+        command: A command that does it again.
+        traceback: Where it went wrong.
+    """
+
+    policy: str
+    missions: int
+    error: str
+    command: str
+    traceback: str
+
+
+def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None) -> list[Part]:
+    """The first missions of every cell of a team: ``counts``, or as many as the manifest wants."""
+    cells, counts = manifest.cells[team], counts or manifest.missions[team]
+    return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
+
+
+def check_parts(manifest: Manifest, team: int, point: int | None) -> list[Part]:
+    """The missions that check the design point selected for a team, if one is.
+
+    None of them has selected it.
+    """
+    if point is None:
+        return []
+    missions = manifest.study["selection"]["check"]
+    return [Part(manifest.cells[team][point], range(CHECK, CHECK + missions))]
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:

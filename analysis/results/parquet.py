@@ -6,6 +6,7 @@ holds, or the cell and replication of an event log, and of its bytes. So a damag
 
 import json
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from analysis.results.chunks import Chunk, short_hash
+from analysis.results.chunks import Chunk, name_of, short_hash
 from dess import InputError
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, Records
@@ -140,6 +141,34 @@ def read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
     except (OSError, pa.ArrowException):  # what pyarrow raises
         return None
     return table if schema is None or table.schema.equals(schema) else None
+
+
+def files_in(folder: Path) -> list[Path]:
+    """The files in a folder that a run may have written."""
+    return sorted(path for path in folder.glob("*.parquet") if NAME.fullmatch(path.name))
+
+
+def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], list[Path]]:
+    """The tables in a folder by the hash of what they hold, and its damaged files.
+
+    Damaged is what does not hold what its name says. Of two files that say different things of the
+    same missions, nobody knows which is right: both are.
+    """
+    tables, damaged = {}, []
+    sound: dict[str, list[tuple[Path, pa.Table]]] = defaultdict(list)
+    for path in files_in(folder):
+        table = read(path, schema)
+        if table is None or name_of(parts_in(table)) != content_hash(path):
+            damaged.append(path)
+        else:
+            sound[content_hash(path)].append((path, table))
+    for name, files in sound.items():
+        first = files[0][1]
+        if all(table.equals(first) for _, table in files):
+            tables[name] = first
+        else:
+            damaged += [path for path, _ in files]
+    return tables, damaged
 
 
 def missions_in(folder: Path) -> int:

@@ -11,7 +11,7 @@ in which order or by how many workers it was computed.
 import json
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple, Self
 from urllib.parse import quote
@@ -22,7 +22,7 @@ import pyarrow as pa
 from filelock import FileLock, Timeout
 
 from analysis.results import parquet
-from analysis.results.chunks import Chunk, Part, gaps, name_of, short_hash
+from analysis.results.chunks import Chunk, Failure, Part, gaps, short_hash
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.rows import rows_of
 from analysis.study.study import Study
@@ -35,25 +35,6 @@ LONG = 150  # characters of a policy in the name of a folder
 FOLDERS = ("missions", "uavs", "events", "failures")
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A chunk that could not be computed.
-
-    Attributes:
-        policy: The team.
-        missions: How many missions are missing for it.
-        error: What went wrong, in a line.
-        command: A command that does it again.
-        traceback: Where it went wrong.
-    """
-
-    policy: str
-    missions: int
-    error: str
-    command: str
-    traceback: str
-
-
 class _Tables(NamedTuple):
     """What the files of a chunk hold."""
 
@@ -62,7 +43,13 @@ class _Tables(NamedTuple):
 
 
 class Store:
-    """The files of a results folder."""
+    """The files of a results folder.
+
+    Attributes:
+        folder: The folder.
+        manifest: What it is about.
+        damaged: The files that are not what their names say.
+    """
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
@@ -70,7 +57,7 @@ class Store:
         self._tables: dict[tuple[int, str], _Tables] = {}  # by team and name of the chunk
         self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
         self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
-        self._damaged: list[Path] = []
+        self.damaged: list[Path] = []
 
     @classmethod
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -148,65 +135,36 @@ class Store:
             for path in self.folder.glob(pattern):
                 path.unlink()
         self._scan()
-        while self._damaged:
-            self._damaged.pop().unlink()
+        while self.damaged:
+            self.damaged.pop().unlink()
 
     def _scan(self) -> None:
         """Learn which missions are there, and which files are damaged."""
         for team in range(len(self.manifest.policies)):
-            uavs = self._by_id("uavs", team, parquet.UAVS)
-            for name, missions in self._by_id("missions", team, parquet.MISSIONS).items():
+            uavs, damaged_uavs = parquet.tables_in(self._partition("uavs", team), parquet.UAVS)
+            missions, damaged = parquet.tables_in(
+                self._partition("missions", team), parquet.MISSIONS
+            )
+            self.damaged += damaged_uavs + damaged
+            for name in missions:
                 if name in uavs:
-                    self._enter(team, name, _Tables(missions, uavs[name]))
-            for path in self._files("events", team):
+                    self._enter(team, name, _Tables(missions[name], uavs[name]))
+            for path in parquet.files_in(self._partition("events", team)):
                 if parquet.read(path) is None:
-                    self._damaged.append(path)
+                    self.damaged.append(path)
                 else:
                     self._logs[team, parquet.content_hash(path)] = path
 
-    def _by_id(self, kind: str, team: int, schema: pa.Schema) -> dict[str, pa.Table]:
-        """The tables of a kind, by what they hold.
-
-        What two files tell in two ways is damaged: nobody knows which is right.
-        """
-        tables: dict[str, pa.Table] = {}
-        paths, contested = defaultdict(list), set()
-        for path in self._files(kind, team):
-            if (table := self._whole(path, schema)) is not None:
-                paths[parquet.content_hash(path)].append(path)
-                if not tables.setdefault(parquet.content_hash(path), table).equals(table):
-                    contested.add(parquet.content_hash(path))
-        self._damaged += [path for name in sorted(contested) for path in paths[name]]
-        return {name: table for name, table in tables.items() if name not in contested}
-
-    def _whole(self, path: Path, schema: pa.Schema) -> pa.Table | None:
-        """What a file holds; if that is not what its name says, it is damaged."""
-        table = parquet.read(path, schema)
-        if table is None or name_of(parquet.parts_in(table)) != parquet.content_hash(path):
-            self._damaged.append(path)
-            return None
-        return table
-
-    def _enter(self, team: int, name: str, tables: "_Tables") -> None:
+    def _enter(self, team: int, name: str, tables: _Tables) -> None:
         self._tables[team, name] = tables
         for key, start, stop in parquet.parts_in(tables.missions):
             self._present[team, key].append(range(start, stop))
-
-    def _files(self, kind: str, team: int) -> list[Path]:
-        """The files of a kind that a run may have written."""
-        files = self._partition(kind, team).glob("*.parquet")
-        return sorted(path for path in files if parquet.NAME.fullmatch(path.name))
 
     def _partition(self, kind: str, team: int) -> Path:
         policy = quote(self.manifest.policies[team].policy, safe="")
         if len(policy) > LONG:
             policy = f"{policy[:LONG]}~{short_hash(policy.encode())}"
         return self.folder / kind / f"policy={policy}"
-
-    @property
-    def damaged(self) -> list[Path]:
-        """The files that are not what their names say."""
-        return [*self._damaged]
 
     def missing(self, chunk: Chunk) -> Chunk | None:
         """What is not there of a chunk, if anything."""
@@ -271,15 +229,21 @@ class Store:
         with replacing(path) as temporary, writable(path):
             temporary.write_text(self.manifest.text, "utf-8")
 
-    def load(self, parts: Sequence[Part]) -> tuple[pd.DataFrame, pd.DataFrame]:
-        """The missions of parts of one team, and their UAVs: with ``point``, in the order asked.
+    def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
+        """The missions of parts of one team, with their ``point``, in the order asked.
 
         Raises:
             InputError: If some are missing or damaged.
         """
-        tables = self._tables_with(parts)
-        missions = rows_of(parts, [chunk.missions for chunk in tables])
-        return missions, rows_of(parts, [chunk.uavs for chunk in tables])
+        return rows_of(parts, [tables.missions for tables in self._tables_with(parts)])
+
+    def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
+        """The UAVs of the same missions, in this order.
+
+        Raises:
+            InputError: If some are missing or damaged.
+        """
+        return rows_of(parts, [tables.uavs for tables in self._tables_with(parts)])
 
     def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
         """The metrics of the missions of every part of one team.
@@ -287,7 +251,7 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        missions = rows_of(parts, [chunk.missions for chunk in self._tables_with(parts)])
+        missions = self.missions(parts)
         ends = np.cumsum([len(part.replications) for part in parts])
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
@@ -307,8 +271,8 @@ class Store:
         present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
         line = f"{self.folder}: incomplete, {present} missions of "
         line += f"{self.manifest.policies[team].policy}{where}"
-        if self._damaged:
-            line += f" (damaged: {self._damaged[0]})"
+        if self.damaged:
+            line += f" (damaged: {self.damaged[0]})"
         if failed := sorted((self.folder / "failures").glob("*.json")):
             line += f" ({len(failed)} chunks failed, see {failed[0]})"
         return f"{line}; allowed: run the study again to complete it"

@@ -1,19 +1,19 @@
 """What a study found: a results folder as tables, loaded whole."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from analysis.results.chunks import Part
+from analysis.results.chunks import check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
 from analysis.study.selection import Choice, Selection
-from analysis.study.study import CHECK
 from dess import InputError
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
@@ -79,7 +79,7 @@ class Results:
         if manifest.study["selection"] is None:
             return None
         rule = Selection.model_validate_json(json.dumps(manifest.study["selection"]))
-        return rule.choice(self.store.samples(_parts(manifest, self.policies.index(policy))))
+        return rule.choice(self.store.samples(parts_of(manifest, self.policies.index(policy))))
 
     def cell(self, policy: str, point: int) -> Cell:
         """A policy at a design point; its key is a hash of all that its records depend on.
@@ -112,46 +112,32 @@ def results_of(store: Store) -> Results:
         InputError: If they are incomplete or damaged.
     """
     manifest = store.manifest
-    loaded, checks = [], []
-    for team in range(len(manifest.policies)):
-        loaded.append((team, *store.load(_parts(manifest, team))))
-        if (point := manifest.selected[team]) is not None:
-            cell, n = manifest.cells[team][point], manifest.study["selection"]["check"]
-            part = Part(cell, range(CHECK, CHECK + n))
-            checks.append((team, store.load([part])[0]))
+    missions, uavs, checks = {}, {}, {}
+    for team, policy in enumerate(team.policy for team in manifest.policies):
+        parts = parts_of(manifest, team)
+        missions[policy], uavs[policy] = store.missions(parts), store.uavs(parts)
+        if checked := check_parts(manifest, team, manifest.selected[team]):
+            checks[policy] = store.missions(checked)
     if not manifest.complete:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
-    missions = [_labelled(manifest, team, frame) for team, frame, _ in loaded]
-    uavs = [
-        pd.concat(
-            [pd.DataFrame({"policy": manifest.policies[t].policy}, frame.index), frame], axis=1
-        )
-        for t, _, frame in loaded
-    ]
-    checked = [_labelled(manifest, team, frame) for team, frame in checks]
-    return Results(
-        store, _stacked(missions), _stacked(uavs), _stacked(checked or [missions[0][:0]])
-    )
+    all_missions = _labelled(manifest, missions)
+    all_checks = _labelled(manifest, checks) if checks else all_missions[:0]
+    return Results(store, all_missions, _of_policies(uavs), all_checks)
 
 
-def parts_of(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
-    """The first missions of every cell, that many."""
-    return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
+def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """The tables of all policies as one, with ``policy`` in front."""
+    table = pd.concat(tables.values(), ignore_index=True)
+    table.insert(0, "policy", np.repeat([*tables], [len(rows) for rows in tables.values()]))
+    return table
 
 
-def _parts(manifest: Manifest, team: int) -> list[Part]:
-    """The missions of a team, those that check a selection aside."""
-    return parts_of(manifest.cells[team], manifest.missions[team])
-
-
-def _labelled(manifest: Manifest, team: int, missions: pd.DataFrame) -> pd.DataFrame:
-    """Missions with their policy, and what the design sets that no record has."""
-    swept = {
-        field: missions["point"].map(dict(enumerate(values)))
-        for field, values in _swept(manifest).items()
-    }
-    front = pd.DataFrame({"policy": manifest.policies[team].policy, "point": missions["point"]})
-    return pd.concat([front.assign(**swept), missions.drop(columns="point")], axis="columns")
+def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Missions of all policies, with what the design sets that no record has."""
+    table = _of_policies(missions)
+    for position, (field, values) in enumerate(_swept(manifest).items(), 2):
+        table.insert(position, field, table["point"].map(dict(enumerate(values))))
+    return table
 
 
 def _swept(manifest: Manifest) -> dict[str, list[Any]]:
@@ -167,7 +153,3 @@ def _swept(manifest: Manifest) -> dict[str, list[Any]]:
         listed = any(isinstance(value, list) for value in values)
         swept[field] = [json.dumps(v) if listed and v is not None else v for v in values]
     return swept
-
-
-def _stacked(frames: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    return pd.concat(frames, ignore_index=True)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import dess
 from analysis import load_results, run_study
 from analysis.results import provenance
-from analysis.results.chunks import Chunk, Part, gaps, split
+from analysis.results.chunks import Chunk, Failure, Part, gaps, split
 from analysis.results.manifest import Cell
-from analysis.results.store import Failure, Store
+from analysis.results.store import Store
 from dess import InputError, simulate_batch
 from dess.files import replacing
 from policies import load
