@@ -7,9 +7,8 @@ holds, or the cell and replication of an event log, and of its bytes. So a damag
 import json
 import re
 from collections import defaultdict
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -39,40 +38,34 @@ UAVS = pa.schema(
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
 
 
-def mission_table(cells: np.ndarray, records: Records) -> pa.Table:
-    """The records of missions as a table.
+class Tables(NamedTuple):
+    """What the files of a chunk hold: a row per mission, and a row per UAV."""
 
-    Args:
-        cells: (n,) the key of the cell of every mission.
-        records: Of the n missions.
-    """
-    columns = {name: records.missions[name] for name in MISSION_RECORD.names or ()}
-    return _table({"cell": cells} | columns, MISSIONS)
+    missions: pa.Table
+    uavs: pa.Table
 
 
-def uav_table(cells: np.ndarray, records: Records) -> pa.Table:
-    """The records of the UAVs of missions as a table, a row per UAV.
-
-    Args:
-        cells: (n,) the key of the cell of every mission.
-        records: Of the n missions.
-    """
+def tables_of(chunk: Chunk, records: Records) -> Tables:
+    """The records of the missions of a chunk as tables, which say what parts they hold."""
+    keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
+    cells = np.repeat(keys, lengths)
+    missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
     mission, uav = np.nonzero(present)
-    columns = {
+    uavs = {
         "cell": cells[mission],
         "replication": records.missions["replication"][mission],
         "uav": uav,
     }
-    columns |= {field: records.uavs[field][present] for field in UAV_RECORD.names or ()}
-    columns["end"] = np.array(END_NAMES)[columns["end"]]
-    return _table(columns, UAVS)
+    uavs |= {name: records.uavs[name][present] for name in UAV_RECORD.names or ()}
+    uavs["end"] = np.array(END_NAMES)[uavs["end"]]
+    return Tables(_table(missions, MISSIONS, chunk), _table(uavs, UAVS, chunk))
 
 
-def _table(columns: dict[str, np.ndarray], schema: pa.Schema) -> pa.Table:
-    arrays = {"cell": pa.array(columns.pop("cell")).dictionary_encode()}
-    arrays |= {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
-    return pa.table(arrays, schema=schema)
+def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> pa.Table:
+    arrays = {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
+    arrays["cell"] = arrays["cell"].dictionary_encode()
+    return pa.table(arrays, schema=schema.with_metadata({_PARTS: json.dumps(chunk.rows)}))
 
 
 def check(missions: pa.Table, chunk: Chunk, seed: int) -> None:
@@ -90,11 +83,6 @@ def check(missions: pa.Table, chunk: Chunk, seed: int) -> None:
         column = missions[field.name]
         if pa.types.is_floating(field.type) and not np.isfinite(column).all():
             raise ValueError(f"the records have a {field.name} that is no number")
-
-
-def with_parts(table: pa.Table, rows: Sequence[Sequence[Any]]) -> pa.Table:
-    """A table that says which parts it holds: the key, start and stop of each."""
-    return table.replace_schema_metadata({_PARTS: json.dumps(rows)})
 
 
 def parts_in(table: pa.Table) -> list[tuple[str, int, int]]:

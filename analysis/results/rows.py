@@ -38,7 +38,7 @@ def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
 
 def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of all tables."""
-    frame = pa.concat_tables(tables).unify_dictionaries().to_pandas().astype({"cell": str})
+    frame = pa.concat_tables(tables).to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
     if frame.duplicated(one).any():  # somebody may have put folders together
         frame = frame.drop_duplicates()

@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Self
 from urllib.parse import quote
 
 import numpy as np
@@ -35,13 +35,6 @@ LONG = 150  # characters of a policy in the name of a folder
 FOLDERS = ("missions", "uavs", "events", "failures")
 
 
-class _Tables(NamedTuple):
-    """What the files of a chunk hold."""
-
-    missions: pa.Table
-    uavs: pa.Table
-
-
 class Store:
     """The files of a results folder.
 
@@ -54,7 +47,7 @@ class Store:
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
         self._lock = FileLock(folder / LOCK)
-        self._tables: dict[tuple[int, str], _Tables] = {}  # by team and name of the chunk
+        self._tables: dict[tuple[int, str], parquet.Tables] = {}  # by team and name of the chunk
         self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
         self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
         self.damaged: list[Path] = []
@@ -78,7 +71,11 @@ class Store:
         store = cls(folder, _extended(folder, manifest, accept_code))
         with writable(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        store._acquire()
+            try:
+                store._lock.acquire(timeout=0)
+            except Timeout:
+                allowed = "allowed: another --out, or wait for its end"
+                raise InputError(f"{folder}: in use by another run; {allowed}") from None
         try:
             store.manifest = _extended(folder, manifest, accept_code)  # a run may have ended here
             store._prepare()
@@ -115,19 +112,9 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self._lock.release()
 
-    def _acquire(self) -> None:
-        with writable(self.folder):
-            try:
-                self._lock.acquire(timeout=0)
-            except Timeout:
-                raise InputError(
-                    f"{self.folder}: in use by another run; "
-                    "allowed: another --out, or wait for its end"
-                ) from None
-
     def _prepare(self) -> None:
         """Write the manifest, remove what a killed run has left, and scan the folder."""
-        self._write_manifest()
+        _write(self.folder / MANIFEST, self.manifest.text)
         for name in FOLDERS:
             with writable(self.folder / name):
                 (self.folder / name).mkdir(exist_ok=True)
@@ -148,14 +135,14 @@ class Store:
             self.damaged += damaged_uavs + damaged
             for name in missions:
                 if name in uavs:
-                    self._enter(team, name, _Tables(missions[name], uavs[name]))
+                    self._enter(team, name, parquet.Tables(missions[name], uavs[name]))
             for path in parquet.files_in(self._partition("events", team)):
                 if parquet.read(path) is None:
                     self.damaged.append(path)
                 else:
                     self._logs[team, parquet.content_hash(path)] = path
 
-    def _enter(self, team: int, name: str, tables: _Tables) -> None:
+    def _enter(self, team: int, name: str, tables: parquet.Tables) -> None:
         self._tables[team, name] = tables
         for key, start, stop in parquet.parts_in(tables.missions):
             self._present[team, key].append(range(start, stop))
@@ -186,14 +173,8 @@ class Store:
         Raises:
             ValueError: If they are not those of the chunk.
         """
-        cells = np.repeat(
-            [part.cell.key for part in chunk.parts],
-            [len(part.replications) for part in chunk.parts],
-        )
-        missions = parquet.mission_table(cells, records)
-        uavs = parquet.uav_table(cells, records)
-        parquet.check(missions, chunk, self.manifest.seed)
-        tables = _Tables(*(parquet.with_parts(t, chunk.rows) for t in (missions, uavs)))
+        tables = parquet.tables_of(chunk, records)
+        parquet.check(tables.missions, chunk, self.manifest.seed)
         # Missions last: a chunk is present when they are.
         parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)
         parquet.write(self._partition("missions", chunk.team), chunk.name, tables.missions)
@@ -209,8 +190,7 @@ class Store:
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Keep why a chunk could not be computed; its path."""
         path = self._failure(chunk)
-        with replacing(path) as temporary, writable(path):
-            temporary.write_text(json.dumps(asdict(failure), indent=2) + "\n", "utf-8")
+        _write(path, json.dumps(asdict(failure), indent=2) + "\n")
         return path
 
     def _failure(self, chunk: Chunk) -> Path:
@@ -220,14 +200,9 @@ class Store:
         """Note how many missions every team and design point has, and that all of it is there."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
-        self._write_manifest()
+        _write(self.folder / MANIFEST, self.manifest.text)
         for path in (self.folder / "failures").glob("*.json"):
             path.unlink()
-
-    def _write_manifest(self) -> None:
-        path = self.folder / MANIFEST
-        with replacing(path) as temporary, writable(path):
-            temporary.write_text(self.manifest.text, "utf-8")
 
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of parts of one team, with their ``point``, in the order asked.
@@ -256,7 +231,7 @@ class Store:
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
-    def _tables_with(self, parts: Sequence[Part]) -> list[_Tables]:
+    def _tables_with(self, parts: Sequence[Part]) -> list[parquet.Tables]:
         """The tables of a team, all of whose parts are present."""
         for part in parts:
             present = self._present[part.cell.team, part.cell.key]
@@ -308,6 +283,12 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
             return manifest
     held = Manifest.read(path)
     return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file, whole or not at all."""
+    with replacing(path) as temporary, writable(path):
+        temporary.write_text(text, "utf-8")
 
 
 def _is_ours(path: Path) -> bool:

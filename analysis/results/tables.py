@@ -113,11 +113,11 @@ def results_of(store: Store) -> Results:
     """
     manifest = store.manifest
     missions, uavs, checks = {}, {}, {}
-    for team, policy in enumerate(team.policy for team in manifest.policies):
-        parts = parts_of(manifest, team)
-        missions[policy], uavs[policy] = store.missions(parts), store.uavs(parts)
-        if checked := check_parts(manifest, team, manifest.selected[team]):
-            checks[policy] = store.missions(checked)
+    for number, team in enumerate(manifest.policies):
+        parts = parts_of(manifest, number)
+        missions[team.policy], uavs[team.policy] = store.missions(parts), store.uavs(parts)
+        if checked := check_parts(manifest, number, manifest.selected[number]):
+            checks[team.policy] = store.missions(checked)
     if not manifest.complete:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
     all_missions = _labelled(manifest, missions)

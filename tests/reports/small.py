@@ -16,6 +16,7 @@ from analysis.verification import cross_check
 from reports.pages import html
 from reports.pages.notebook import read
 from reports.player import library
+from tests.analysis.small import write_timing
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 
@@ -55,7 +56,7 @@ def run_small_studies(folder: Path, *names: str) -> Path:
         if name == cross_check.STUDY:
             cross_check.write(cross_check.simulate_missions(study, 2), folder)
     if not names:
-        timing.write(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
+        write_timing(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
     return folder
 
 

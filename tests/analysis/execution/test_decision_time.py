@@ -13,7 +13,7 @@ from analysis.execution.decision_time import ROUNDS
 from analysis.results.provenance import engine_code, members_of
 from dess import InputError, load_scenario, simulate, simulate_batch
 from policies import load, load_team
-from tests.analysis.small import small_study, write_scenario
+from tests.analysis.small import small_study, write_scenario, write_timing
 
 SEED, MISSIONS = 5, 6
 
@@ -133,11 +133,11 @@ def test_it_is_told_what_was_measured_on_what(measured, scenario):
 
 
 def test_it_is_read_as_it_was_written(measured, tmp_path):
-    path = decision_time.write(measured, tmp_path / "new" / "timing")
+    path = write_timing(measured, tmp_path / "new" / "timing")
     assert path == tmp_path / "new" / "timing" / "timing.json"
     assert decision_time.read(path.parent) == measured
     before = path.read_bytes()
-    decision_time.write(decision_time.read(path.parent), path.parent)
+    write_timing(decision_time.read(path.parent), path.parent)
     assert path.read_bytes() == before
     assert str(tmp_path).encode() not in before
 
@@ -186,7 +186,7 @@ def test_a_policy_that_is_listed_twice_is_refused(measured, tmp_path):
 def test_where_nothing_can_be_written_is_refused(measured, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="timing.json: cannot be written: "):
-        decision_time.write(measured, tmp_path / "file")
+        write_timing(measured, tmp_path / "file")
 
 
 @pytest.mark.parametrize(

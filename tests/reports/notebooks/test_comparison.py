@@ -15,6 +15,7 @@ from analysis.questions import head_to_head, regions, summary
 from analysis.questions.missions import FOLDER
 from dess import InputError
 from reports.pages import missions as missions_of_pages
+from tests.analysis.small import write_timing
 from tests.reports.small import said_by, shown_by
 
 NAME = "comparison"
@@ -25,7 +26,7 @@ POLICIES = ["random", "greedy", "nearest", "ddqn"]
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     run_study(load_study(NAME, policies=POLICIES, missions=120), folder / NAME)
-    timing.write(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
+    write_timing(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
     return folder
 
 
