@@ -1,6 +1,7 @@
 import pytest
 
 from analysis import load_study, study_names
+from analysis.study.study import budget_of
 from dess import InputError, load_scenario
 from dess.scenario import SAMPLED
 from policies.registry import SHIPPED, trained_names
@@ -178,3 +179,15 @@ def test_fewer_missions_than_event_logs_keep_a_log_each():
     assert load_study("fig4", missions=logged).logged == logged
     with pytest.raises(InputError, match="logged: 3 is more than the missions"):
         load_study("fig4", missions=2, logged=3)
+
+
+def test_the_budget_says_what_differs_from_the_shipped_study(tmp_path):
+    few = load_study("fig5", missions=3, policies=["greedy"])
+    others = load_study("fig5", seed=3, policies=["greedy", "greedy,tour"])
+    words = [
+        budget_of(study.model_dump(mode="json")) for study in (load_study("fig5"), few, others)
+    ]
+    assert words[0] == "full"
+    assert words[1] == "1 of 6 policies, 3 instead of 300 missions"
+    assert words[2] == "other policies, another seed"
+    assert budget_of(small_study(tmp_path).model_dump(mode="json")) == "as asked"
