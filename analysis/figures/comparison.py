@@ -57,7 +57,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     """
     rows = table[table["field"] == field].sort_values("position")
     with style():
-        figure, ax = panels(3.5)
+        figure, ax = panels(3.5, values="y")
         ax.axhline(0, color=INK, linewidth=1.2, zorder=1)
         ax.axhline(overall, color=MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall")
         for row in rows.itertuples():
@@ -70,8 +70,6 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
         points_axis(ax.yaxis, 6)
-        ax.grid(axis="x", visible=False)
-        sns.despine(ax=ax)
     return figure
 
 
@@ -146,7 +144,6 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
         points_axis(ax.xaxis, 7)
         ax.yaxis.set_major_formatter(PercentFormatter(1))
-        sns.despine(ax=ax)
     return figure
 
 
@@ -162,7 +159,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
     """
     colours = policy_colours([*policies, *(cost.policy for cost in costs)])
     with style():
-        figure, ax = panels(1.5 + 0.45 * len(costs))
+        figure, ax = panels(1.5 + 0.45 * len(costs), values="x")
         for y, cost in enumerate(costs):
             colour, _ = colours[cost.policy]
             first = not y
@@ -179,8 +176,6 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_yticks(range(len(costs)), [cost.policy for cost in costs])
         ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
         legend_below(figure, ax, 1)
     return figure
 

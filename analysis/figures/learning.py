@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
@@ -51,7 +50,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     averages = smoothed(curves[curves["variant"].isin(labels)], metric)
     colours = dict(zip(labels, palette(), strict=False))
     with style():
-        figure, ax = panels(3.9)
+        figure, ax = panels(3.9, values="y")
         for number, (variant, label) in enumerate(labels.items()):
             of_variant = averages[averages["variant"] == variant]
             _trainings(of_variant, colours[variant], ax)
@@ -95,7 +94,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     level = table.loc[table["variant"] == baseline, "mean"].item()
     left, right = _ends(table, last[metric], OFF * level)
     with style():
-        figure, ax = panels(0.9 + 0.42 * len(table))
+        figure, ax = panels(0.9 + 0.42 * len(table), values="x")
         ax.axvline(level, color=INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, row in table.reset_index(drop=True).iterrows():
             reached = values.get_group(row["variant"])
@@ -111,8 +110,6 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
         ax.set_xlim(left, right)
         round_ticks(ax.xaxis, 5)
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
     return figure
 
 
@@ -125,7 +122,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     """
     kept = curve[curve["is_best"]].iloc[-1]
     with style():
-        figure, ax = panels(3.9)
+        figure, ax = panels(3.9, values="y")
         colours = palette()
         for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
             for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
@@ -205,8 +202,6 @@ def _steps_axis(last: int, ax: Axes) -> None:
     ax.set(xlim=(0, last * 1.02), xlabel="training step [1000 updates]")
     ax.xaxis.set_major_locator(MaxNLocator(nbins=7))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:g}"))
-    ax.grid(axis="x", visible=False)
-    sns.despine(ax=ax)
 
 
 def _legend_below(ax: Axes) -> None:

@@ -7,7 +7,6 @@ them together. Nothing touches pyplot's state.
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -21,6 +20,7 @@ from analysis.figures.style import (
     MUTED,
     SEA,
     ZONE,
+    grid_of,
     node_colours,
     note_at_right,
     shifts,
@@ -241,5 +241,4 @@ def _margin_note(text: str, level: float, ax: Axes) -> None:
 def _time_axis(events: Events, ax: Axes) -> None:
     ax.set(xlim=(0, duration(events)), xlabel="time [mission slots]")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    ax.grid(axis="x", visible=False)
-    sns.despine(ax=ax)
+    grid_of("y", ax)

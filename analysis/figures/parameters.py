@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, PercentFormatter
@@ -51,7 +50,7 @@ def effect(
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
     colours = policy_colours(policies)
     with style():
-        figure, axes = panels(7.6, 4, sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
+        figure, axes = panels(7.6, 4, "y", sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
         for ax, metric in zip(axes, METRICS, strict=False):
             _means(rows[rows["metric"] == metric], [*changes], colours, ax)
             ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
@@ -64,8 +63,6 @@ def effect(
         axes[3].set_xticks(range(len(values)), values)
         for ax in axes:
             round_ticks(ax.yaxis, 5)
-            ax.grid(axis="x", visible=False)
-            sns.despine(ax=ax)
         legend_below(figure, axes[0])
     return figure
 
@@ -80,7 +77,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     rows = rows.reset_index(drop=True)
     colour = palette()[0]
     with style():
-        figure, ax = panels(1.5 + 0.52 * len(rows))
+        figure, ax = panels(1.5 + 0.52 * len(rows), values="x")
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
             name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
             spots = np.arange(len(rows)) + shift
@@ -94,8 +91,6 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         ax.set_yticks(range(len(rows)), [_tick(name) for name in rows["parameter"]])
         ax.set(title=title, ylim=(len(rows) - 0.5, -0.5), xlabel="share of the variance")
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
         legend_below(figure, ax, 2)
     return figure
 

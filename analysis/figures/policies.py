@@ -7,7 +7,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
@@ -38,7 +37,7 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     rows = summary[summary["metric"] == metric].reset_index(drop=True)
     colours = policy_colours(rows["policy"])
     with style():
-        figure, ax = panels(1.3 + 0.42 * len(rows))
+        figure, ax = panels(1.3 + 0.42 * len(rows), values="x")
         for y, row in rows.iterrows():
             ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
             note_at_right(f"{row['mean']:.1%}", y, ax)
@@ -49,8 +48,6 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
         ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
         ax.set_xticks(np.linspace(0, 1, 6))
         ax.xaxis.set_major_formatter(PercentFormatter(1))
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
     return figure
 
 
@@ -67,7 +64,7 @@ def by_fleet(
     rows = summary[summary["metric"] == metric].sort_values("uavs")
     colours = policy_colours(summary["policy"])
     with style():
-        figure, ax = panels(3.9)
+        figure, ax = panels(3.9, values="y")
         for policy, shift in zip(colours, shifts(len(colours), 0.12), strict=True):
             means = rows[rows["policy"] == policy]
             ax.errorbar(means["uavs"] + shift, means["mean"], yerr=arms(means), linewidth=1,
@@ -79,8 +76,6 @@ def by_fleet(
         ax.set_xticks(sorted(rows["uavs"].unique()))
         ax.set_yticks(np.linspace(0, 1, 6))
         ax.yaxis.set_major_formatter(PercentFormatter(1))
-        ax.grid(axis="x", visible=False)
         ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=5, columnspacing=1.1,
                   handletextpad=0.5)  # fmt: skip
-        sns.despine(ax=ax)
     return figure

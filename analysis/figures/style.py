@@ -3,14 +3,14 @@
 A figure is made inside ``style`` and touches no state of pyplot::
 
     with style():
-        figure, ax = panels(height=3.5)
+        figure, ax = panels(height=3.5, values="x")
         ax.errorbar(row["mean"], 0, xerr=arms(row), **dot("greedy", colours))
         legend_below(figure, ax)
 """
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -57,16 +57,30 @@ def style() -> Iterator[None]:
         yield
 
 
-def panels(height: float, rows: int = 1, **options: Any) -> tuple[Figure, Any]:
+def panels(
+    height: float, rows: int = 1, values: Literal["x", "y", "xy"] = "xy", **options: Any
+) -> tuple[Figure, Any]:
     """A new figure with its axes, one below the other.
 
     Args:
         height: Of the figure [inches].
         rows: The number of axes.
+        values: The axes that have grid lines.
         options: Further arguments of ``Figure.subplots``.
     """
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    return figure, figure.subplots(rows, **options)
+    axes = figure.subplots(rows, **options)
+    for ax in np.atleast_1d(axes):
+        grid_of(values, ax)
+    return figure, axes
+
+
+def grid_of(values: Literal["x", "y", "xy"], ax: Axes) -> None:
+    """Grid lines for the axes of values alone, and no frame; names stand beside no axis line."""
+    ax.grid(visible=False)
+    for axis in values:
+        ax.grid(axis=axis, visible=True)
+    sns.despine(ax=ax, left=values == "x")
 
 
 def node_colours(count: int) -> list[str]:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
@@ -100,7 +99,6 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
         ax.set(title="Initial data of a mission", ylabel="density")
         ax.set_xlabel("data units, all nodes together")
         ax.yaxis.set_major_locator(MaxNLocator(nbins=5))
-        sns.despine(ax=ax)
         legend_below(figure, ax, 2)
     return figure
 
@@ -114,7 +112,7 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
     """
     shown = blocks.head(SHOWN)
     with style():
-        figure, ax = panels(3.6)
+        figure, ax = panels(3.6, values="y")
         looks = ((True, SEEN, "o", "holds the mean of all"), (False, MISS, "X", "misses it"))
         for holds, colour, marker, name in looks:
             rows = shown[shown["holds"] == holds]
@@ -127,8 +125,6 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
         round_ticks(ax.yaxis, 6)
         ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
-        ax.grid(axis="x", visible=False)
-        sns.despine(ax=ax)
         legend_below(figure, ax, 2)
     return figure
 
@@ -163,11 +159,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
 
 def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
     """A panel and a lower one for the deviations, over the same axis."""
-    figure, (ax, below) = panels(4.6, 2, sharex=True, height_ratios=(2, 1))
-    ax.grid(axis="x", visible=False)
-    for panel in (ax, below):
-        sns.despine(ax=panel)
-    return figure, (ax, below)
+    return panels(4.6, 2, "y", sharex=True, height_ratios=(2, 1))
 
 
 def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
@@ -181,7 +173,6 @@ def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
                    zorder=3)  # fmt: skip
     reach = max(1.15 * float(deviations.abs().max()), 1.25 * band)
     ax.set(ylabel="standard\nerrors", ylim=(-reach, reach))
-    ax.grid(axis="x", visible=False)
 
 
 def _box(ax: Axes, top: float, height: float, name: str, text: str, colour: str) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
@@ -41,7 +40,7 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     policies = list(dict.fromkeys(rows["policy"]))
     colours = policy_colours(rows["policy"])
     with style():
-        figure, ax = panels(4.1)
+        figure, ax = panels(4.1, values="y")
         offsets = shifts(len(policies), 0.025 * (len(policies) - 1))
         for policy, shift in zip(policies, offsets, strict=True):
             sides = rows[rows["policy"] == policy].sort_values("point")
@@ -52,8 +51,6 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
         ax.set_xticks((0, 1), ticks)
         round_ticks(ax.yaxis, 6)
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        ax.grid(axis="x", visible=False)
-        sns.despine(ax=ax)
         legend_below(figure, ax)
     return figure
 
@@ -68,7 +65,7 @@ def gains(answers: pd.DataFrame) -> Figure:
     policies = list(dict.fromkeys(rows["policy"]))
     colours = policy_colours(rows["policy"])
     with style():
-        figure, ax = panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(policies)))
+        figure, ax = panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(policies)), values="x")
         offsets = shifts(len(policies), 0.055 * (len(policies) - 1))
         for policy, shift in zip(policies, offsets, strict=True):
             changes = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
@@ -79,8 +76,6 @@ def gains(answers: pd.DataFrame) -> Figure:
         ax.set(title="Variation − baseline, mission by mission", xlabel="percentage points",
                ylim=(len(METRICS) - 0.5, -0.5))  # fmt: skip
         points_axis(ax.xaxis, 7)
-        ax.grid(axis="y", visible=False)
-        sns.despine(ax=ax, left=True)
         legend_below(figure, ax)
     return figure
 
@@ -111,7 +106,6 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
             ax.set(title=title, ylim=(-0.02, 1.02))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
             points_axis(ax.xaxis, 7)
-            sns.despine(ax=ax)
         axes[1].set(xlim=(low - room, high + room), xlabel="percentage points")
         legend_below(figure, axes[0])
     return figure

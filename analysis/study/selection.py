@@ -123,10 +123,8 @@ class Selection(BaseModel):
             The numbers, no less than there are; all as there are: done.
         """
         values = self._values(samples)
-        return [
-            max(len(sample), int(count))
-            for sample, count in zip(values, self._play(values).counts, strict=True)
-        ]
+        counts = _Race(self, values).counts
+        return [max(len(sample), int(n)) for sample, n in zip(values, counts, strict=True)]
 
     def choice(self, samples: Sequence[Mapping[str, np.ndarray]]) -> Choice:
         """The selected design point, and what can be said of it.
@@ -140,38 +138,32 @@ class Selection(BaseModel):
         values = self._values(samples)
         if not values or min(map(len, values)) < self.first:
             raise ValueError(f"choice: needs points, with {self.first} or more missions each")
-        played = self._play(values)
-        counts = [min(n, len(sample)) for n, sample in zip(played.counts, values, strict=True)]
-        means = [sample[:n].mean() for n, sample in zip(counts, values, strict=True)]
+        race = _Race(self, values)
+        counts = [min(int(n), len(sample)) for n, sample in zip(race.counts, values, strict=True)]
         return Choice(
-            best=played.best,
-            survivors=tuple(map(int, played.alive)),
-            counts=tuple(map(int, counts)),
-            means=tuple(map(float, means)),
+            best=race.best,
+            survivors=tuple(map(int, race.alive)),
+            counts=tuple(counts),
+            means=tuple(float(x[:n].mean()) for n, x in zip(counts, values, strict=True)),
             procedure=self.procedure,
-            guarantee=self._guarantee(played),
-            guaranteed=played.decided,
-            done=played.done,
-            stage=played.stage,
-            rounds=played.rounds,
-            missions=int(sum(counts)),
+            guarantee=self._guarantee(race),
+            guaranteed=race.over,
+            done=race.done,
+            stage=race.stage,
+            rounds=race.rounds,
+            missions=sum(counts),
         )
 
     def _values(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray]:
         return [np.asarray(sample[self.metric], float) for sample in samples]
 
-    def _play(self, values: list[np.ndarray]) -> "_Played":
-        alpha, bounded = 1 - self.confidence, self.procedure == "kn-bounded"
-        margins = _Margins(len(values), self.first, self.indifference, alpha, bounded)
-        return _kn(values, margins, self.budget)
-
-    def _guarantee(self, played: "_Played") -> str:
-        if len(played.counts) == 1:
+    def _guarantee(self, race: "_Race") -> str:
+        if len(race.values) == 1:
             return "it is the only design point"
-        if not played.done:
+        if not race.done:
             return "none yet: the procedure wants more missions"
-        left = len(played.alive)
-        if not played.decided:
+        left = len(race.alive)
+        if not race.over:
             return (
                 f"none: the budget of {self.budget} missions ended with {left} design points left;"
                 " this is the best mean of them"
@@ -183,76 +175,6 @@ class Selection(BaseModel):
             f"with probability {least} {self.confidence:g} {what}, if the best is better than "
             f"{others} by {self.indifference:g} or more"
         )
-
-
-@dataclass
-class _Played:
-    """Where the rounds led: the counts wanted so far, and who is left.
-
-    Attributes:
-        counts: (k,) missions wanted.
-        alive: Points not ruled out, in order.
-        best: The best of them.
-        stage: Missions of it that this rests on.
-        rounds: Rounds played.
-        done: No more missions are wanted.
-        decided: The race ended before the budget.
-    """
-
-    counts: np.ndarray
-    alive: np.ndarray
-    best: int = 0
-    stage: int = 0
-    rounds: int = 1
-    done: bool = False
-    decided: bool = False
-
-    def covered_by(self, values: list[np.ndarray]) -> bool:
-        """Whether all missions of the round are there."""
-        return all(len(sample) >= n for sample, n in zip(values, self.counts, strict=True))
-
-
-@dataclass(frozen=True)
-class _Margins:
-    """By how much a mean must fall behind another one to leave the race.
-
-    Attributes:
-        points: k.
-        first: n0.
-        indifference: delta.
-        alpha: Probability of error.
-        bounded: Whether this is ``kn-bounded``.
-    """
-
-    points: int
-    first: int
-    indifference: float
-    alpha: float
-    bounded: bool
-
-    def reach(self, values: np.ndarray) -> np.ndarray:
-        """The stages from which the margins of all pairs are zero: h2 S2_il / delta^2.
-
-        Args:
-            values: (s, n) values of the points in the race.
-
-        Returns:
-            (s, s) stages, of no meaning on the diagonal.
-        """
-        if self.points == 1:
-            return np.zeros((1, 1))
-        odds = (self.points - 1) / self.alpha
-        h2 = ((odds / 2) ** (2 / (self.first - 1)) - 1) * (self.first - 1)
-        reach = h2 * _variances_of_differences(values) / self.indifference**2
-        return reach + 4 * np.log(odds) / (3 * self.indifference) if self.bounded else reach
-
-    def at(self, reach: np.ndarray, stage: int) -> np.ndarray:
-        """W at a stage."""
-        return np.maximum(0.0, self.indifference / (2 * stage) * (reach - stage))
-
-    def renewed(self, stage: int) -> float:
-        """The stage after which the variances are taken anew."""
-        return _grown(stage) if self.bounded else np.inf
 
 
 def _grown(count: int) -> int:
@@ -268,81 +190,105 @@ def _variances_of_differences(values: np.ndarray) -> np.ndarray:
     return np.maximum(variances[:, None] + variances - 2 * covariances, 0.0)
 
 
-def _kn(values: list[np.ndarray], margins: _Margins, budget: int) -> _Played:
-    """Play the race as far as the values reach."""
-    played = _Played(np.full(len(values), margins.first), np.arange(len(values)))
-    race = _Race(values, margins) if played.covered_by(values) else None
-    while race and played.covered_by(values):
-        target = int(played.counts.max())
-        race.run(target)
-        played.alive, played.best, played.stage = race.alive, race.best, race.stage
-        step = min(
-            _grown(target) - target,
-            max(race.horizon - target, 1),
-            (budget - int(played.counts.sum())) // len(race.alive),
-        )
-        if race.over or step < 1:
-            played.done, played.decided = True, race.over
-            break
-        played.counts[race.alive] += step
-        played.rounds += 1
-    return played
-
-
 class _Race:
-    """The stages of the procedure of Kim and Nelson."""
+    """The procedure of Kim and Nelson, played as far as the values reach.
 
-    def __init__(self, values: list[np.ndarray], margins: _Margins):
-        self.values = values
-        self.margins = margins
+    Attributes:
+        values: Per design point its values; all points have the missions of round one, or nothing
+            is played.
+        counts: (k,) missions wanted so far.
+        alive: Points not ruled out, in order.
+        stage: The last stage played.
+        rounds: Rounds played.
+        over: The race has ended.
+        done: No more missions are wanted: the race or the budget has ended.
+    """
+
+    def __init__(self, rule: Selection, values: list[np.ndarray]):
+        self.rule, self.values = rule, values
+        self.is_bounded = rule.procedure == "kn-bounded"
+        self.counts = np.full(len(values), rule.first)
         self.alive = np.arange(len(values))
-        self.stage = margins.first - 1  # the last one played
-        self.over = False
-        # Sums are taken mission by mission: no result depends on the rounds.
-        starts = self._values(0, margins.first)
-        self.sums = np.cumsum(starts, axis=1)[:, -2]
-        self.reach = margins.reach(starts)
-        self.renewal = margins.renewed(margins.first)
+        self.stage, self.rounds = rule.first - 1, 1
+        self.over = self.done = False
+        if self._has_missions():
+            # Sums are taken mission by mission: no result depends on the rounds.
+            self.sums = np.cumsum(self._missions(0, rule.first), axis=1)[:, -2]
+            self._renew_margins(rule.first)
+            self._play()
 
     @property
     def best(self) -> int:
         """The point of the best mean."""
         return int(self.alive[np.argmax(self.sums)])
 
-    @property
-    def horizon(self) -> int:
-        """The stage that ends the race at the latest, by the variances known."""
-        return int(self.reach.max()) + 1
+    def _has_missions(self) -> bool:
+        """Whether all missions wanted are there."""
+        return all(len(sample) >= n for sample, n in zip(self.values, self.counts, strict=True))
 
-    def run(self, target: int) -> None:
-        """Play the stages up to a number of missions that all who are left have."""
-        while self.stage < target and not self.over:
-            self._run_block(int(min(self.stage + _BLOCK, target, self.renewal)))
-            if self.stage == self.renewal:
-                self.reach = self.margins.reach(self._values(0, self.stage))
-                self.renewal = self.margins.renewed(self.stage)
-
-    def _values(self, begin: int, end: int) -> np.ndarray:
+    def _missions(self, begin: int, end: int) -> np.ndarray:
+        """(s, n) values of the points in the race."""
         return np.array([self.values[i][begin:end] for i in self.alive])
+
+    def _play(self) -> None:
+        """Play round by round, until the race or the budget ends or missions are missing."""
+        while self._has_missions():
+            target = int(self.counts.max())
+            while self.stage < target and not self.over:
+                self._run_block(int(min(self.stage + _BLOCK, target, self.renewal)))
+                if self.stage == self.renewal:
+                    self._renew_margins(self.stage)
+            last_stage = int(self.reach.max()) + 1  # by the variances known
+            step = min(
+                _grown(target) - target,
+                max(last_stage - target, 1),
+                (self.rule.budget - int(self.counts.sum())) // len(self.alive),
+            )
+            if self.over or step < 1:
+                self.done = True
+                return
+            self.counts[self.alive] += step
+            self.rounds += 1
+
+    def _renew_margins(self, stage: int) -> None:
+        """Estimate the variances from all missions up to a stage, and say when to do so again.
+
+        ``reach`` has the stages from which the margins of all pairs are zero, h2 S2_il / delta^2:
+        (s, s), of no meaning on the diagonal.
+        """
+        self.renewal = _grown(stage) if self.is_bounded else np.inf
+        points, first, delta = len(self.values), self.rule.first, self.rule.indifference
+        if points == 1:
+            self.reach = np.zeros((1, 1))
+            return
+        odds = (points - 1) / (1 - self.rule.confidence)
+        h2 = ((odds / 2) ** (2 / (first - 1)) - 1) * (first - 1)
+        self.reach = h2 * _variances_of_differences(self._missions(0, stage)) / delta**2
+        if self.is_bounded:
+            self.reach += 4 * np.log(odds) / (3 * delta)
+
+    def _margins(self, reach: np.ndarray, stage: int) -> np.ndarray:
+        """By how much a mean must fall behind another one to leave the race: W at a stage."""
+        return np.maximum(0.0, self.rule.indifference / (2 * stage) * (reach - stage))
 
     def _run_block(self, end: int) -> None:
         begin = self.stage
-        block = np.column_stack([self.sums, self._values(begin, end)])
+        block = np.column_stack([self.sums, self._missions(begin, end)])
         sums = np.cumsum(block, axis=1)[:, 1:]
-        itself = np.eye(len(self.alive), dtype=bool)
-        tightest = np.where(itself, np.inf, self.reach).min(axis=1)
+        diagonal = np.eye(len(self.alive), dtype=bool)
+        tightest = np.where(diagonal, np.inf, self.reach).min(axis=1)
         left = np.ones(len(self.alive), bool)
         for stage in range(begin + 1, end + 1):
             means = np.where(left, sums[:, stage - begin - 1] / stage, -np.inf)
-            # Only those are compared whom the best could beat by their narrowest margin.
-            close = means.max() - self.margins.at(tightest, stage)
+            # Only points are compared that the best could beat by their narrowest margin.
+            close = means.max() - self._margins(tightest, stage)
             behind = np.flatnonzero(left & (means < close))
             if behind.size:
-                bars = means - self.margins.at(self.reach[behind], stage)
+                bars = means - self._margins(self.reach[behind], stage)
                 left[behind] = means[behind] >= bars.max(axis=1)
             self.stage = stage
-            if self._ends(means, left):
-                self.over = True
+            self.over = self._ends(means, left)
+            if self.over:
                 break
         self.alive, self.sums = self.alive[left], sums[left, self.stage - begin - 1]
         self.reach = self.reach[np.ix_(left, left)]
