@@ -115,13 +115,3 @@ def arrivals(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
     """(T, K) data units that arrived in missions one after another, by mission slot and node."""
     none = np.zeros((0, len(space.nodes)), int)
     return np.concatenate([none, *(log.arrivals for log in logs)])
-
-
-def initial_data(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
-    """(N, K) initial data [data units] of missions, by node."""
-    return np.array([log.initial for log in logs]).reshape(-1, len(space.nodes))
-
-
-def start_cells(logs: Sequence[Log]) -> np.ndarray:
-    """(N, 2) the cells at which the first UAVs start."""
-    return np.array([log.first_cell for log in logs]).reshape(-1, 2)

@@ -116,7 +116,8 @@ class Suite:
             block: Missions of a block whose interval is compared with the mean of all missions.
         """
         space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
-        initial = event_logs.initial_data(self.realisations, space)
+        initial = np.array([log.initial for log in self.realisations])
+        start_cells = np.array([log.first_cell for log in self.realisations])
         return [
             *draws.arrival_checks(self.arrivals, space.arrival_rate),
             draws.arrived_check(self.missions, space),
@@ -131,7 +132,7 @@ class Suite:
             records.engine_check(self.study, self.again),
             *draws.parameter_checks(self.missions, space),
             *draws.initial_checks(initial, self.missions["initial"].to_numpy(), space),
-            draws.start_check(event_logs.start_cells(self.realisations), space),
+            draws.start_check(start_cells, space),
             *(
                 coverage.coverage_check(name, self.values(metric), block, metric == SUCCESS)
                 for metric, name in METRICS.items()

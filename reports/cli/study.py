@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess import InputError
-from reports.cli import console, study_tables
+from reports.cli import console
 from reports.cli.settings import RESULTS, JsonOption, WorkersOption
 
 if TYPE_CHECKING:
@@ -48,6 +48,7 @@ def run(
     """Run a study into a results folder; run again to resume or to top up."""
     from analysis.execution.runner import ChunkError, run_study
     from analysis.study.study import load_study
+    from reports.cli import study_tables
 
     changes = {"missions": missions, "policies": policy}
     study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
@@ -107,6 +108,7 @@ def show(
     """Show the results of a study: means, comparisons, selections, the worst missions."""
     from analysis.questions import summary
     from analysis.results.tables import load_results
+    from reports.cli import study_tables
 
     results = load_results(folder)
     if policy and policy not in results.policies:

@@ -2,22 +2,23 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import pandas as pd
+
+from analysis import numbers
+from analysis.execution.dry_run import Plan
 from analysis.names import PRODUCT, SHORT_METRICS
+from analysis.questions import summary
+from analysis.questions.summary import settings
+from analysis.replication import paper
+from analysis.results.tables import Results
+from analysis.study.study import Study
 from reports.cli import console
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-    from analysis.execution.dry_run import Plan
-    from analysis.results.tables import Results
-    from analysis.study.study import Study
 
 MANY_POINTS = 40  # more design points are not listed
 
 
-def print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
+def print_plan(plan: Plan, study: Study, out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and an estimate of the time."""
     rows = [
         [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
@@ -36,11 +37,8 @@ def print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
     print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
 
 
-def print_summary(results: "Results", folder: Path, short: bool) -> None:
+def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
-    from analysis.questions import summary
-    from analysis.replication import paper
-
     study = results.manifest["study"]
     print(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
     for change in results.store.manifest.accepted:
@@ -50,30 +48,36 @@ def print_summary(results: "Results", folder: Path, short: bool) -> None:
         _print_selections(summary.selections(results))
         if checks := study["selection"]["check"]:
             _print_means(summary.checks(results), f"{checks} further missions", printed)
-    elif len(summary.settings(results)) == 1:
+    elif len(settings(results)) == 1:
         _print_means(summary.means(results), "mean, 95 % interval", printed)
     elif short:
-        _print_by_point(results, summary.means(results), [PRODUCT])
+        _print_by_point(settings(results), summary.means(results), [PRODUCT])
 
 
-def print_details(results: "Results", tables: "Mapping[str, pd.DataFrame]") -> None:
+def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
     """Print the tables of ``dess study show``, by their names in its JSON; none that is empty."""
-    _print_sensitivities(tables["sensitivities"])
-    _print_by_point(results, tables["means"], [*SHORT_METRICS])
-    _print_distributions(tables["distributions"])
-    _print_precisions(results, tables["precisions"])
-    _print_comparisons(tables["comparisons"])
-    _print_learners(tables["learned_against_heuristic"])
-    _print_worst(tables["worst"])
+    points = settings(results)
+    printers = {
+        "sensitivities": _print_sensitivities,
+        "means": lambda means: _print_by_point(points, means, [*SHORT_METRICS]),
+        "distributions": _print_distributions,
+        "precisions": lambda precisions: _print_precisions(points, precisions),
+        "comparisons": _print_comparisons,
+        "learned_against_heuristic": _print_learners,
+        "worst": _print_worst,
+    }
+    for name, print_rows in printers.items():
+        if not tables[name].empty:
+            print_rows(tables[name])
 
 
-def _print_frame(title: str, cells: "pd.DataFrame") -> None:
+def _print_frame(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text under its title; the index is its first column."""
     rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
     console.print_table([title, *map(str, cells.columns)], rows)
 
 
-def _print_selections(selected: "pd.DataFrame") -> None:
+def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
     cells = selected.set_index("policy")[["setting", "missions", "left"]]
     cells["missions"] = cells["missions"].map("{:,}".format)
@@ -82,22 +86,16 @@ def _print_selections(selected: "pd.DataFrame") -> None:
         print(f" {guarantee}")
 
 
-def _print_means(means: "pd.DataFrame", title: str, printed: Mapping[str, float]) -> None:
+def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
     """A row per policy, and one with the values that the paper prints; a column per metric."""
-    from analysis import numbers
-
     cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], "policy")
     if printed:
         cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
     _print_frame(title, cells.rename(columns=SHORT_METRICS))
 
 
-def _print_by_point(results: "Results", means: "pd.DataFrame", metrics: list[str]) -> None:
+def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
     """A table per metric, a row per design point, if there are several and not too many."""
-    from analysis import numbers
-    from analysis.questions.summary import settings
-
-    points = settings(results)
     if len(points) == 1:
         return
     if len(points) > MANY_POINTS:
@@ -108,12 +106,8 @@ def _print_by_point(results: "Results", means: "pd.DataFrame", metrics: list[str
         _print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
 
 
-def _print_distributions(table: "pd.DataFrame") -> None:
+def _print_distributions(table: pd.DataFrame) -> None:
     """Quantiles of the product over the missions, and the mean of the worst ones."""
-    from analysis import numbers
-
-    if table.empty:
-        return
     rows = []
     for policy, views in table.groupby("policy", sort=False):
         quantiles = views[views["view"] == "quantile"].set_index("share")["value"]
@@ -124,13 +118,8 @@ def _print_distributions(table: "pd.DataFrame") -> None:
     console.print_table([*head, "mean of the worst 5 %"], rows)
 
 
-def _print_precisions(results: "Results", table: "pd.DataFrame") -> None:
+def _print_precisions(points: list[str], table: pd.DataFrame) -> None:
     """The precision that each estimate reached, beside its target."""
-    from analysis.questions.summary import settings
-
-    if table.empty:
-        return
-    points = settings(results)
     rows = [
         [
             f"{row.policy} {points[row.point]}".strip(),
@@ -145,46 +134,33 @@ def _print_precisions(results: "Results", table: "pd.DataFrame") -> None:
     console.print_table(["precision", "metric", "missions", "mean", "target", "reached"], rows)
 
 
-def _print_sensitivities(table: "pd.DataFrame") -> None:
+def _print_sensitivities(table: pd.DataFrame) -> None:
     """A table per policy, a row per parameter: its effect alone, and with all interactions."""
-    from analysis import numbers
-
-    if table.empty:
-        return
-    for policy, rows in table[table["metric"] == PRODUCT].groupby("policy", sort=False):
-        cells = [
-            [
-                row.parameter,
-                numbers.interval(row.first, row.first_low, row.first_high),
-                numbers.interval(row.total, row.total_low, row.total_high),
-            ]
-            for row in rows.itertuples()
-        ]
-        console.print_table([f"{policy}: share of the product's variance", "alone", "total"], cells)
+    for policy, indices in table[table["metric"] == PRODUCT].groupby("policy", sort=False):
+        rows = []
+        for row in indices.itertuples():
+            alone = numbers.interval(row.first, row.first_low, row.first_high)
+            total = numbers.interval(row.total, row.total_low, row.total_high)
+            rows.append([row.parameter, alone, total])
+        console.print_table([f"{policy}: share of the product's variance", "alone", "total"], rows)
 
 
-def _print_comparisons(table: "pd.DataFrame") -> None:
+def _print_comparisons(table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
-    if table.empty:
-        return
     cells, product = _differences(table, "policy")
     cells["pairing saves"] = product["variance_reduction"].map(_gain)
     _print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
 
 
-def _print_learners(table: "pd.DataFrame") -> None:
+def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
-    if table.empty:
-        return
     cells, product = _differences(table, "learner")
     cells = cells.assign(about=product["about"], trainings=product["trainings"])
     _print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 
 
-def _differences(table: "pd.DataFrame", who: str) -> "tuple[pd.DataFrame, pd.DataFrame]":
+def _differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Differences in every metric and the p-value of the product, as text; rows of the product."""
-    from analysis import numbers
-
     estimates = table.rename(columns={"difference": "mean"})
     cells = numbers.wide(estimates, who, write=numbers.points).rename(columns=SHORT_METRICS)
     product = table[table["metric"] == PRODUCT].set_index(who)
@@ -197,14 +173,10 @@ def _gain(reduction: float) -> str:
     return f"{1 / (1 - reduction):.1f} x" if reduction < 1 else ""
 
 
-def _print_worst(table: "pd.DataFrame") -> None:
+def _print_worst(table: pd.DataFrame) -> None:
     """The worst missions of a policy, with the commands that simulate them again."""
-    from analysis import numbers
-
-    if len(table):
-        print(
-            f" worst missions of {table['policy'].iloc[0]}, by collection ratio and communication:"
-        )
+    policy = table["policy"].iloc[0]
+    print(f" worst missions of {policy}, by collection ratio and communication:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
         print(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")

@@ -8,7 +8,6 @@ from collections.abc import Collection, Iterable, Sequence
 from itertools import groupby
 
 from IPython.display import HTML
-from jinja2 import Environment, PackageLoader
 
 from analysis import numbers
 from analysis.replication import paper
@@ -17,6 +16,7 @@ from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Finding, Row
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from reports.pages.template import template
 
 # Verdict -> class and sign, so that colour is not all that tells them apart.
 LOOKS = {
@@ -40,12 +40,9 @@ def as_html(
         pages: File names of the pages that there are, to link to; None for all.
         departures: What of the policy with the paper's network is not the paper's.
     """
-    environment = Environment(
-        loader=PackageLoader("reports", "templates"), autoescape=True, trim_blocks=True
-    )
-    environment.filters |= {"figure": figure, "percent": numbers.percent}
     columns = [*zip(*(row.findings for row in rows), strict=True)]
-    html = environment.get_template("scorecard.html").render(
+    page = template("scorecard.html", figure=figure, percent=numbers.percent)
+    html = page.render(
         sections=[(s, [*of_section]) for s, of_section in groupby(rows, lambda row: row.section)],
         total=len(rows),
         policies=[*map(_usual_policy, columns)],

@@ -16,31 +16,17 @@ from importlib import metadata
 from typing import Any, NamedTuple
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.numbers import level, words
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from policies.registry import descriptions
+from reports.pages.template import template
 
 Manifest = Mapping[str, Any]
 
 _HEADING = re.compile(r"^(?=### )", re.M)
-
-
-class Overview(NamedTuple):
-    """The order of events (III-C), for ``analysis.figures.verification.slot``.
-
-    Attributes:
-        steps: What happens and how, the first before the first slot, the others in every slot.
-        repeated: When another slot begins.
-        end: What follows when none does.
-    """
-
-    steps: list[tuple[str, str]]
-    repeated: str
-    end: str
 
 
 class Description(NamedTuple):
@@ -48,12 +34,12 @@ class Description(NamedTuple):
 
     Attributes:
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
-        overview: The diagram of item 2.1.
+        overview: The order of events (III-C, item 2.1): what ``figures.verification.slot`` draws.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 
     sections: dict[str, str]
-    overview: Overview
+    overview: tuple[list[tuple[str, str]], str, str]
     parameters: pd.DataFrame
 
 
@@ -85,20 +71,10 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
     }
-    text: Any = _environment().get_template("stress.md").make_module(values)
+    filters = {"words": words, "number": _number, "span": _span, "counted": _counted}
+    text: Any = template("stress.md", **filters).make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(text)) if part.strip()}
-    return Description(sections, Overview(text.steps, text.repeated, text.end), _parameters(space))
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("reports", "templates"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        autoescape=False,  # the template is Markdown, and its values are ours
-    )
-    environment.filters |= {"words": words, "number": _number, "span": _span, "counted": _counted}
-    return environment
+    return Description(sections, (text.steps, text.repeated, text.end), _parameters(space))
 
 
 def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:

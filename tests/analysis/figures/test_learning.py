@@ -5,7 +5,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
-from tests.analysis.questions.test_learning import training
+from tests.analysis.questions.learning.test_curves import training
 
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
