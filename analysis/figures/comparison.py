@@ -11,16 +11,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 
 from analysis import numbers
 from analysis.execution.decision_time import Cost
+from analysis.figures import style
 from analysis.figures.missions import mission_figure
-from analysis.figures.style import (
-    INK,
-    MUTED,
-    legend_below,
-    panels,
-    points_axis,
-    policy_colours,
-    style,
-)
 from analysis.names import parameter
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
 from analysis.questions.missions import LoggedMission
@@ -28,7 +20,7 @@ from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
 
 # Blue is ahead, orange behind, on all figures; an inconclusive mean is hollow.
-COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: MUTED}
+COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: style.MUTED}
 EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
 
 
@@ -56,10 +48,12 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         overall: The mean difference of all missions, drawn as a dashed line.
     """
     rows = table[table["field"] == field].sort_values("position")
-    with style():
-        figure, ax = panels(3.5, values="y")
-        ax.axhline(0, color=INK, linewidth=1.2, zorder=1)
-        ax.axhline(overall, color=MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall")
+    with style.look():
+        figure, ax = style.panels(3.5, values="y")
+        ax.axhline(0, color=style.INK, linewidth=1.2, zorder=1)
+        ax.axhline(
+            overall, color=style.MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall"
+        )
         for row in rows.itertuples():
             colour = COLOURS[row.verdict]
             ax.errorbar(row.position, row.mean, yerr=[[row.mean - row.low], [row.high - row.mean]],
@@ -69,7 +63,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         ax.set(title=parameter(field).label, ylabel="mean difference [points]")
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
-        points_axis(ax.yaxis, 6)
+        style.points_axis(ax.yaxis, 6)
     return figure
 
 
@@ -86,8 +80,8 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     grid = np.full((len(names), len(names_2)), np.nan)
     grid[table["position"], table["position_2"]] = table["mean"]
     widest = max(float(np.nanmax(np.abs(grid))), 0.01)
-    with style():
-        figure, ax = panels(1.5 + 0.55 * len(names))
+    with style.look():
+        figure, ax = style.panels(1.5 + 0.55 * len(names))
         ax.grid(False)
         colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
         ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
@@ -126,15 +120,15 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     room = 0.04 * (high - low)
     x = np.concatenate([[min(values[0], low) - 1], values, [max(values[-1], high) + 1]])
     y = np.concatenate([[0], shares, [1]])
-    with style():
-        figure, ax = panels(3.9)
+    with style.look():
+        figure, ax = style.panels(3.9)
         ax.axvspan(x[0], 0, color=COLOURS[BEHIND], alpha=0.12, linewidth=0, zorder=0)
         ax.axvspan(0, x[-1], color=COLOURS[AHEAD], alpha=0.10, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
         ax.fill_between(
-            x, band[0], band[1], step="post", color=INK, alpha=0.2, linewidth=0, gid="band"
+            x, band[0], band[1], step="post", color=style.INK, alpha=0.2, linewidth=0, gid="band"
         )
-        ax.step(x, y, where="post", color=INK, linewidth=1.8, gid="shares")
+        ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
         for x_text, side, outcome in ((0, "left", BEHIND), (1, "right", AHEAD)):
             share = (values < 0 if outcome == BEHIND else values > 0).mean()
             ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (x_text, 1.03), ha=side,
@@ -142,7 +136,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         ax.set_title("Difference in every mission", pad=22)
         ax.set(xlim=(low - room, high + room), ylim=(0, 1), ylabel="share of the missions")
         ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
-        points_axis(ax.xaxis, 7)
+        style.points_axis(ax.xaxis, 7)
         ax.yaxis.set_major_formatter(PercentFormatter(1))
     return figure
 
@@ -157,9 +151,9 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         costs: Those of an ``execution.decision_time.Timing``.
         policies: All policies of the study: they give every policy its colour on all pages.
     """
-    colours = policy_colours([*policies, *(cost.policy for cost in costs)])
-    with style():
-        figure, ax = panels(1.5 + 0.45 * len(costs), values="x")
+    colours = style.policy_colours([*policies, *(cost.policy for cost in costs)])
+    with style.look():
+        figure, ax = style.panels(1.5 + 0.45 * len(costs), values="x")
         for y, cost in enumerate(costs):
             colour, _ = colours[cost.policy]
             first = not y
@@ -176,7 +170,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_yticks(range(len(costs)), [cost.policy for cost in costs])
         ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
-        legend_below(figure, ax, 1)
+        style.legend_below(figure, ax, 1)
     return figure
 
 

@@ -14,16 +14,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from analysis import numbers
-from analysis.figures.style import (
-    INK,
-    LINES,
-    MUTED,
-    note_at_right,
-    palette,
-    panels,
-    round_ticks,
-    style,
-)
+from analysis.figures import style
 from analysis.names import METRICS
 from analysis.questions.learning.curves import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
 
@@ -48,13 +39,13 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
         labels: The variants to draw, with their names in the legend.
     """
     averages = smoothed(curves[curves["variant"].isin(labels)], metric)
-    colours = dict(zip(labels, palette(), strict=False))
-    with style():
-        figure, ax = panels(3.9, values="y")
+    colours = dict(zip(labels, style.palette(), strict=False))
+    with style.look():
+        figure, ax = style.panels(3.9, values="y")
         for number, (variant, label) in enumerate(labels.items()):
             of_variant = averages[averages["variant"] == variant]
             _trainings(of_variant, colours[variant], ax)
-            _mean(of_variant, colours[variant], LINES[number], label, ax)
+            _mean(of_variant, colours[variant], style.LINES[number], label, ax)
         low, high = averages["value"].min(), averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         ax.set(title=NAMES[metric], ylim=(low - room, high + room))
@@ -93,22 +84,24 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     values = last.groupby("variant")[metric]
     level = table.loc[table["variant"] == baseline, "mean"].item()
     left, right = _ends(table, last[metric], OFF * level)
-    with style():
-        figure, ax = panels(0.9 + 0.42 * len(table), values="x")
-        ax.axvline(level, color=INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
+    with style.look():
+        figure, ax = style.panels(0.9 + 0.42 * len(table), values="x")
+        ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, row in table.reset_index(drop=True).iterrows():
             reached = values.get_group(row["variant"])
             if reached.max() < left:
-                ax.plot(left, y, "<", color=INK, markersize=7, clip_on=False, gid=row["variant"])
+                ax.plot(
+                    left, y, "<", color=style.INK, markersize=7, clip_on=False, gid=row["variant"]
+                )
             else:
                 _seeds(reached, row, y, ax)
             note = f"{row['mean']:.1%}, n = {row['n']}"
-            note_at_right(note, y, ax)
+            style.note_at_right(note, y, ax)
         names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
         ax.set_yticks(range(len(table)), names)
         ax.set(title=METRICS[metric.removeprefix("final_")], ylim=(len(table) - 0.4, -0.6))
         ax.set_xlim(left, right)
-        round_ticks(ax.xaxis, 5)
+        style.round_ticks(ax.xaxis, 5)
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
     return figure
 
@@ -121,14 +114,14 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
         name: Of the policy.
     """
     kept = curve[curve["is_best"]].iloc[-1]
-    with style():
-        figure, ax = panels(3.9, values="y")
-        colours = palette()
+    with style.look():
+        figure, ax = style.panels(3.9, values="y")
+        colours = style.palette()
         for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
             for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
                 ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
                         label="" if n else EVALUATED[metric])  # fmt: skip
-        ax.plot(kept["updates"], kept[metric], "*", color=INK, markersize=13, zorder=5,
+        ax.plot(kept["updates"], kept[metric], "*", color=style.INK, markersize=13, zorder=5,
                 label=f"weights kept: {kept[metric]:.1%}")  # fmt: skip
         _phases(curve, ax)
         ax.set(title=name, ylim=(-0.02, 1.04))
@@ -156,13 +149,13 @@ def _ends(table: pd.DataFrame, values: pd.Series, floor: float) -> tuple[float, 
 
 def _seeds(reached: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
     """The trainings of a variant, and above them their mean with its interval."""
-    colour = palette()[0]
+    colour = style.palette()[0]
     if row["n"] > 1:
         arms = [[row["mean"] - row["low"]], [row["high"] - row["mean"]]]
         ax.errorbar(row["mean"], y - 0.14, xerr=arms, marker="D", markersize=5, color=colour,
                     capsize=4, elinewidth=1.8, zorder=2)  # fmt: skip
     spots = np.full(len(reached), y + 0.18 * (row["n"] > 1))
-    ax.scatter(reached, spots, color=MUTED, s=18, zorder=3, gid=row["variant"])
+    ax.scatter(reached, spots, color=style.MUTED, s=18, zorder=3, gid=row["variant"])
 
 
 def _trainings(averages: pd.DataFrame, colour: str, ax: Axes) -> None:
@@ -190,10 +183,10 @@ def _phases(curve: pd.DataFrame, ax: Axes) -> None:
     before = curve.loc[curve["phase"] != curve["phase"].iloc[-1], "updates"]
     if before.empty:
         return
-    ax.axvline(before.max(), color=MUTED, linewidth=1, zorder=1, gid="last phase")
+    ax.axvline(before.max(), color=style.MUTED, linewidth=1, zorder=1, gid="last phase")
     ax.annotate(
         "phase II", (before.max(), 0), xycoords=("data", "axes fraction"), xytext=(4, 12),
-        textcoords="offset points", fontsize=8.5, color=INK,
+        textcoords="offset points", fontsize=8.5, color=style.INK,
         path_effects=[withStroke(linewidth=3, foreground="white")],
     )  # fmt: skip
 

@@ -13,20 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from analysis.figures.style import (
-    DPI,
-    INK,
-    LINES,
-    MUTED,
-    SEA,
-    ZONE,
-    grid_of,
-    node_colours,
-    note_at_right,
-    shifts,
-    style,
-    uav_colours,
-)
+from analysis.figures import style
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
 
@@ -43,21 +30,22 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     numbered at their start (diamond) and end (dot) and, where they share a path, shifted apart.
     """
     slots = uav_slots(events)
-    colours = np.array([*node_colours(len(scenario.nodes)), MUTED])  # the last for node -1
-    offsets = shifts(scenario.uavs, SPREAD / 2)
+    # The last is that of node -1, which is none.
+    colours = np.array([*style.node_colours(len(scenario.nodes)), style.MUTED])
+    offsets = style.shifts(scenario.uavs, SPREAD / 2)
     _grid(scenario, ax)
     for uav, of_uav in slots.groupby("uav"):
         shifted = of_uav.assign(
             **{column: of_uav[column] + offsets[uav] for column in ("from_x", "from_y", "x", "y")}
         )
-        colour = uav_colours(scenario.uavs)[uav]
+        colour = style.uav_colours(scenario.uavs)[uav]
         _trail(shifted, colour, ax)
         _moves(shifted[shifted["moved"]], colours, f"moves-{uav}", ax)
         hovers = shifted[~shifted["moved"] & ~shifted["charging"]]
         ax.scatter(hovers["x"], hovers["y"], c=colours[hovers["node"]], marker="x", s=34,
                    linewidths=1.7, zorder=5, gid=f"hovers-{uav}")  # fmt: skip
         charges = shifted[shifted["charging"]]
-        ax.scatter(charges["x"], charges["y"], color=INK, marker=(8, 2, 0), s=70,
+        ax.scatter(charges["x"], charges["y"], color=style.INK, marker=(8, 2, 0), s=70,
                    linewidths=1.1, zorder=6, gid=f"charges-{uav}")  # fmt: skip
         _ends(shifted, uav, colour, ax)
 
@@ -68,10 +56,10 @@ def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
     for uav, curve in levels.groupby("uav"):
         name = f"UAV {uav + 1}" if scenario.uavs <= 3 else f"{uav + 1}"
         ax.plot(curve["time"], curve["battery"], label=name, linewidth=1.6,
-                color=uav_colours(scenario.uavs)[uav],
-                linestyle=LINES[uav % len(LINES)])  # fmt: skip
+                color=style.uav_colours(scenario.uavs)[uav],
+                linestyle=style.LINES[uav % len(style.LINES)])  # fmt: skip
     for level, name in ((scenario.charge_start, "$C_S$"), (scenario.charge_complete, "$C_C$")):
-        ax.axhline(level, color=MUTED, linewidth=0.9, zorder=1)
+        ax.axhline(level, color=style.MUTED, linewidth=0.9, zorder=1)
         _margin_note(f"{name} {level}", level, ax)
     ax.set(title="Battery", ylabel="battery [%]", ylim=(0, 103))
     if scenario.uavs <= 6:  # more do not fit beside the title
@@ -83,10 +71,10 @@ def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
 def residual(events: Events, scenario: Scenario, ax: Axes) -> None:
     """Residual data [data units] over time: one band per node, in its colour, and their sum."""
     data = residual_data(events)
-    colours = node_colours(len(scenario.nodes))
+    colours = style.node_colours(len(scenario.nodes))
     ax.stackplot(data.index, data.to_numpy().T, colors=colours, alpha=0.75, linewidth=0)
     total = data.sum(axis=1)
-    ax.plot(total.index, total, color=INK, linewidth=1.6, label="all nodes")
+    ax.plot(total.index, total, color=style.INK, linewidth=1.6, label="all nodes")
     _margin_note(f"{total.iloc[-1]:.0f} left", total.iloc[-1], ax)
     ax.set(title="Residual data, a band per node", ylabel="data units", ylim=(0, None))
     _time_axis(events, ax)
@@ -99,17 +87,17 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     for state in ("charging", "waiting"):
         for uav, busy in slots[slots[state]].groupby("uav"):
             top = base + np.isin(edges, busy["slot"])
-            colour = uav_colours(scenario.uavs)[uav]
+            colour = style.uav_colours(scenario.uavs)[uav]
             face, hatch = (colour, None) if state == "charging" else ("none", "/////")
             ax.fill_between(
                 edges, base, top, step="post", facecolor=face, edgecolor=colour, hatch=hatch,
                 linewidth=0, alpha=0.85,
             )  # fmt: skip
             base = top
-    ax.step(edges, base, where="post", color=INK, linewidth=1, gid="occupancy")
+    ax.step(edges, base, where="post", color=style.INK, linewidth=1, gid="occupancy")
     pads = scenario.zone_cells if scenario.pads is None else scenario.pads
     if pads <= scenario.uavs:
-        ax.axhline(pads, color=MUTED, linewidth=0.9)
+        ax.axhline(pads, color=style.MUTED, linewidth=0.9)
     hatched = "; hatched: waiting" if slots["waiting"].any() else ""
     ax.set(
         title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}",
@@ -122,8 +110,8 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
 
 def mission_figure(events: Events, scenario: Scenario) -> Figure:
     """A mission: its map, and under it battery, residual data and charging zone over time."""
-    with style():
-        figure = Figure(figsize=(5.6, 11), dpi=DPI)
+    with style.look():
+        figure = Figure(figsize=(5.6, 11), dpi=style.DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
         axes = figure.subplots(4, height_ratios=(5.6, 1.6, 1.6, 1.1))
         trajectories(events, scenario, axes[0])
@@ -148,12 +136,14 @@ def _outcome(events: Events, scenario: Scenario) -> str:
 def _grid(scenario: Scenario, ax: Axes) -> None:
     """The grid, its zone and its nodes; y grows south."""
     x, y, width, height = scenario.zone
-    zone = Rectangle((x - 0.5, y - 0.5), width, height, facecolor=ZONE, edgecolor=EDGE, zorder=1)
-    ax.set_facecolor(SEA)
+    zone = Rectangle(
+        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=EDGE, zorder=1
+    )
+    ax.set_facecolor(style.SEA)
     ax.grid(False)
     ax.add_patch(zone)
     nodes = np.array(scenario.nodes)
-    ax.scatter(nodes[:, 0], nodes[:, 1], c=node_colours(len(nodes)), s=95,
+    ax.scatter(nodes[:, 0], nodes[:, 1], c=style.node_colours(len(nodes)), s=95,
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
     ax.set(
         aspect="equal",
@@ -210,13 +200,13 @@ def _ends(slots: pd.DataFrame, uav: int, colour: str, ax: Axes) -> None:
 def _map_legend(ax: Axes) -> None:
     """The symbols of the map (Table I)."""
 
-    def mark(marker, label, face=INK, size=7.0):
-        return Line2D([], [], linestyle="", marker=marker, label=label, color=INK,
+    def mark(marker, label, face=style.INK, size=7.0):
+        return Line2D([], [], linestyle="", marker=marker, label=label, color=style.INK,
                       markerfacecolor=face, markersize=size)  # fmt: skip
 
-    served = node_colours(2)[1]
+    served = style.node_colours(2)[1]
     handles = [
-        Patch(facecolor=ZONE, edgecolor=EDGE, label="start and charging zone"),
+        Patch(facecolor=style.ZONE, edgecolor=EDGE, label="start and charging zone"),
         mark("o", "sensor node", face=served, size=8),
         mark("D", "start of UAV", face="white"),
         mark("o", "end of UAV"),
@@ -225,7 +215,7 @@ def _map_legend(ax: Axes) -> None:
         Line2D([], [], linestyle="", marker="x", markeredgewidth=1.7, color=served,
                label="hover, serving that node"),
         mark((8, 2, 0), "hover, charging", size=8),
-        Line2D([], [], linestyle="", marker=r"$\rightarrow$", markersize=13, color=MUTED,
+        Line2D([], [], linestyle="", marker=r"$\rightarrow$", markersize=13, color=style.MUTED,
                label="no node served"),
     ]  # fmt: skip
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.48, -0.1), ncols=3,
@@ -234,11 +224,11 @@ def _map_legend(ax: Axes) -> None:
 
 def _margin_note(text: str, level: float, ax: Axes) -> None:
     """A note in the right margin, at a level of the y axis."""
-    note = note_at_right(text, level, ax, 8.5)
+    note = style.note_at_right(text, level, ax, 8.5)
     note.set_in_layout(False)  # maps of one gallery are equally large, whatever the notes say
 
 
 def _time_axis(events: Events, ax: Axes) -> None:
     ax.set(xlim=(0, duration(events)), xlabel="time [mission slots]")
     ax.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8))
-    grid_of("y", ax)
+    style.grid_of("y", ax)

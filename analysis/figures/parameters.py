@@ -3,7 +3,7 @@
 Each returns a figure of its own; nothing touches pyplot's state.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
@@ -11,20 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, PercentFormatter
 
-from analysis.figures.style import (
-    INK,
-    MUTED,
-    arms,
-    dot,
-    legend_below,
-    palette,
-    panels,
-    policy_colours,
-    round_ticks,
-    shifts,
-    signed_points,
-    style,
-)
+from analysis.figures import style
 from analysis.names import METRICS, parameter
 from analysis.study.design import NOISE
 
@@ -48,22 +35,23 @@ def effect(
     """
     rows = table[table["field"] == field]
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
-    colours = policy_colours(policies)
-    with style():
-        figure, axes = panels(7.6, 4, "y", sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
+    colours = style.policy_colours(policies)
+    looks, half_width = {policy: colours[policy] for policy in changes}, APART * len(values)
+    with style.look():
+        figure, axes = style.panels(7.6, 4, "y", sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
         for ax, metric in zip(axes, METRICS, strict=False):
-            _means(rows[rows["metric"] == metric], [*changes], colours, ax)
+            style.policy_means(rows[rows["metric"] == metric], "position", looks, half_width, ax)
             ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        for policy, shift in zip(changes, _shifts(len(changes), len(values)), strict=True):
-            _changes(changes[policy], shift, dot(policy, colours), axes[3])
+        for policy, shift in zip(changes, style.shifts(len(changes), half_width), strict=True):
+            _changes(changes[policy], shift, style.dot(policy, colours), axes[3])
         axes[3].set(title=f"Change of the last, from {values[0]} on", ylabel="points")
-        axes[3].yaxis.set_major_formatter(FuncFormatter(signed_points))
+        axes[3].yaxis.set_major_formatter(FuncFormatter(style.signed_points))
         axes[3].set(xlim=(-0.4, len(values) - 0.6), xlabel=parameter(field).label)
         axes[3].set_xticks(range(len(values)), values)
         for ax in axes:
-            round_ticks(ax.yaxis, 5)
-        legend_below(figure, axes[0])
+            style.round_ticks(ax.yaxis, 5)
+        style.legend_below(figure, axes[0])
     return figure
 
 
@@ -75,48 +63,33 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         title: Of the figure.
     """
     rows = rows.reset_index(drop=True)
-    colour = palette()[0]
-    with style():
-        figure, ax = panels(1.5 + 0.52 * len(rows), values="x")
+    colour = style.palette()[0]
+    with style.look():
+        figure, ax = style.panels(1.5 + 0.52 * len(rows), values="x")
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
             name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
             spots = np.arange(len(rows)) + shift
             ax.barh(spots, rows[index], 0.32, color=face, edgecolor=colour, label=name, zorder=2)
-            ax.errorbar(rows[index], spots, xerr=arms(rows, index, f"{index}_low", f"{index}_high"),
-                        fmt="none", ecolor=INK, capsize=3,
+            bars = style.arms(rows, index, f"{index}_low", f"{index}_high")
+            ax.errorbar(rows[index], spots, xerr=bars, fmt="none", ecolor=style.INK, capsize=3,
                         elinewidth=1.3, zorder=3)  # fmt: skip
-        ax.axvline(0, color=INK, linewidth=0.8, zorder=1)
+        ax.axvline(0, color=style.INK, linewidth=0.8, zorder=1)
         for y in rows.index[rows["parameter"] == NOISE]:
-            ax.axhline(y - 0.5, color=MUTED, linewidth=0.9, linestyle=":")
+            ax.axhline(y - 0.5, color=style.MUTED, linewidth=0.9, linestyle=":")
         ax.set_yticks(range(len(rows)), [_tick(name) for name in rows["parameter"]])
         ax.set(title=title, ylim=(len(rows) - 0.5, -0.5), xlabel="share of the variance")
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        legend_below(figure, ax, 2)
+        style.legend_below(figure, ax, 2)
     return figure
-
-
-def _means(
-    rows: pd.DataFrame, policies: Sequence[str], colours: dict[str, tuple[str, str]], ax: Axes
-) -> None:
-    offsets = _shifts(len(policies), rows["position"].nunique())
-    for policy, shift in zip(policies, offsets, strict=True):
-        means = rows[rows["policy"] == policy].sort_values("position")
-        ax.errorbar(means["position"] + shift, means["mean"], yerr=arms(means), linewidth=1,
-                    label=policy, **dot(policy, colours))  # fmt: skip
 
 
 def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
     """Differences to the first value, whose own difference is 0."""
     rows = pairs[pairs["first"] == 0].sort_values("second")
-    bars = np.concatenate([np.zeros((2, 1)), arms(rows, "difference")], axis=1)
+    bars = np.concatenate([np.zeros((2, 1)), style.arms(rows, "difference")], axis=1)
     spots = np.array([0, *rows["second"]]) + shift
     ax.errorbar(spots, [0, *rows["difference"]], yerr=bars, **look, linewidth=1)
-    ax.axhline(0, color=MUTED, linewidth=0.9, zorder=1)
-
-
-def _shifts(policies: int, values: int) -> np.ndarray:
-    """(policies,) how far each policy is drawn from the middle of a value."""
-    return shifts(policies, APART * values)
+    ax.axhline(0, color=style.MUTED, linewidth=0.9, zorder=1)
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:

@@ -10,20 +10,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from analysis.figures.style import (
-    INK,
-    arms,
-    dot,
-    legend_below,
-    note_at_right,
-    panels,
-    policy_colours,
-    shifts,
-    style,
-)
+from analysis.figures import style
 from analysis.names import METRICS
 
-_PRINTED: dict = {"color": INK, "linestyle": "--", "linewidth": 1.3}
+_PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
 
 
 def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
@@ -35,15 +25,15 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
         printed: The paper's figure.
     """
     rows = summary[summary["metric"] == metric].reset_index(drop=True)
-    colours = policy_colours(rows["policy"])
-    with style():
-        figure, ax = panels(1.3 + 0.42 * len(rows), values="x")
+    colours = style.policy_colours(rows["policy"])
+    with style.look():
+        figure, ax = style.panels(1.3 + 0.42 * len(rows), values="x")
         for y, row in rows.iterrows():
-            ax.errorbar(row["mean"], y, xerr=arms(row), **dot(row["policy"], colours))
-            note_at_right(f"{row['mean']:.1%}", y, ax)
+            ax.errorbar(row["mean"], y, xerr=style.arms(row), **style.dot(row["policy"], colours))
+            style.note_at_right(f"{row['mean']:.1%}", y, ax)
         if printed is not None:
             ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
-            legend_below(figure, ax)
+            style.legend_below(figure, ax)
         ax.set_yticks(range(len(rows)), rows["policy"])
         ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
         ax.set_xticks(np.linspace(0, 1, 6))
@@ -61,14 +51,11 @@ def by_fleet(
         metric: One of ``METRICS``.
         printed: The paper's figures by number of UAVs.
     """
-    rows = summary[summary["metric"] == metric].sort_values("uavs")
-    colours = policy_colours(summary["policy"])
-    with style():
-        figure, ax = panels(3.9, values="y")
-        for policy, shift in zip(colours, shifts(len(colours), 0.12), strict=True):
-            means = rows[rows["policy"] == policy]
-            ax.errorbar(means["uavs"] + shift, means["mean"], yerr=arms(means), linewidth=1,
-                        alpha=0.9, label=policy, **dot(policy, colours))  # fmt: skip
+    rows = summary[summary["metric"] == metric]
+    colours = style.policy_colours(summary["policy"])
+    with style.look():
+        figure, ax = style.panels(3.9, values="y")
+        style.policy_means(rows, "uavs", colours, 0.12, ax, alpha=0.9)
         if printed:
             ax.plot(*zip(*sorted(printed.items()), strict=True), marker="D", markersize=6,
                     label="paper", **_PRINTED)  # fmt: skip

@@ -1,14 +1,14 @@
 """The look that all figures share: colours, fonts, axes and marks.
 
-A figure is made inside ``style`` and touches no state of pyplot::
+A figure is made inside ``look`` and touches no state of pyplot::
 
-    with style():
-        figure, ax = panels(height=3.5, values="x")
-        ax.errorbar(row["mean"], 0, xerr=arms(row), **dot("greedy", colours))
-        legend_below(figure, ax)
+    with style.look():
+        figure, ax = style.panels(height=3.5, values="x")
+        ax.errorbar(row["mean"], 0, xerr=style.arms(row), **style.dot("greedy", colours))
+        style.legend_below(figure, ax)
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -48,7 +48,7 @@ _LOOK = {
 
 
 @contextmanager
-def style() -> Iterator[None]:
+def look() -> Iterator[None]:
     """The look of all figures, for the figures and axes that are made inside."""
     with mpl.rc_context():
         mpl.rcdefaults()  # whatever the user's matplotlibrc says
@@ -112,7 +112,7 @@ def policy_colours(policies: Iterable[str]) -> dict[str, tuple[str, str]]:
     return {name: (palette()[numbers[name] % 10], "os^vPX*"[numbers[name] % 7]) for name in names}
 
 
-def dot(policy: str, colours: dict[str, tuple[str, str]]) -> dict:
+def dot(policy: str, colours: Mapping[str, tuple[str, str]]) -> dict:
     """How the means of a policy are drawn, as arguments of ``Axes.errorbar``."""
     colour, marker = colours[policy]
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
@@ -123,6 +123,30 @@ def arms(
 ) -> np.ndarray:
     """Lengths of the arms of error bars, (2, N), from the columns of estimate and interval."""
     return np.array([rows[mean] - rows[low], rows[high] - rows[mean]]).reshape(2, -1)
+
+
+def policy_means(
+    rows: pd.DataFrame,
+    x: str,
+    looks: Mapping[str, tuple[str, str]],
+    half_width: float,
+    ax: Axes,
+    **options: Any,
+) -> None:
+    """The means of every policy against a column, with intervals, side by side at each value.
+
+    Args:
+        rows: A row per ``policy`` and value of ``x``, with ``mean``, ``low`` and ``high``.
+        x: The column.
+        looks: The policies to draw, as of ``policy_colours``.
+        half_width: Half the distance between the outer policies at a value.
+        ax: Where to draw.
+        options: Further arguments of ``Axes.errorbar``.
+    """
+    for policy, shift in zip(looks, shifts(len(looks), half_width), strict=True):
+        means = rows[rows["policy"] == policy].sort_values(x)
+        ax.errorbar(means[x] + shift, means["mean"], yerr=arms(means), linewidth=1, label=policy,
+                    **dot(policy, looks), **options)  # fmt: skip
 
 
 def shifts(count: int, half_width: float) -> np.ndarray:

@@ -13,7 +13,7 @@ from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from scipy import stats
 
-from analysis.figures.style import INK, MUTED, SEA, ZONE, legend_below, panels, round_ticks, style
+from analysis.figures import style
 from analysis.stats.intervals import LEVEL
 from analysis.verification import closed_forms
 from analysis.verification.fits import Fit
@@ -36,7 +36,7 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
     table, spots = observed.table, np.arange(len(observed.table))
     n = table["expected"].sum()
     error = np.sqrt(table["expected"] * (1 - table["expected"] / n).clip(lower=1e-12))
-    with style():
+    with style.look():
         figure, (ax, below) = _panels()
         ax.bar(spots, table["expected"], 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
@@ -52,7 +52,7 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
         labels = [name.replace(" or ", "\nor ") for name in table["label"]]
         below.set_xticks(spots[::step], labels[::step])
         below.set_xlabel(label)
-        legend_below(figure, ax, 2)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -65,9 +65,9 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
     known = [closed_forms.rate_moments(space, d).mean for d in away]
-    with style():
+    with style.look():
         figure, (ax, below) = _panels()
-        ax.plot(away, known, color=INK, linewidth=1.3, zorder=1, label="by integration")
+        ax.plot(away, known, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
         ax.scatter(table["distance"], table["mean"], s=30, color=SEEN, zorder=3, label="simulated")
         ax.set(title="Mean rate of a lone UAV", ylabel="data units per\ncommunication slot")
         ax.set(xscale="log", yscale="log")
@@ -77,7 +77,7 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
         _deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
         below.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
         below.set_xlabel("distance [m]")
-        legend_below(figure, ax, 2)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -89,8 +89,8 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
         space: The scenario, with a range of initial data.
     """
     law = closed_forms.initial_total(space)
-    with style():
-        figure, ax = panels(3.4)
+    with style.look():
+        figure, ax = style.panels(3.4)
         bins = int(np.clip(np.sqrt(len(values)), 8, 50))
         ax.hist(values, bins, density=True, color=KNOWN, label="observed")
         reach = law.mean() + 3 * law.std() * np.array([-1, 1])
@@ -99,7 +99,7 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
         ax.set(title="Initial data of a mission", ylabel="density")
         ax.set_xlabel("data units, all nodes together")
         ax.yaxis.set_major_locator(MaxNLocator(nbins=5))
-        legend_below(figure, ax, 2)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -111,8 +111,8 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
         title: Of the figure.
     """
     shown = blocks.head(SHOWN)
-    with style():
-        figure, ax = panels(3.6, values="y")
+    with style.look():
+        figure, ax = style.panels(3.6, values="y")
         looks = ((True, SEEN, "o", "holds the mean of all"), (False, MISS, "X", "misses it"))
         for holds, colour, marker, name in looks:
             rows = shown[shown["holds"] == holds]
@@ -120,12 +120,12 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
                       linewidth=1.2 if holds else 2.2)  # fmt: skip
             ax.scatter(rows.index + 1, rows["mean"], s=10 if holds else 34, color=colour,
                        marker=marker, zorder=3, label=name)  # fmt: skip
-        ax.axhline(blocks["reference"].iloc[0], color=INK, linewidth=1.1, zorder=1)
+        ax.axhline(blocks["reference"].iloc[0], color=style.INK, linewidth=1.1, zorder=1)
         ax.set(title=title, xlabel="block of missions", xlim=(0, len(shown) + 1))
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
-        round_ticks(ax.yaxis, 6)
+        style.round_ticks(ax.yaxis, 6)
         ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
-        legend_below(figure, ax, 2)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -139,15 +139,15 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     """
     height, gap = 1.0, 0.35
     tops = [-(height + gap) * number for number in range(len(steps) + 1)]
-    with style():
-        figure, ax = panels(0.8 * len(tops))
+    with style.look():
+        figure, ax = style.panels(0.8 * len(tops))
         for number, (name, text) in enumerate(steps):
-            _box(ax, tops[number], height, name, text, ZONE if number == 0 else SEA)
-        _box(ax, tops[-1], height, end, "", ZONE)
+            _box(ax, tops[number], height, name, text, style.ZONE if number == 0 else style.SEA)
+        _box(ax, tops[-1], height, end, "", style.ZONE)
         for top in tops[1:]:
             _arrow(ax, (5, top + gap), (5, top))
         first, last = tops[1] - height / 2, tops[-2] - height / 2
-        ax.plot([10, 10.7, 10.7], [last, last, first], color=INK, linewidth=1.2)
+        ax.plot([10, 10.7, 10.7], [last, last, first], color=style.INK, linewidth=1.2)
         _arrow(ax, (10.7, first), (10, first))
         ax.text(
             11, (first + last) / 2, repeated, rotation=-90, va="center", ha="left", fontsize=9.5
@@ -159,14 +159,14 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
 
 def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
     """A panel and a lower one for the deviations, over the same axis."""
-    return panels(4.6, 2, "y", sharex=True, height_ratios=(2, 1))
+    return style.panels(4.6, 2, "y", sharex=True, height_ratios=(2, 1))
 
 
 def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
     """Deviations in standard errors, and a band that holds all of them in 95 % of such figures."""
     band = stats.norm.ppf(1 - (1 - LEVEL) / 2 / max(len(deviations), 1))
     ax.axhspan(-band, band, color=KNOWN, alpha=0.45, linewidth=0)
-    ax.axhline(0, color=INK, linewidth=0.9)
+    ax.axhline(0, color=style.INK, linewidth=0.9)
     out = deviations.abs() > band
     for which, colour, marker in ((~out, SEEN, "o"), (out, MISS, "X")):
         ax.scatter(np.asarray(spots)[which], deviations[which], s=26, color=colour, marker=marker,
@@ -177,7 +177,7 @@ def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
 
 def _box(ax: Axes, top: float, height: float, name: str, text: str, colour: str) -> None:
     box = FancyBboxPatch((0, top - height), 10, height, boxstyle="round,pad=0,rounding_size=0.2",
-                         facecolor=colour, edgecolor=MUTED, linewidth=0.9)  # fmt: skip
+                         facecolor=colour, edgecolor=style.MUTED, linewidth=0.9)  # fmt: skip
     ax.add_patch(box)
     middle = top - height / 2
     ax.text(0.3, middle + 0.2 * bool(text), name, va="center", weight="bold", fontsize=10.5)
@@ -185,5 +185,5 @@ def _box(ax: Axes, top: float, height: float, name: str, text: str, colour: str)
 
 
 def _arrow(ax: Axes, tail: tuple[float, float], head: tuple[float, float]) -> None:
-    ax.add_patch(FancyArrowPatch(tail, head, arrowstyle="-|>", mutation_scale=11, color=INK,
+    ax.add_patch(FancyArrowPatch(tail, head, arrowstyle="-|>", mutation_scale=11, color=style.INK,
                                  linewidth=1.2, shrinkA=0, shrinkB=0))  # fmt: skip

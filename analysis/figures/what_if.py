@@ -7,20 +7,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
-from analysis.figures.style import (
-    INK,
-    LINES,
-    MUTED,
-    arms,
-    dot,
-    legend_below,
-    panels,
-    points_axis,
-    policy_colours,
-    round_ticks,
-    shifts,
-    style,
-)
+from analysis.figures import style
 from analysis.names import METRICS
 from analysis.questions.what_if.question import SIDES
 
@@ -37,21 +24,16 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
         settings: Of baseline and variation: what is set, in words.
     """
     rows = table[table["metric"] == metric]
-    policies = list(dict.fromkeys(rows["policy"]))
-    colours = policy_colours(rows["policy"])
-    with style():
-        figure, ax = panels(4.1, values="y")
-        offsets = shifts(len(policies), 0.025 * (len(policies) - 1))
-        for policy, shift in zip(policies, offsets, strict=True):
-            sides = rows[rows["policy"] == policy].sort_values("point")
-            ax.errorbar(sides["point"] + shift, sides["mean"], yerr=arms(sides), linewidth=1,
-                        label=policy, **dot(policy, colours))  # fmt: skip
+    colours = style.policy_colours(rows["policy"])
+    with style.look():
+        figure, ax = style.panels(4.1, values="y")
+        style.policy_means(rows, "point", colours, 0.025 * (len(colours) - 1), ax)
         ax.set(title=METRICS[metric], xlim=(-0.45, 1.45), ylim=_ends(rows))
         ticks = ["\n".join((s, *words)) for s, words in zip(SIDES, settings, strict=True)]
         ax.set_xticks((0, 1), ticks)
-        round_ticks(ax.yaxis, 6)
+        style.round_ticks(ax.yaxis, 6)
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        legend_below(figure, ax)
+        style.legend_below(figure, ax)
     return figure
 
 
@@ -62,21 +44,20 @@ def gains(answers: pd.DataFrame) -> Figure:
         answers: Rows of ``questions.what_if_answer.answers``.
     """
     rows = answers[answers["metric"].isin([*METRICS])].rename(columns={"difference": "mean"})
-    policies = list(dict.fromkeys(rows["policy"]))
-    colours = policy_colours(rows["policy"])
-    with style():
-        figure, ax = panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(policies)), values="x")
-        offsets = shifts(len(policies), 0.055 * (len(policies) - 1))
-        for policy, shift in zip(policies, offsets, strict=True):
+    colours = style.policy_colours(rows["policy"])
+    with style.look():
+        figure, ax = style.panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(colours)), values="x")
+        offsets = style.shifts(len(colours), 0.055 * (len(colours) - 1))
+        for policy, shift in zip(colours, offsets, strict=True):
             changes = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
-            ax.errorbar(changes["mean"], np.arange(len(METRICS)) + shift, xerr=arms(changes),
-                        linestyle="", label=policy, **dot(policy, colours))  # fmt: skip
-        ax.axvline(0, color=INK, linewidth=0.9, zorder=1)
+            ax.errorbar(changes["mean"], np.arange(len(METRICS)) + shift, xerr=style.arms(changes),
+                        linestyle="", label=policy, **style.dot(policy, colours))  # fmt: skip
+        ax.axvline(0, color=style.INK, linewidth=0.9, zorder=1)
         ax.set_yticks(range(len(METRICS)), map(_broken, METRICS.values()))
         ax.set(title="Variation − baseline, mission by mission", xlabel="percentage points",
                ylim=(len(METRICS) - 0.5, -0.5))  # fmt: skip
-        points_axis(ax.xaxis, 7)
-        legend_below(figure, ax)
+        style.points_axis(ax.xaxis, 7)
+        style.legend_below(figure, ax)
     return figure
 
 
@@ -86,28 +67,28 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     Args:
         differences: Per policy, as of ``questions.what_if_answer.differences``.
     """
-    colours = policy_colours(differences)
+    colours = style.policy_colours(differences)
     tails = (1 - MIDDLE) / 2
     ends = np.array([gaps.quantile([tails, 1 - tails]) for gaps in differences.values()])
     low, high = min(ends[:, 0].min(), 0.0), max(ends[:, 1].max(), 0.0)
     room = max(0.04 * (high - low), 0.002)
-    with style():
-        figure, axes = panels(5.6, 2, sharey=True)
+    with style.look():
+        figure, axes = style.panels(5.6, 2, sharey=True)
         titles = ("Share of missions with that difference or less", "The same, near the middle")
         for ax, title in zip(axes, titles, strict=True):
             for number, (policy, gaps) in enumerate(differences.items()):
                 values = np.sort(gaps.to_numpy(float))
                 shares = np.arange(1, len(values) + 1) / len(values)
                 ax.step([values[0], *values], [0, *shares], where="post", label=policy,
-                        color=colours[policy][0], linestyle=LINES[number % 4],
+                        color=colours[policy][0], linestyle=style.LINES[number % 4],
                         linewidth=1.7)  # fmt: skip
-            ax.axvline(0, color=INK, linewidth=0.9, zorder=1)
-            ax.axhline(0.5, color=MUTED, linewidth=0.9, linestyle=":", zorder=1)
+            ax.axvline(0, color=style.INK, linewidth=0.9, zorder=1)
+            ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
             ax.set(title=title, ylim=(-0.02, 1.02))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-            points_axis(ax.xaxis, 7)
+            style.points_axis(ax.xaxis, 7)
         axes[1].set(xlim=(low - room, high + room), xlabel="percentage points")
-        legend_below(figure, axes[0])
+        style.legend_below(figure, axes[0])
     return figure
 
 
