@@ -242,8 +242,4 @@ def budget_of(study: Mapping[str, Any]) -> str:
 
 
 def _shown(values: dict[str, Any]) -> str:
-    return (
-        "the scenario as it is"
-        if not values
-        else ", ".join(f"{key}={value}" for key, value in values.items())
-    )
+    return ", ".join(f"{key}={value}" for key, value in values.items()) or "the scenario as it is"

@@ -127,7 +127,7 @@ def table(frame: pd.DataFrame, caption: str = "", wrap: bool = False) -> HTML:
     return HTML(f'{above}<div class="scroll">{html}</div>')
 
 
-def figure(drawing: Figure, alt: str, caption: str = "") -> HTML:
+def figure(drawing: Figure, alt: str, caption: str) -> HTML:
     """A figure with its alternative text and its caption."""
     return HTML(_figure(drawing, alt, caption))
 
@@ -149,7 +149,7 @@ def svg(drawing: Figure) -> bytes:
 
 def _figure(drawing: Figure, alt: str, caption: str) -> str:
     source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
-    below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     width, height = drawing.get_size_inches()
     shape = ' class="tall"' if height > 1.5 * width else ""
-    return f'<figure><img{shape} alt="{escape(alt)}" src="{source}">{below}</figure>'
+    image = f'<img{shape} alt="{escape(alt)}" src="{source}">'
+    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"

@@ -4,7 +4,7 @@ The words of the page stand in ``templates/scorecard.html``; here is what it fil
 """
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 
 from IPython.display import HTML
@@ -28,16 +28,11 @@ LOOKS = {
 }
 
 
-def as_html(
-    rows: Sequence[Row],
-    pages: Collection[str] | None = None,
-    departures: Sequence[str] = (),
-) -> HTML:
+def as_html(rows: Sequence[Row], departures: Sequence[str] = ()) -> HTML:
     """The scorecard.
 
     Args:
         rows: As of ``analysis.replication.scorecard.scorecard``.
-        pages: File names of the pages that there are, to link to; None for all.
         departures: What of the policy with the paper's network is not the paper's.
     """
     columns = [*zip(*(row.findings for row in rows), strict=True)]
@@ -51,7 +46,6 @@ def as_html(
         best_uavs=paper.BEST_UAVS,
         above=ABOVE,
         below=BELOW,
-        pages=pages,
         level=numbers.level(LEVEL),
         spreads=_spreads(rows),
         departures=numbers.words(departures) if departures else "",

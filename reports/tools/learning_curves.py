@@ -17,13 +17,14 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.names import METRICS, PRODUCT
 from dess import load_scenario, simulate_batch
+from dess.files import replacing
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of
 from policies.ddqn.training import Training
 
 EVALUATION_SEED = 900_000_001
-METRICS = ("success", "collection_ratio", "collection_ratio_and_communication")
 
 
 def _variants() -> dict[str, dict[str, Any]]:
@@ -31,20 +32,18 @@ def _variants() -> dict[str, dict[str, Any]]:
     quick = load_config("quick")
     last = quick.phases[-1].model_dump()
     alone = {"phases": [last | {"ticks": quick.ticks}]}
-    means = {"guard": False, "low_battery_starts": 0.0, "early_returns": 0.0}
+    no_guard: dict[str, Any] = {"guard": False}
+    no_starts, no_returns = {"low_battery_starts": 0.0}, {"early_returns": 0.0}
     return {
         "quick": {},
         "no transfer": alone,
-        "no guard": {"guard": False},
-        "no guard, no transfer": {"guard": False} | alone,
-        "no low-battery starts": {"low_battery_starts": 0.0},
-        "no early returns": {"early_returns": 0.0},
-        "no low-battery starts, no early returns": {
-            "low_battery_starts": 0.0,
-            "early_returns": 0.0,
-        },
-        "none of the three": means,
-        "none of the three, no transfer": means | alone,
+        "no guard": no_guard,
+        "no guard, no transfer": no_guard | alone,
+        "no low-battery starts": no_starts,
+        "no early returns": no_returns,
+        "no low-battery starts, no early returns": no_starts | no_returns,
+        "none of the three": no_guard | no_starts | no_returns,
+        "none of the three, no transfer": no_guard | no_starts | no_returns | alone,
         "1-step returns": {"n_step": 1},
         "discount 0.99": {"discount": 0.99},
         "64 environments": {"num_envs": 64, "replay": 8000},
@@ -75,7 +74,7 @@ def table(curves: pd.DataFrame) -> str:
     for variant in [name for name in VARIANTS if name in set(curves["variant"])]:
         last = curves[curves["variant"] == variant].groupby("seed").last()
         means = [100 * last[f"final_{name}"].mean() for name in METRICS]
-        products = 100 * last[f"final_{METRICS[-1]}"]
+        products = 100 * last[f"final_{PRODUCT}"]
         cells = " | ".join(f"{mean:.1f} %" for mean in means)
         ends = f"{products.min():.1f}, {products.max():.1f}" if len(last) > 1 else ""
         lines.append(f"| {variant} | {len(last)} | {cells} | {ends} |")
@@ -111,9 +110,8 @@ def main() -> None:
             curve, final = run(config, arguments.missions)
             curve.insert(0, "variant", variant)
             curve.insert(1, "seed", seed)
-            new = path.with_suffix(".new")
-            curve.assign(**final).to_parquet(new, index=False)
-            new.replace(path)
+            with replacing(path) as new:
+                curve.assign(**final).to_parquet(new, index=False)
             print(variant, seed, final, f"{curve['seconds'].iloc[-1]:.0f} s", flush=True)
 
 

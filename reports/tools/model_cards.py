@@ -15,6 +15,8 @@ import numpy as np
 import pandas as pd
 
 import policies
+from analysis import numbers
+from analysis.names import PRODUCT
 from analysis.replication import paper
 from analysis.stats.intervals import mean_interval, wilson
 from dess import load_scenario, simulate_batch
@@ -27,15 +29,13 @@ BEGIN, END = (
 )
 # The seed of the missions of model cards; no training and no selection of weights uses it.
 EVALUATION_SEED = 20_261_121
-PRODUCT = "collection_ratio_and_communication"
 
 
 def _row(name: str, missions: np.ndarray) -> str:
     """Success, collection ratio and product of missions with their intervals, as a table row."""
     ends = [wilson(int(missions["success"].sum()), len(missions))]
     ends += [mean_interval(missions[metric]) for metric in ("collection_ratio", PRODUCT)]
-    cells = [f"{100 * e.mean:.1f} % [{100 * e.low:.1f}, {100 * e.high:.1f}]" for e in ends]
-    return f"| {name} | {' | '.join(cells)} |"
+    return f"| {name} | {' | '.join(numbers.interval(*interval) for interval in ends)} |"
 
 
 HEAD = "| | success | collection ratio | product per mission |\n| --- | --- | --- | --- |"
@@ -57,22 +57,21 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
         f"{p['name']} ({p['ticks']} ticks{'' if p['battery'] else ', no battery decrease'})"
         for p in config["phases"]
     )
-    yield _list(
-        {
-            "Command": f"`{command}`",
-            "Config": f"`policies/ddqn/configs/{config['name']}.toml`, whole in `config.json`",
-            "Observation and network": f"{config['observation']}, {_count(policy):,} weights",
-            "Phases": phases,
-            "Hardware": f"{run['device']}, {run['threads']} thread(s), torch {run['torch']}",
-            "Wall time": f"{run['seconds'] / 60:.0f} min",
-            "Updates": f"{run['updates']:,} of {config['batch']} transitions",
-            "Experience": f"{run['uav_slots']:,} UAV-slots",
-            "Seeds": f"training {config['seed']} (missions of seed {MISSION_SEED} + that); "
-            f"selection {config['evaluation_seed']}; evaluation below {EVALUATION_SEED}",
-            "Selection": f"moving average of {config['window']} evaluations of "
-            f"{config['evaluation_missions']} missions; best product {run['selection_score']:.4f}",
-        }
-    )
+    entries = {
+        "Command": f"`{command}`",
+        "Config": f"`policies/ddqn/configs/{config['name']}.toml`, whole in `config.json`",
+        "Observation and network": f"{config['observation']}, {_count(policy):,} weights",
+        "Phases": phases,
+        "Hardware": f"{run['device']}, {run['threads']} thread(s), torch {run['torch']}",
+        "Wall time": f"{run['seconds'] / 60:.0f} min",
+        "Updates": f"{run['updates']:,} of {config['batch']} transitions",
+        "Experience": f"{run['uav_slots']:,} UAV-slots",
+        "Seeds": f"training {config['seed']} (missions of seed {MISSION_SEED} + that); "
+        f"selection {config['evaluation_seed']}; evaluation below {EVALUATION_SEED}",
+        "Selection": f"moving average of {config['window']} evaluations of "
+        f"{config['evaluation_missions']} missions; best product {run['selection_score']:.4f}",
+    }
+    yield "\n".join(f"- {name}: {text}" for name, text in entries.items())
     yield (
         "The learning curve (`training.parquet`): evaluations during training, without battery "
         "decrease in a phase without it:"
@@ -80,8 +79,8 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     rows = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 12).round().astype(int))]
     table = ["| tick | phase | minutes | success | product |", "| --- | --- | --- | --- | --- |"]
     table += [
-        f"| {r.tick} | {r.phase} | {r.seconds / 60:.0f} | {100 * r.evaluation_success:.1f} % "
-        f"| {100 * getattr(r, 'evaluation_' + PRODUCT):.1f} % |"
+        f"| {r.tick} | {r.phase} | {r.seconds / 60:.0f} | {numbers.percent(r.evaluation_success)} "
+        f"| {numbers.percent(getattr(r, 'evaluation_' + PRODUCT))} |"
         for r in rows.itertuples()
     ]
     yield "\n".join(table)
@@ -99,7 +98,7 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     rows = [_row(folder.name, learned)]
     rows += [_row(f"{n} UAV(s)", learned[learned["uavs"] == n]) for n in np.unique(learned["uavs"])]
     rows += [_row(f"`{name}`", other) for name, other in others.items()]
-    printed = " | ".join(f"{100 * value:.1f} %" for value in paper.TABLE_IV.values())
+    printed = " | ".join(map(numbers.percent, paper.TABLE_IV.values()))
     rows.append(f"| paper, Table IV | {printed} |")
     yield "\n".join([HEAD, *rows])
     gains = {
@@ -118,18 +117,16 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
         for n, case in ((n, load_scenario("fig4", uavs=n)) for n in (1, 2, 3))
     ]
     for n, means in paper.FIG_4.items():
-        cells = f"{100 * means['success']:.1f} % | {100 * means['collection_ratio']:.1f} % | "
-        rows.append(f"| paper, I = {n} | {cells}not printed |")
+        cells = " | ".join(
+            numbers.percent(means[metric]) for metric in ("success", "collection_ratio")
+        )
+        rows.append(f"| paper, I = {n} | {cells} | not printed |")
     yield f"The cases of Fig. 4, {missions} missions each:"
     yield "\n".join([HEAD, *rows])
 
 
 def _count(policy: Any) -> int:
     return sum(weight.numel() for weight in policy.network.parameters())
-
-
-def _list(entries: dict[str, str]) -> str:
-    return "\n".join(f"- {name}: {text}" for name, text in entries.items())
 
 
 def main() -> None:

@@ -142,11 +142,6 @@ def test_it_is_whole_and_loads_nothing(html: str) -> None:
     assert elements.links == ["performance.html#table-4", "mission.html#fig-4", "learning.html"]
 
 
-def test_links_lead_to_pages_that_there_are() -> None:
-    assert Elements(as_html(ROWS, ["mission.html"]).data).links == ["mission.html#fig-4"]
-    assert Elements(as_html(ROWS, []).data).links == []
-
-
 def test_the_same_rows_give_the_same_bytes(html: str) -> None:
     assert as_html([*ROWS]).data == html
 
