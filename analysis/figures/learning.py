@@ -159,8 +159,8 @@ def _seeds(reached: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
 
 
 def _trainings(averages: pd.DataFrame, colour: str, ax: Axes) -> None:
-    for _, one in averages.groupby(["seed", "phase"], sort=False):
-        ax.plot(one["updates"], one["value"], color=colour, linewidth=0.7, alpha=0.55)
+    for _, curve in averages.groupby(["seed", "phase"], sort=False):
+        ax.plot(curve["updates"], curve["value"], color=colour, linewidth=0.7, alpha=0.55)
 
 
 def _mean(averages: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> None:

@@ -17,7 +17,6 @@ from analysis.figures import style
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario
 
-EDGE = "#d9a400"  # of the charging zone
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
 
@@ -137,7 +136,7 @@ def _grid(scenario: Scenario, ax: Axes) -> None:
     """The grid, its zone and its nodes; y grows south."""
     x, y, width, height = scenario.zone
     zone = Rectangle(
-        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=EDGE, zorder=1
+        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, zorder=1
     )
     ax.set_facecolor(style.SEA)
     ax.grid(False)
@@ -206,7 +205,7 @@ def _map_legend(ax: Axes) -> None:
 
     served = style.node_colours(2)[1]
     handles = [
-        Patch(facecolor=style.ZONE, edgecolor=EDGE, label="start and charging zone"),
+        Patch(facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, label="start and charging zone"),
         mark("o", "sensor node", face=served, size=8),
         mark("D", "start of UAV", face="white"),
         mark("o", "end of UAV"),

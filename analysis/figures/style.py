@@ -24,7 +24,8 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from analysis.numbers import minus
 
-INK, MUTED, SEA, ZONE = "#22303c", "#7a8791", "#f3f8fb", "#ffe08a"
+INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
+SEA, ZONE, ZONE_EDGE = "#f3f8fb", "#ffe08a", "#d9a400"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
 # Policies that look the same in all figures, whichever others are drawn.
 KNOWN_POLICIES = ("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper")
@@ -43,7 +44,7 @@ _LOOK = {
     "ytick.color": INK,
     "legend.frameon": False,
     "legend.fontsize": 9,
-    "grid.color": "#dde4e9",
+    "grid.color": GRID,
 }
 
 

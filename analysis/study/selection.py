@@ -1,4 +1,4 @@
-"""Select the best of many design points, with missions where they tell the points apart.
+"""Select the best of many design points, with more missions for those that are hard to rule out.
 
 Procedures for the largest mean of a metric over k points; ties go to the lowest number.
 
@@ -120,7 +120,7 @@ class Selection(BaseModel):
             samples: Per design point: metric -> (n,) values of replications 0..n-1.
 
         Returns:
-            The numbers, no less than there are; all as there are: done.
+            The numbers, none below the missions given; equal to them if no more are needed.
         """
         values = self._values(samples)
         counts = _Race(self, values).counts

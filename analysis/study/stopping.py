@@ -118,7 +118,7 @@ class Precision(BaseModel):
             samples: Per design point: metric -> (n,) values of replications 0..n-1.
 
         Returns:
-            The numbers, no less than there are; all as there are: done.
+            The numbers, none below the missions given; equal to them if no more are needed.
         """
         return [self._wanted(sample) for sample in samples]
 

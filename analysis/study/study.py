@@ -113,7 +113,7 @@ class Study(BaseModel):
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:
-            raise ValueError("precision: selection is there too; allowed: either")
+            raise ValueError("precision: selection is also given; allowed: either")
         if self.rule and "missions" in self.model_fields_set:
             rule = "precision" if self.precision else "selection"
             raise ValueError(f"missions: are decided by {rule}; allowed: either")
@@ -140,7 +140,7 @@ class Study(BaseModel):
             return
         for shown, count in Counter(map(_shown, designs)).items():
             if count > 1:
-                raise ValueError(f"design: {shown} is there twice; allowed: once")
+                raise ValueError(f"design: {shown} is listed twice; allowed: once")
 
     @property
     def command(self) -> list[str]:

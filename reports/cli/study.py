@@ -81,14 +81,14 @@ def _bar() -> "Iterator[tuple[Callable[[int], object], Callable[[Round], object]
     """Progress in missions: callbacks for missions done, and for rounds, which add missions."""
     with console.bar("mission") as bar:
 
-        def begin(a_round: "Round") -> None:
-            if a_round.number:
-                bar.set_description(f"round {a_round.number + 1}", refresh=False)
+        def begin(started: "Round") -> None:
+            if started.number:
+                bar.set_description(f"round {started.number + 1}", refresh=False)
             else:
-                present = f", {a_round.present:,} of them present" if a_round.present else ""
-                print(f"{a_round.missions:,} missions{present}", file=sys.stderr)
-            bar.total = a_round.missions
-            bar.initial += a_round.present  # took no time
+                present = f", {started.present:,} of them present" if started.present else ""
+                print(f"{started.missions:,} missions{present}", file=sys.stderr)
+            bar.total = started.missions
+            bar.initial += started.present  # took no time
 
         yield bar.update, begin
 

@@ -3,9 +3,9 @@
 import json
 from typing import Any, TypeAlias
 
-from analysis.figures.style import INK, MUTED, SEA, ZONE
+from analysis.figures.style import GRID, INK, MUTED, SEA, ZONE, ZONE_EDGE
 from dess.scenario import Scenario
-from reports.player.mission_map import EDGE, STATUS, counted
+from reports.player.mission_map import STATUS, counted
 from reports.player.panels import BATTERY, CHARGING, PANELS, ranges
 from reports.player.playback import Playback
 from reports.player.trace import Json
@@ -13,7 +13,6 @@ from reports.player.trace import Json
 WIDE = 720  # width [px] from which on the curves stand beside the map, not below it
 MARGINS = {"l": 44, "r": 38, "t": 6, "b": 40}
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif'
-GRID = "#dde4e9"
 SECONDS_PER_SLOT = {"Play": 0.3, "Fast": 0.1}
 
 # What all axes, notes, controls and traces have, unless they say otherwise.
@@ -133,7 +132,7 @@ def _shapes(scenario: Scenario) -> list[Json]:
          "x0": x - 0.5, "x1": x + width - 0.5, "y0": y - 0.5, "y1": y + height - 0.5}
         for (x, y, width, height), fill, edge in (
             ((0, 0, scenario.grid, scenario.grid), SEA, MUTED),
-            (scenario.zone, ZONE, EDGE),
+            (scenario.zone, ZONE, ZONE_EDGE),
         )
     ]  # fmt: skip
     for level in (scenario.charge_start, scenario.charge_complete):

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from analysis.figures.style import INK, MUTED
+from analysis.figures.style import INK, MUTED, ZONE_EDGE
 from reports.player.playback import Playback
 from reports.player.trace import Json, Moving, lines, markers, rounded
 
 TRAIL = 12  # moves that a UAV draws behind it
 NODE_SIZE, UAV_SIZE, PAD_SIZE = 25, 16, 21  # diameters, and the side of a square [px]
-EDGE, STATUS = "#d9a400", 5  # colour of the zone's edge, panel of the status line
+STATUS = 5  # panel of the status line
 
 
 def rings(playback: Playback) -> Json:
@@ -78,7 +78,7 @@ def _links(playback: Playback) -> Iterator[Moving]:
 
 def _squares(playback: Playback) -> Iterator[Moving]:
     """A square under every UAV that waits, and one under every UAV that charges."""
-    for state, fill, width in (("waiting", "rgba(0, 0, 0, 0)", 1.8), ("charging", EDGE, 1.2)):
+    for state, fill, width in (("waiting", "rgba(0, 0, 0, 0)", 1.8), ("charging", ZONE_EDGE, 1.2)):
         line = {"color": INK, "width": width}
         style = markers(state, symbol="square", size=PAD_SIZE, color=fill, line=line)
         frames = [

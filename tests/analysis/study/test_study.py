@@ -104,7 +104,7 @@ BAD = {
     "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
     "design = {kind = 'grid', values.uavs = []}": ["uavs has no values"],
     "design = {kind = 'grid', values.uavs = 2}": ["values.uavs"],
-    "design = {kind = 'grid', values.uavs = [1, 2, 1]}": ["uavs=1 is there twice"],
+    "design = {kind = 'grid', values.uavs = [1, 2, 1]}": ["uavs=1 is listed twice"],
     "design = {kind = 'grid', values.uavz = [1, 2]}": ["at uavz=1", "uavz: unknown key"],
     "design = {kind = 'cube', values.uavs = [1]}": ["kind: 'cube' is unknown", "grid", "saltelli"],
     "design = {values.uavs = [1]}": ["design", "kind"],
@@ -122,7 +122,7 @@ BAD = {
         "missions: are decided by selection"
     ],
     "selection = {procedure = 'kn', indifference = 0.1}\n"
-    "precision.targets.success.absolute = 0.1": ["precision: selection is there too"],
+    "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
     "selection = {procedure = 'kn', indifference = -0.1}": [
         "selection.indifference",
         "greater than 0",
