@@ -38,11 +38,11 @@ class DesignPoint:
     replication: int = 0
 
 
-def _tuples(value: Any) -> Any:
+def as_tuples(value: Any) -> Any:
     """Lists, as TOML gives them, to tuples, at any depth."""
     if isinstance(value, dict):
-        return {key: _tuples(item) for key, item in value.items()}
-    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
+        return {key: as_tuples(item) for key, item in value.items()}
+    return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:
@@ -81,10 +81,10 @@ def _is_power_of_two(number: int) -> int:
 
 
 Values = Annotated[
-    dict[str, tuple[Any, ...]], BeforeValidator(_tuples), AfterValidator(_have_values)
+    dict[str, tuple[Any, ...]], BeforeValidator(as_tuples), AfterValidator(_have_values)
 ]
-Rows = Annotated[tuple[dict[str, Any], ...], BeforeValidator(_tuples)]
-Ranges = Annotated[dict[str, Any], BeforeValidator(_tuples), AfterValidator(_are_ranges)]
+Rows = Annotated[tuple[dict[str, Any], ...], BeforeValidator(as_tuples)]
+Ranges = Annotated[dict[str, Any], BeforeValidator(as_tuples), AfterValidator(_are_ranges)]
 PowerOfTwo = Annotated[Integer, AfterValidator(_is_power_of_two)]
 
 

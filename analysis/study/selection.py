@@ -35,9 +35,9 @@ from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from analysis.study.stopping import MOST, Metric
+from analysis.study.stopping import MOST, Metric, StrictTable
 from dess.scenario import Integer, Number
 
 # Stages of the race that are summed at once; their number changes no result.
@@ -76,7 +76,7 @@ class Choice:
     missions: int
 
 
-class Selection(BaseModel):
+class Selection(StrictTable):
     """The rule that missions are spent to find the best of the design points.
 
     The missions come in rounds that grow. What is wanted is a function of the values in the order
@@ -86,8 +86,6 @@ class Selection(BaseModel):
     Raises:
         pydantic.ValidationError: If a field is not valid.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     procedure: Literal["kn", "kn-bounded"] = Field(
         description="kn-bounded: for metrics between 0 and 1 with rare failures; kn: for others"

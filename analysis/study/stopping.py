@@ -20,10 +20,14 @@ _LEVEL = 0.95
 _GROWTH = 2.0
 
 
-class Target(BaseModel):
-    """How narrow an interval is to be: met if either half-width is."""
+class StrictTable(BaseModel):
+    """A table of a study's TOML file: frozen, of known keys, and of the types that TOML gives."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+class Target(StrictTable):
+    """How narrow an interval is to be: met if either half-width is."""
 
     absolute: Number | None = Field(None, gt=0, description="half-width in units of the metric")
     relative: Number | None = Field(None, gt=0, description="half-width as a share of |mean|")
@@ -64,7 +68,7 @@ class Reached(NamedTuple):
     stop: int | None
 
 
-class Precision(BaseModel):
+class Precision(StrictTable):
     """The rule that a cell is replicated until its 95 % intervals are narrow enough.
 
     The half-widths are those of ``stats.intervals``: half the Wilson interval of ``success``,
@@ -89,8 +93,6 @@ class Precision(BaseModel):
     Raises:
         pydantic.ValidationError: If a field is not valid.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     first: Integer = Field(
         30, ge=2, le=MOST, description="missions of a cell before the first check"

@@ -4,11 +4,10 @@ from collections import Counter
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
+    BeforeValidator,
     Field,
     PrivateAttr,
     ValidationError,
@@ -16,9 +15,9 @@ from pydantic import (
     model_validator,
 )
 
-from analysis.study.design import Design, DesignPoint, Saltelli
+from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.selection import Selection
-from analysis.study.stopping import MOST, Precision
+from analysis.study.stopping import MOST, Precision, StrictTable
 from dess import InputError
 from dess.files import Shipped
 from dess.scenario import (
@@ -45,7 +44,7 @@ class Point(NamedTuple):
     replication: int = 0
 
 
-class Study(BaseModel):
+class Study(StrictTable):
     """Policies x design points x replications.
 
     Every policy meets the same replications, and so does every design point (common random
@@ -56,8 +55,6 @@ class Study(BaseModel):
         pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
     name: str = Field(
         pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="names the folder of results"
     )
@@ -67,7 +64,9 @@ class Study(BaseModel):
     design: Design | None = Field(
         None, description="the design points; without one, the scenario is the only point"
     )
-    policies: tuple[str, ...] = Field(min_length=1, description='teams: "P" or "P,P,..."')
+    policies: Annotated[tuple[str, ...], BeforeValidator(as_tuples)] = Field(
+        min_length=1, description='teams: "P" or "P,P,..."'
+    )
     missions: Integer = Field(
         1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"
     )
@@ -84,11 +83,6 @@ class Study(BaseModel):
     )
 
     _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
-
-    @field_validator("policies", mode="before")
-    @classmethod
-    def _list_to_tuple(cls, value: Any) -> Any:
-        return tuple(value) if isinstance(value, list) else value
 
     @field_validator("policies")
     @classmethod

@@ -22,6 +22,7 @@ from pygments.lexers import PythonLexer
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess import InputError
+from dess.files import writable
 from reports.pages import missions
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
@@ -83,7 +84,7 @@ def render(
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
         shown = [read(name, notebooks) for name in names_in(notebooks)]
         files[INDEX] = index_of(pages_in(out, but=files) | files, shown)
-        with _writing(out):
+        with writable(out):
             for name, text in files.items():
                 Path(folder, name).write_bytes(text.encode())
             for name in files:
@@ -103,7 +104,7 @@ def _folders(folders: Iterable[Path]) -> Iterator[None]:
     try:
         for folder in folders:
             new = [path for path in (folder, *folder.parents) if not path.exists()]
-            with _writing(folder):
+            with writable(folder):
                 folder.mkdir(parents=True, exist_ok=True)
             made += new
         yield
@@ -112,14 +113,6 @@ def _folders(folders: Iterable[Path]) -> Iterator[None]:
             with suppress(OSError):  # not empty
                 path.rmdir()
         raise
-
-
-@contextmanager
-def _writing(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"out: {out} cannot be written: {error.strerror}") from error
 
 
 def _check_results(folder: Path) -> None:

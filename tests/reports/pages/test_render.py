@@ -296,7 +296,7 @@ def test_a_folder_that_cannot_be_written_is_refused(
     results: Path, notebooks: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="out: .*file.* cannot be written"):
+    with pytest.raises(InputError, match="file.*: cannot be written: "):
         render(["mission"], results, tmp_path / "file" / "out", notebooks=notebooks)
 
 
