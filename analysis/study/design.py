@@ -6,14 +6,15 @@ function of its fields, in their written order.
 """
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
+from analysis.study.stopping import StrictTable
 from dess.scenario import Integer, Scenario, validation_line
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
@@ -88,8 +89,14 @@ Ranges = Annotated[dict[str, Any], BeforeValidator(as_tuples), AfterValidator(_a
 PowerOfTwo = Annotated[Integer, AfterValidator(_is_power_of_two)]
 
 
-class _Design(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+class _Design(StrictTable):
+    @cached_property
+    def points(self) -> tuple[DesignPoint, ...]:
+        """The design points, in order."""
+        return tuple(self._points())
+
+    def _points(self) -> Iterator[DesignPoint]:
+        raise NotImplementedError
 
 
 class Grid(_Design):
@@ -100,11 +107,9 @@ class Grid(_Design):
         {}, description="field -> values; without any, the one point is the scenario as it is"
     )
 
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, in order."""
-        combinations = product(*self.values.values())
-        return tuple(DesignPoint(dict(zip(self.values, c, strict=True))) for c in combinations)
+    def _points(self) -> Iterator[DesignPoint]:
+        for combination in product(*self.values.values()):
+            yield DesignPoint(dict(zip(self.values, combination, strict=True)))
 
 
 class OneAtATime(_Design):
@@ -116,12 +121,9 @@ class OneAtATime(_Design):
     kind: Literal["one-at-a-time"] = "one-at-a-time"
     values: Values = Field(min_length=1, description="field -> values")
 
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, by field and value, in order."""
-        return tuple(
-            DesignPoint({field: value}) for field, values in self.values.items() for value in values
-        )
+    def _points(self) -> Iterator[DesignPoint]:
+        for field, values in self.values.items():
+            yield from (DesignPoint({field: value}) for value in values)
 
 
 class Table(_Design):
@@ -130,10 +132,8 @@ class Table(_Design):
     kind: Literal["table"] = "table"
     rows: Rows = Field(min_length=1, description="tables of field -> value, one per point")
 
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, in order."""
-        return tuple(DesignPoint(row) for row in self.rows)
+    def _points(self) -> Iterator[DesignPoint]:
+        return map(DesignPoint, self.rows)
 
 
 class _Sampled(_Design):
@@ -157,13 +157,11 @@ class LatinHypercube(_Sampled):
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     size: Integer = Field(ge=1, le=MAX_SIZE, description="number of points")
 
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, in the order of their draws."""
+    def _points(self) -> Iterator[DesignPoint]:
         from scipy.stats import qmc
 
         sample = qmc.LatinHypercube(len(self.ranges), rng=self.seed).random(self.size)
-        return tuple(self._point(unit) for unit in sample)
+        return map(self._point, sample)
 
 
 class Saltelli(_Sampled):
@@ -193,14 +191,12 @@ class Saltelli(_Sampled):
         names = [*self.ranges, NOISE]
         return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
-    @cached_property
-    def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, block by block."""
+    def _points(self) -> Iterator[DesignPoint]:
         from SALib.sample import sobol
 
         sample = sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
-        last = self.replications - 1
-        return tuple(self._point(unit, _scaled(noise, (0, last), True)) for *unit, noise in sample)
+        ends = (0, self.replications - 1)
+        return (self._point(unit, _scaled(noise, ends, True)) for *unit, noise in sample)
 
 
 def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:

@@ -65,7 +65,7 @@ def test_bad_input_gets_one_line_and_leaves_nothing(arguments, dess, tmp_path):
     assert out == ""
     *progress, line = err.splitlines()
     assert line.startswith("dess: error: ")
-    assert all("cell" in bar for bar in filter(None, progress))  # on a busy machine
+    assert all("step" in bar for bar in filter(None, progress))  # on a busy machine
     for part in BAD[arguments]:
         assert part in line
     assert files_of(tmp_path) == before
