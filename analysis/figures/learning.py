@@ -95,8 +95,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
                 )
             else:
                 _seeds(reached, row, y, ax)
-            note = f"{row['mean']:.1%}, n = {row['n']}"
-            style.note_at_right(note, y, ax)
+            style.note_at_right(f"{row['mean']:.1%}, n = {row['n']}", y, ax)
         names = ["\n".join(textwrap.wrap(variant, 22)) for variant in table["variant"]]
         ax.set_yticks(range(len(table)), names)
         ax.set(title=METRICS[metric.removeprefix("final_")], ylim=(len(table) - 0.4, -0.6))
@@ -116,8 +115,8 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     kept = curve[curve["is_best"]].iloc[-1]
     with style.look():
         figure, ax = style.panels(3.9, values="y")
-        colours = style.palette()
-        for metric, colour, line in zip(EVALUATED, colours[2:], ("--", ":", "-"), strict=False):
+        looks = zip(style.palette()[2:], ("--", ":", "-"), strict=False)
+        for metric, (colour, line) in zip(EVALUATED, looks, strict=False):
             for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
                 ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
                         label="" if n else EVALUATED[metric])  # fmt: skip
@@ -151,9 +150,8 @@ def _seeds(reached: pd.Series, row: pd.Series, y: float, ax: Axes) -> None:
     """The trainings of a variant, and above them their mean with its interval."""
     colour = style.palette()[0]
     if row["n"] > 1:
-        arms = [[row["mean"] - row["low"]], [row["high"] - row["mean"]]]
-        ax.errorbar(row["mean"], y - 0.14, xerr=arms, marker="D", markersize=5, color=colour,
-                    capsize=4, elinewidth=1.8, zorder=2)  # fmt: skip
+        ax.errorbar(row["mean"], y - 0.14, xerr=style.arms(row), marker="D", markersize=5,
+                    color=colour, capsize=4, elinewidth=1.8, zorder=2)  # fmt: skip
     spots = np.full(len(reached), y + 0.18 * (row["n"] > 1))
     ax.scatter(reached, spots, color=style.MUTED, s=18, zorder=3, gid=row["variant"])
 

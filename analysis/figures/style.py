@@ -78,9 +78,8 @@ def panels(
 
 def grid_of(values: Literal["x", "y", "xy"], ax: Axes) -> None:
     """Grid lines for the axes of values alone, and no frame; names stand beside no axis line."""
-    ax.grid(visible=False)
-    for axis in values:
-        ax.grid(axis=axis, visible=True)
+    ax.xaxis.grid("x" in values)
+    ax.yaxis.grid("y" in values)
     sns.despine(ax=ax, left=values == "x")
 
 
