@@ -71,8 +71,8 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
     }
-    filters = {"words": words, "number": _number, "span": _span, "counted": _counted}
-    text: Any = template("stress.md", **filters).make_module(values)
+    page = template("stress.md", words=words, number=_number, span=_span, counted=_counted)
+    text: Any = page.make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(text)) if part.strip()}
     return Description(sections, (text.steps, text.repeated, text.end), _parameters(space))
 
