@@ -5,11 +5,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
-from tests.analysis.questions.learning.test_curves import training
 
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
 from analysis.questions.learning import ablation, curves
+from tests.analysis.questions.learning.test_curves import training
 
 METRIC = "evaluation_collection_ratio_and_communication"
 LABELS = {"one": "with", "two": "without"}
