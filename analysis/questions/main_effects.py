@@ -122,7 +122,7 @@ def changes_by_field(results: Results, table: pd.DataFrame) -> dict[str, dict[st
 
 def shape(pairs: pd.DataFrame) -> Shape:
     """The shape that the differences of ``changes`` leave."""
-    ups, downs = differing(pairs, 1), differing(pairs, -1)
+    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
     places = range(int(pairs["second"].max()) + 1)
     peaks = tuple(p for p in places if _passes(p, ups, downs))
     valleys = tuple(p for p in places if _passes(p, downs, ups))
@@ -137,7 +137,7 @@ def shape(pairs: pd.DataFrame) -> Shape:
     return Shape(words, peaks)
 
 
-def differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
+def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
     """The pairs of positions whose values differ, upwards (sign 1) or downwards (sign -1)."""
     rows = pairs[(pairs["p_adjusted"] <= 1 - LEVEL) & (np.sign(pairs["difference"]) == sign)]
     return set(zip(rows["first"], rows["second"], strict=True))
@@ -164,69 +164,32 @@ def leading_policies(
     return [policy for policy in (learned or best[0], heuristic or best[1]) if policy]
 
 
-def caption(table: pd.DataFrame, field: str, pairs: Mapping[str, pd.DataFrame]) -> str:
-    """What a figure of a parameter shows: the shapes of its curves, and their missions.
-
-    Args:
-        table: The ``effects`` of the policies that are drawn.
-        field: The parameter.
-        pairs: Per policy, its ``changes`` in collection ratio and communication.
-    """
-    shapes = "; ".join(f"{policy} {shape(rows).words}" for policy, rows in pairs.items())
-    n = table.loc[table["field"] == field, "n"].min()
-    return (
-        f"Collection ratio and communication: {shapes}. n = {n:,} missions per point, bars are "
-        f"{numbers.level(LEVEL)} intervals."
-    )
-
-
-def in_words(table: pd.DataFrame, pairs: pd.DataFrame, policy: str, field: str) -> str:
-    """How collection ratio and communication changes from a parameter's first value to its last.
-
-    Args:
-        table: The ``effects``.
-        pairs: The ``changes`` of the policy along the parameter.
-        policy: The policy.
-        field: The parameter.
-    """
-    rows = table[(table["field"] == field) & (table["policy"] == policy)]
-    rows = rows[rows["metric"] == PRODUCT].set_index("position")
-    values, last = rows["value"], rows.index.max()
-    change = pairs[(pairs["first"] == 0) & (pairs["second"] == last)]
-    (points,) = change[["difference", "low", "high"]].itertuples(index=False)
-    first_mean, last_mean = (numbers.percent(rows.loc[n, "mean"]) for n in (0, last))
-    along = shape(pairs)
-    text = (
-        f"{policy} **{along.words}**: {first_mean} at {values[0]}, {last_mean} at {values[last]}, "
-        f"{numbers.points(*points)} points"
-    )
-    if along.words != PEAK:
-        return text
-    about = " or so" if len(along.peaks) > 1 else ""
-    return f"{text}, highest at {numbers.words([values[n] for n in along.peaks])}{about}"
-
-
-def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]]) -> str:
-    """Every parameter and, below it, every policy ``in_words``: a list in Markdown.
+def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]]) -> pd.DataFrame:
+    """How collection ratio and communication goes along every parameter, as a table to print.
 
     Args:
         table: The ``effects``.
         changes: ``changes_by_field``.
     """
+    rows = table[table["metric"] == PRODUCT].set_index(["policy", "field", "position"])
     lines = []
-    for field, pairs in changes.items():
-        lines.append(f"- **{parameter(field).name}**")
-        lines += [f"    - {in_words(table, rows, p, field)}" for p, rows in pairs.items()]
-    return "\n".join(lines)
-
-
-def by_size(changes: Mapping[str, Mapping[str, pd.DataFrame]], policy: str) -> list[str]:
-    """The parameters by their largest change, ``initial data per node (43.0 points)``.
-
-    Args:
-        changes: ``changes_by_field``.
-        policy: The policy.
-    """
-    sizes = {field: pairs[policy]["difference"].abs().max() for field, pairs in changes.items()}
-    ranked = sorted(sizes.items(), key=lambda item: -item[1])
-    return [f"{parameter(field).within} ({100 * size:.1f} points)" for field, size in ranked]
+    for field, pairs_of_field in changes.items():
+        for policy, pairs in pairs_of_field.items():
+            values = rows.loc[(policy, field)]
+            first, last = values.iloc[0], values.iloc[-1]
+            change = pairs.set_index(["first", "second"]).loc[0, len(values) - 1]
+            along = shape(pairs)
+            peaks = values.loc[[*along.peaks], "value"] if along.words == PEAK else []
+            lines.append(
+                {
+                    "Parameter": parameter(field).name,
+                    "Policy": policy,
+                    "Along the values": along.words,
+                    "First": f"{numbers.percent(first['mean'])} at {first['value']}",
+                    "Last": f"{numbers.percent(last['mean'])} at {last['value']}",
+                    "Last − first": numbers.points(*change[["difference", "low", "high"]]),
+                    "Highest at": " or ".join(peaks),
+                    "Largest difference": f"{100 * pairs['difference'].abs().max():.1f}",
+                }
+            )
+    return pd.DataFrame(lines)

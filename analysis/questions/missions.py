@@ -176,27 +176,6 @@ def uav_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
     return pd.concat([_uavs(mission) for mission in missions], ignore_index=True)
 
 
-def growth_in_words(
-    results: Results, missions: Sequence[LoggedMission], printed: Sequence[float]
-) -> str:
-    """How the collection ratio changes from the smallest fleet to the largest.
-
-    Args:
-        results: The study of the missions.
-        missions: Of one policy, by the number of UAVs.
-        printed: The collection ratios that the paper prints for them.
-    """
-    first, last = missions[0].row, missions[-1].row
-    of_ends = [estimate(results, row["policy"], RATIO, row["point"]) for row in (first, last)]
-    ratios = [first[RATIO], last[RATIO], *(row["mean"] for row in of_ends), printed[0], printed[-1]]
-    texts = [numbers.percent(ratio) for ratio in ratios]
-    return (
-        f"From {first['uavs']} to {last['uavs']} UAVs, the collection ratio goes from {texts[0]} "
-        f"to {texts[1]} in these missions, from {texts[2]} to {texts[3]} in the mean of "
-        f"{first['policy']}, and from {texts[4]} to {texts[5]} in the paper."
-    )
-
-
 def _outcome(mission: LoggedMission) -> dict[str, Any]:
     row, log = mission.row, mission.log
     served = log.loc[log["event"] == "communication", "node"].nunique()

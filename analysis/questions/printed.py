@@ -1,4 +1,4 @@
-"""Estimates beside the figures that the paper prints: tables of text, and lists in words.
+"""Estimates beside the figures that the paper prints: tables of text.
 
 A mark says where the whole interval of an estimate lies, relative to the printed figure.
 """
@@ -10,10 +10,9 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.names import METRICS
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, POSITIONS, position
+from analysis.stats.verdict import MARKS, position
 
 PAPER = "paper"
-MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}
 
 
 def with_mark(estimate: Any, printed: float) -> str:
@@ -63,22 +62,6 @@ def beside_by_fleet(
             texts = [with_mark(row, figure) for row in rows.itertuples()]
             columns[METRICS[metric], f"I = {uavs}"] = [numbers.percent(figure), *texts]
     return pd.DataFrame(columns)
-
-
-def positions_in_words(estimates: pd.DataFrame, printed: Mapping[str, float]) -> str:
-    """A Markdown list of which policies are above, around and below the figure of each metric."""
-    return "\n".join(
-        _line(estimates[estimates["metric"] == metric], metric, figure)
-        for metric, figure in printed.items()
-    )
-
-
-def _line(estimates: pd.DataFrame, metric: str, figure: float) -> str:
-    policies: dict[str, list[str]] = {side: [] for side in POSITIONS}
-    for row in estimates.itertuples():
-        policies[position(row, figure)].append(row.policy)
-    parts = [f"{side}: {numbers.words(names)}" for side, names in policies.items() if names]
-    return f"- **{METRICS[metric]}** (paper {numbers.percent(figure)}), {'; '.join(parts)}."
 
 
 def _text(estimate: Any) -> str:

@@ -13,7 +13,6 @@ from analysis.study.design import NOISE, Saltelli
 from dess import InputError
 
 METRICS = (*SHARES, *MEANS)
-SMALL = 0.05  # share of the variance below which a parameter hardly matters
 
 
 def sensitivity(
@@ -99,59 +98,6 @@ def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
     """``number of UAVs 1–3 and initial data per node 5–20``."""
     return numbers.words(
         [f"{parameter(field).within} {value_text(ends)}" for field, ends in ranges.items()]
-    )
-
-
-def caption(indices: pd.DataFrame) -> str:
-    """What a figure of the indices of one policy and one metric shows."""
-    policy, metric, n = indices[["policy", "metric", "n"]].iloc[0]
-    return (
-        f"{METRIC_NAMES[metric]} of {policy}. n = {n:,} missions; lines: {numbers.level(LEVEL)} "
-        "intervals by bootstrap. Estimates are not cut: that of a small share may be negative, an "
-        "interval may go beyond 100 %. Below the dotted line: noise."
-    )
-
-
-def in_words(indices: pd.DataFrame) -> str:
-    """The parameter that matters most, the noise, and the parameters that hardly matter.
-
-    Args:
-        indices: Rows of ``questions.summary.sensitivities`` of one policy and one metric.
-    """
-    shares = indices.set_index("parameter")
-    settings = shares.drop(NOISE)
-    most = settings["first"].idxmax()
-    small = settings.index[settings["total_high"] < SMALL]
-    text = (
-        f"**{indices['policy'].iloc[0]}**: {parameter(most).name} matters most, alone "
-        f"{_shares(shares.loc[[most]], 'first')[0]} of the variance. The noise leaves "
-        f"{_shares(shares.loc[[NOISE]], 'total')[0]} that no setting removes."
-    )
-    if small.empty:
-        return text
-    return (
-        f"{text} Less than {numbers.percent(SMALL)} of it has to do with "
-        f"{numbers.words([parameter(field).within for field in small])}, by the whole interval, "
-        "interactions included."
-    )
-
-
-def without_shares(indices: pd.DataFrame) -> str:
-    """The metrics that have no variance to take shares of, as a sentence; empty without any.
-
-    Args:
-        indices: Rows of ``questions.summary.sensitivities``.
-    """
-    constant = indices[indices["first"].isna()].groupby("metric", sort=False)["policy"]
-    names = [
-        f"{METRIC_NAMES[str(metric)].lower()} of {numbers.words(policies.unique().tolist())}"
-        for metric, policies in constant
-    ]
-    if not names:
-        return ""
-    return (
-        f"There are no shares of {numbers.words(names)}: it is the same in all missions of both "
-        "base samples, from which the variance is taken."
     )
 
 

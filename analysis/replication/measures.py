@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.names import RATIO, parameter, value_text
 from analysis.questions import main_effects, node_shares
-from analysis.questions.learning.curves import Transfer
+from analysis.questions.learning.curves import Transfer, last_phase, settled
 from analysis.replication import paper
 from analysis.replication.evidence_of_policy import (
     EvidenceOfPolicy,
@@ -227,25 +227,18 @@ def setting(field: str, value: str) -> str:
 def final_lead(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
     """By how much training with transfer learning ends above training without it."""
     transfer = evidence.transfer(metric)
-    where = "ends below, or level"
-    if transfer.throughout:
-        where = "above at every step"
-    elif transfer.since is not None:
-        where = f"above from step {transfer.since:,} on"
-    note = f"trainings {evidence.using} and {evidence.without}: {where}{_if_short(transfer)}"
+    variants = f"trainings {evidence.using} and {evidence.without}"
+    note = f"{variants}: {transfer.course}{_if_short(transfer)}"
     return Measured((transfer,), _at_the_end(transfer, unit), note)
 
 
 def level_from(evidence: EvidenceOfTrainings, metric: str) -> Measured:
     """The step from which on the mean curve without transfer learning stays near its end."""
     transfer, curves = evidence.transfer(metric), evidence.curves(metric)
-    curves = curves[curves["variant"] == evidence.without]
-    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
-    means = curves.groupby("updates")["value"].mean()
-    far = np.flatnonzero((means - means.iloc[-1]).abs() > MARGIN)
-    since = int(means.index[far[-1] + 1 if len(far) else 0])
-    settled = Quantity(since, unit="steps", name="level from")
-    quantities = settled, *_at_the_end(transfer, "points")
+    means = last_phase(curves, evidence.without).mean(axis="columns")
+    since = int(means.index[settled(means, MARGIN)])
+    level = Quantity(since, unit="steps", name="level from")
+    quantities = level, *_at_the_end(transfer, "points")
     note = f"trainings {evidence.without}{_if_short(transfer)}"
     return Measured((since / means.index[-1], transfer), quantities, note)
 

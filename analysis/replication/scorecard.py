@@ -19,7 +19,7 @@ from analysis.replication.evidence_of_policy import (
     evidence_of_trainings,
 )
 from analysis.replication.measures import Measured, Quantity
-from analysis.replication.rules import MARGIN, NO_RESULTS, VERDICTS
+from analysis.replication.rules import MARGIN, NO_RESULTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import INCONCLUSIVE, position
 from dess import InputError
@@ -99,12 +99,6 @@ def listed(rows: Iterable[Row]) -> str:
         for row in rows
     ]
     return "\n".join(lines)
-
-
-def counted(rows: Iterable[Row]) -> str:
-    """How many claims have each verdict on one policy, as ``holds: 3; inconclusive: 1``."""
-    verdicts = [row.findings[0].verdict for row in rows]
-    return "; ".join(f"{v}: {verdicts.count(v)}" for v in VERDICTS if v in verdicts)
 
 
 def margin(studies: Mapping[str, Results]) -> float:

@@ -3,12 +3,11 @@
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import METRICS, PRODUCT, parameter, value_text
+from analysis.names import METRICS, parameter, value_text
 from analysis.questions import summary
 from analysis.questions.printed import with_mark
 from analysis.replication import paper
 from analysis.results.tables import Results
-from analysis.stats.verdict import position
 
 
 def setting(results: Results, point: int) -> dict[str, str]:
@@ -31,21 +30,6 @@ def table(results: Results) -> pd.DataFrame:
         effort = {"Missions": f"{row.missions:,}", "Settings left": str(row.left)}
         rows.append({"Policy": row.policy, **setting(results, row.point), **means, **effort})
     return pd.DataFrame(rows)
-
-
-def best_in_words(results: Results) -> str:
-    """The best policy at its best setting, beside the paper; empty without missions to check."""
-    checks = summary.checks(results)
-    checks = checks[checks["metric"] == PRODUCT]
-    if checks.empty:
-        return ""
-    best, printed = checks.loc[checks["mean"].idxmax()], paper.SWEET_SPOT[PRODUCT]
-    chosen = [f"{name} {value}" for name, value in setting(results, best["point"]).items()]
-    return (
-        f"The best at its best setting is **{best['policy']}**, with {numbers.words(chosen)}: "
-        f"{numbers.estimate(best)} in collection ratio and communication; against the paper's "
-        f"{numbers.percent(printed)}: {position(best, printed)}."
-    )
 
 
 def guarantees(results: Results) -> str:

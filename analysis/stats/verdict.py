@@ -13,6 +13,7 @@ from typing import Protocol
 from analysis.stats.intervals import LEVEL
 
 ABOVE, INCONCLUSIVE, BELOW = POSITIONS = ("above", "inconclusive", "below")
+MARKS = {ABOVE: "▲", INCONCLUSIVE: "≈", BELOW: "▼"}  # in tables
 HOLDS, IN_PART, REFUTED = "holds", "holds in part", "does not hold"
 
 Part = bool | None

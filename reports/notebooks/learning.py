@@ -75,11 +75,8 @@ by_metric = dict(zip(metrics, (rules.throughout, rules.passes), strict=True))
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 html.say(
     "**The rules here**, with Welch's t over the trainings:\n\n"
-    "- of the reward: {rules[0]}\n- of collection ratio and communication: {rules[1]}\n\n"
-    "By these rules the claim {counts} of {n} comparisons.",
+    "- of the reward: {rules[0]}\n- of collection ratio and communication: {rules[1]}",
     rules=[rule.in_words(rules.MARGIN) for rule in by_metric.values()],
-    counts=learning.counts_in_words(verdicts.values()),
-    n=len(verdicts),
 )
 
 # %%
@@ -93,12 +90,10 @@ html.table(
 best = last.groupby("variant")[final].max().map(numbers.percent)
 html.say(
     "The trainings here have {steps:,} steps. The paper sees its crossing at {paper:,}: by the "
-    "rules shorter ones are inconclusive. As far as these go, {open_ends}. With {name}, the best "
-    "training with transfer reaches {ends[0]}, the best without {ends[1]} in collection ratio and "
-    "communication.",
+    "rules shorter ones are inconclusive. With {name}, the best training with transfer reaches "
+    "{ends[0]}, the best without {ends[1]} in collection ratio and communication.",
     steps=last["updates"].max(),
     paper=paper.CROSSING,
-    open_ends=learning.open_ends_in_words(transfers.values()),
     name=[*pairs][-1],
     ends=[best[variant] for variant in pairs[[*pairs][-1]]],
 )
@@ -132,22 +127,13 @@ html.table(
     ablation.ablation_table(table, last, baseline),
     "Means over n trainings with 95 % intervals; none of one training, or where all are the same. "
     f"Differences: Welch's t; of a single training, Student's t with the spread of {baseline}, so "
-    f"the interval holds 0 if one more training of {baseline} might have come out like that",
+    f"the interval holds 0 if one more training of {baseline} might have come out like that. "
+    "▲ the whole interval is above 0: better; ▼ below it: worse; ≈ around it: inconclusive",
 )
 
-# %%
-html.say(
-    "Against {baseline}, by the whole interval, each for itself:\n\n{positions}\n\n"
-    "Of {n} such intervals some miss by chance. Corrected for their number (Holm), what is left "
-    "to differ is: {significant}. {once} of {all} variants were trained once: of these only large "
-    "differences show.",
-    baseline=baseline,
-    positions=ablation.positions_in_words(table),
-    n=len(table) - 1,
-    significant=ablation.significant_in_words(table),
-    once=(table["n"] == 1).sum(),
-    all=len(table),
-)
+# %% [markdown]
+# Of so many intervals some miss by chance; the p-values are corrected for their number (Holm). Of
+# a variant that was trained once only large differences show.
 
 # %% [markdown]
 # ## The policies that are shipped

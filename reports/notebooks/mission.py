@@ -135,9 +135,6 @@ for mission in shown:
 # ## What one sees
 
 # %%
-html.say("{growth}", growth=missions.growth_in_words(fig4, shown, printed))
-
-# %%
 html.table(missions.outcome_table(shown), "The three missions; data in data units")
 
 # %% [markdown]

@@ -65,7 +65,8 @@ html.gallery(
         (
             figures.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
-            main_effects.caption(effects, field, pairs),
+            f"n = {effects.loc[effects['field'] == field, 'n'].min():,} missions per point, bars are "
+            f"{level} intervals.",
         )
         for field, pairs in changes.items()
     ]
@@ -79,10 +80,14 @@ html.gallery(
 # *falls* if all go down, *stays level* if none differ; *rises, then falls* if nothing before a
 # value falls and nothing behind it rises.
 #
-# Collection ratio and communication, from the first value to the last:
+# A value that is the highest may be one of several that do not differ. The largest difference is
+# that of any two values.
 
 # %%
-html.say("{changes}", changes=main_effects.listed(effects, changes))
+html.table(
+    main_effects.listed(effects, changes),
+    f"Collection ratio and communication; differences in percentage points, with {level} intervals",
+)
 
 # %% [markdown]
 # ### What the paper sees
@@ -94,19 +99,9 @@ rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
 html.say(
     "The claims of the paper on its Fig. 5, and their verdicts for {leading}, by the rules of the "
     "replication scorecard. One is inconclusive where the missions are too few for either "
-    "answer.\n\n{claims}",
+    "answer. They overlap, so their number is no score.\n\n{claims}",
     leading=leading,
     claims=scorecard.listed(rows),
-)
-
-# %%
-html.say(
-    "So for {leading}, of {n} claims, {verdicts}. They overlap, so their number is no score. By "
-    "the largest difference between two values, the parameters rank: {parameters}.",
-    leading=leading,
-    n=len(rows),
-    verdicts=scorecard.counted(rows),
-    parameters=numbers.words(main_effects.by_size(changes, leading)),
 )
 
 # %% [markdown]
@@ -150,9 +145,7 @@ html.table(
 
 # %%
 html.say(
-    "{best}\n\nWhat is known of the selections:\n\n{guarantees}",
-    best=sweet_spot.best_in_words(sweet),
-    guarantees=sweet_spot.guarantees(sweet),
+    "What is known of the selections:\n\n{guarantees}", guarantees=sweet_spot.guarantees(sweet)
 )
 
 # %% [markdown]
@@ -170,25 +163,23 @@ html.say(
 # %%
 indices = summary.sensitivities(sobol)
 of_product = indices[indices["metric"] == names.PRODUCT].dropna()
-groups = of_product.groupby("policy", sort=False)
+caption = (
+    f"Collection ratio and communication of {{}}. n = {indices['n'].min():,} missions; lines: "
+    f"{level} intervals by bootstrap. Estimates are not cut: that of a small share may be "
+    "negative, an interval may go beyond 100 %. Below the dotted line: noise."
+)
 html.gallery(
     [
-        (figures.sensitivity(rows, p), f"Sobol indices of {p}", sensitivity.caption(rows))
-        for p, rows in groups
+        (figures.sensitivity(rows, policy), f"Sobol indices of {policy}", caption.format(policy))
+        for policy, rows in of_product.groupby("policy", sort=False)
     ]
-)
-
-# %%
-html.say(
-    "{policies}\n\n{without_shares}",
-    policies="\n".join(f"- {sensitivity.in_words(rows)}" for _, rows in groups),
-    without_shares=sensitivity.without_shares(indices),
 )
 
 # %%
 html.table(
     sensitivity.index_table(indices),
-    f"Sobol indices as shares of the variance, with {level} intervals",
+    f"Sobol indices as shares of the variance, with {level} intervals. A metric that is the same "
+    "in all missions of both base samples has no variance to take shares of, and no row",
 )
 
 # %% [markdown]

@@ -69,11 +69,10 @@ best = best_policy(table4.missions)
 rows = overall[overall["policy"] == best].set_index("metric")[["mean", "low", "high"]]
 html.say(
     "The best policy by collection ratio and communication is **{best}**: {product}, with success "
-    "{success}. Against the paper's figures, by the whole interval:\n\n{positions}",
+    "{success}.",
     best=best,
     product=numbers.interval(*rows.loc[PRODUCT]),
     success=numbers.interval(*rows.loc[SUCCESS]),
-    positions=printed.positions_in_words(overall, paper.TABLE_IV),
 )
 
 # %%

@@ -16,11 +16,9 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import LEVEL, Interval, mean_interval
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from analysis.stats.verdict import MARKS, position
 
 _UNKNOWN = Interval(np.nan, np.nan, np.nan)
-_WORDS = {BELOW: "worse", ABOVE: "better", INCONCLUSIVE: INCONCLUSIVE}
-
 
 BASELINE = "quick"  # the variant that the others of the shipped curves are compared with
 
@@ -107,28 +105,6 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
     return pd.DataFrame(columns)
 
 
-def positions_in_words(table: pd.DataFrame) -> str:
-    """A Markdown list of the variants that are worse, better and inconclusive by the interval."""
-    variants: dict[str, list[str]] = {word: [] for word in _WORDS.values()}
-    for row in _compared(table).itertuples():
-        gap = Interval(row.difference, row.difference_low, row.difference_high)
-        variants[_WORDS[position(gap)]].append(row.variant)
-    return "\n".join(
-        f"- **{word}**: {'; '.join(names)}" for word, names in variants.items() if names
-    )
-
-
-def significant_in_words(table: pd.DataFrame, level: float = LEVEL) -> str:
-    """The variants that differ from the baseline by the corrected p-values, or ``nothing``."""
-    significant = table[table["p_adjusted"] <= 1 - level]["variant"]
-    return f"**{'; '.join(significant)}**" if len(significant) else "nothing"
-
-
-def _compared(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of variants other than the baseline."""
-    return table[table["p"].notna()]
-
-
 def _mean(row: Any) -> str:
     if row.low < row.high:
         return numbers.interval(row.mean, row.low, row.high)
@@ -138,4 +114,5 @@ def _mean(row: Any) -> str:
 def _gap(row: Any) -> str:
     if np.isnan(row.p):
         return ""
-    return numbers.points(row.difference, row.difference_low, row.difference_high)
+    gap = Interval(row.difference, row.difference_low, row.difference_high)
+    return f"{numbers.points(*gap)} {MARKS[position(gap)]}"

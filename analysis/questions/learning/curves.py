@@ -11,7 +11,7 @@ itself), the evaluated metrics, and the ``final_...`` metrics of the weights tha
     transfer(averages, "quick", "no transfer", shortest=800_000)
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +60,14 @@ class Transfer:
     length: int
     trainings: tuple[int, int]
 
+    @property
+    def course(self) -> str:
+        """Where the mean curve with transfer is above, in words."""
+        if self.since is None:
+            return "ends below, or level"
+        where = "in all of phase II" if self.throughout else f"from step {self.since:,} on"
+        return f"is above {where}"
+
 
 def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
     """The exponential moving average of every training, begun anew in every phase.
@@ -102,6 +110,13 @@ def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:
     return {name: pair for name, pair in PAIRS.items() if {*pair} <= variants}
 
 
+def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
+    """(steps, trainings) averages of a variant in its last phase, at the steps of all trainings."""
+    curves = averages[averages["variant"] == variant]
+    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
+    return curves.pivot(index="updates", columns="seed", values="value").dropna()
+
+
 def transfer(
     averages: pd.DataFrame, using: str, without: str, shortest: int, level: float = BAND
 ) -> Transfer:
@@ -116,7 +131,7 @@ def transfer(
         shortest: Trainings of fewer steps are inconclusive.
         level: Confidence level of the last difference.
     """
-    a, b = (_last_phase(averages, variant) for variant in (using, without))
+    a, b = (last_phase(averages, variant) for variant in (using, without))
     steps = a.index.intersection(b.index)
     lead = a.loc[steps].mean(axis=1) - b.loc[steps].mean(axis=1)
     behind = np.flatnonzero(lead <= 0)
@@ -140,21 +155,10 @@ def transfers(
     }
 
 
-def settled(curve: pd.DataFrame, metric: str, margin: float) -> pd.Series:
-    """The first evaluation of the last phase from which on the average stays near its last value.
-
-    Args:
-        curve: The curve of one training.
-        metric: What is averaged, as by ``smoothed``.
-        margin: How near.
-
-    Returns:
-        The row of the curve.
-    """
-    last_phase = curve[curve["phase"] == curve["phase"].iloc[-1]]
-    averages = _average(last_phase[metric])
+def settled(averages: pd.Series, margin: float) -> int:
+    """The position from which on averages stay within a margin of the last one."""
     far = np.flatnonzero((averages - averages.iloc[-1]).abs() > margin)
-    return last_phase.iloc[far[-1] + 1 if len(far) else 0]
+    return int(far[-1]) + 1 if len(far) else 0
 
 
 def transfer_table(
@@ -172,36 +176,13 @@ def transfer_table(
             f"{compared.trainings[0]} and {compared.trainings[1]}",
             "Reward" if metric == REWARD else "Product",
             verdicts[name, metric],
-            _where_above(compared),
+            compared.course,
             _last_difference(compared, metric),
         )
         for (name, metric), compared in transfers.items()
     ]
     head = ["Trainings with", "n", "Metric", "Verdict", "With transfer, the mean curve"]
     return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
-
-
-def counts_in_words(verdicts: Collection[str]) -> str:
-    """How often each verdict is given, in order of appearance: ``**holds** in 2 and ...``."""
-    counts = {verdict: [*verdicts].count(verdict) for verdict in verdicts}
-    return numbers.words([f"**{verdict}** in {count}" for verdict, count in counts.items()])
-
-
-def open_ends_in_words(transfers: Collection[Transfer]) -> str:
-    """In how many comparisons the interval of the last difference holds 0."""
-    unclear = [t.last for t in transfers if t.last.low <= 0 <= t.last.high]
-    alike = sum(last.low == last.high for last in unclear)
-    text = f"the interval of the last difference holds 0 in {len(unclear)} of {len(transfers)}"
-    same = f"; in {alike} of these all trainings end alike" if alike else ""
-    return f"{text} comparisons{same}"
-
-
-def _where_above(compared: Transfer) -> str:
-    if compared.since is None:
-        return "ends below, or level"
-    if compared.throughout:
-        return "is above in all of phase II"
-    return f"is above from step {compared.since:,} on"
 
 
 def _last_difference(compared: Transfer, metric: str) -> str:
@@ -218,10 +199,3 @@ def _last_difference(compared: Transfer, metric: str) -> str:
 
 def _average(values: pd.Series) -> pd.Series:
     return values.ewm(alpha=ALPHA, adjust=False).mean()
-
-
-def _last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """(steps, trainings) averages of a variant in its last phase."""
-    curves = averages[averages["variant"] == variant]
-    curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
-    return curves.pivot(index="updates", columns="seed", values="value").dropna()

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from analysis import numbers
-from analysis.questions.learning.curves import PRODUCT, settled, smoothed
+from analysis.questions.learning.curves import PRODUCT, last_phase, settled, smoothed
 from policies.ddqn.config import TrainingConfig, config_of, learner_of
 
 
@@ -54,10 +54,10 @@ def curves_of(trainings: Iterable[Trained], variant: str) -> pd.DataFrame:
 def course_in_words(policy: Trained, margin: float) -> str:
     """Where a training ends, and since when it has stayed within a margin: a Markdown item."""
     end = policy.curve.iloc[-1]
-    near = settled(policy.curve, PRODUCT, margin)
-    average = smoothed(curves_of([policy], policy.name), PRODUCT)["value"].iloc[-1]
+    averages = last_phase(smoothed(curves_of([policy], ""), PRODUCT), "")[policy.config.seed]
+    near = policy.curve.iloc[settled(averages, margin) - len(averages)]
     return (
-        f"- **{policy.name}** ends at {numbers.percent(average)} after {end['updates']:,} updates, "
+        f"- **{policy.name}** ends at {numbers.percent(averages.iloc[-1])} after {end['updates']:,} updates, "
         f"{end['uav_slots'] / 1e6:.1f} million UAV-slots and {end['seconds'] / 60:.0f} minutes. "
         f"From update {near['updates']:,} on ({near['seconds'] / 60:.0f} minutes) it stays within "
         f"{numbers.margin(margin)} of that: the other "

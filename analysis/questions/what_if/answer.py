@@ -19,7 +19,7 @@ from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, sett
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import compare
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 
 # Means per mission beside the paper's metrics.
 MEASURES = {
@@ -36,7 +36,6 @@ MEASURES = {
 POWER = 0.8
 
 _SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product"}
-_MARKS = {ABOVE: "▲", BELOW: "▼", INCONCLUSIVE: "≈"}
 _MISSION = ["policy", "point", "replication"]
 
 
@@ -196,7 +195,7 @@ def listed(table: pd.DataFrame, policy: str) -> pd.DataFrame:
     for row in table[table["policy"] == policy].itertuples():
         write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
         sides = [write(row.before), write(row.after)]
-        name, mark = (_SHORT | MEASURES)[row.metric], _MARKS[verdict(row)]
+        name, mark = (_SHORT | MEASURES)[row.metric], MARKS[verdict(row)]
         lines.append([name, *sides, f"{mark} {change(row)}{unit}"])
     heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
     return pd.DataFrame(lines, columns=heads)

@@ -126,35 +126,29 @@ def effects_of(means, field="uavs", policy="mine"):
     return pd.DataFrame(rows, columns=columns)
 
 
-def test_a_rise_is_told_by_its_ends():
-    table, pairs = effects_of([0.1, 0.3, 0.4]), pairs_of([0.2, 0.1])
-    text = main_effects.in_words(table, pairs, "mine", "uavs")
-    assert text == "mine **rises**: 10.0 % at 1, 40.0 % at 3, +30.0 [+29.9, +30.1] points"
+def test_the_table_has_a_row_per_parameter_and_policy():
+    policies = {"mine": [0.1, 0.2, 0.1], "other": [0.1, 0.3, 0.4]}
+    effects = pd.concat(effects_of(means, policy=policy) for policy, means in policies.items())
+    changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
+    table = main_effects.listed(effects, changes).set_index("Policy")
+    assert table.loc["other"].tolist() == [
+        "Number of UAVs",
+        RISES,
+        "10.0 % at 1",
+        "40.0 % at 3",
+        "+30.0 [+29.9, +30.1]",
+        "",
+        "30.0",
+    ]
+    assert table.loc["mine", "Highest at"] == "2"
+    assert table.loc["mine", "Last − first"] == "0.0 [−0.1, +0.1]"
 
 
-@pytest.mark.parametrize(("steps", "top"), [((0.2, -0.1), "2"), ((0.2, 0, -0.1), "2 and 3 or so")])
-def test_a_peak_is_told_by_where_it_may_be(steps, top):
+@pytest.mark.parametrize(("steps", "top"), [((0.2, -0.1), "2"), ((0.2, 0, -0.1), "2 or 3")])
+def test_the_table_says_where_a_peak_may_be(steps, top):
     means = np.cumsum([0.1, *steps])
-    text = main_effects.in_words(effects_of(means), pairs_of([*steps]), "mine", "uavs")
-    assert text.endswith(f" points, highest at {top}")
-
-
-def test_a_list_has_a_line_per_parameter_and_policy():
-    table = pd.concat([effects_of([0.1, 0.2], policy=policy) for policy in ("mine", "other")])
-    changes = {"uavs": {"mine": pairs_of([0.1]), "other": pairs_of([0.0])}}
-    lines = main_effects.listed(table, changes).splitlines()
-    assert lines[0] == "- **Number of UAVs**"
-    assert lines[1].startswith("    - mine **rises**")
-    assert lines[2].startswith("    - other **stays level**")
-    assert "mine rises; other stays level. n = 300 " in main_effects.caption(
-        table, "uavs", changes["uavs"]
-    )
-
-
-def test_parameters_are_ranked_by_their_largest_difference():
-    changes = {"uavs": {"mine": pairs_of([0.1, -0.3])}, "quota": {"mine": pairs_of([0.2, 0.2])}}
-    ranked = main_effects.by_size(changes, "mine")
-    assert ranked == ["quota (40.0 points)", "number of UAVs (30.0 points)"]
+    table = main_effects.listed(effects_of(means), {"uavs": {"mine": pairs_of([*steps])}})
+    assert table.loc[0, ["Along the values", "Highest at"]].tolist() == [PEAK, top]
 
 
 def test_a_parameter_with_one_value_has_no_changes(tmp_path):

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from analysis import run_study
@@ -138,14 +137,3 @@ def test_means_are_of_a_policy_at_a_point_or_at_all(results: Results) -> None:
     assert at_point["n"] == 6
     everywhere = missions.estimate(results, "greedy")
     assert everywhere["mean"] == pytest.approx(np.mean(greedy[PRODUCT]))
-
-
-def test_the_sentence_on_fleets_names_both_ends(
-    results: Results, shown: list[missions.LoggedMission]
-) -> None:
-    text = missions.growth_in_words(results, shown, [0.5, 0.9])
-    assert text.startswith("From 1 to 3 UAVs, the collection ratio goes from ")
-    means = results.missions.query("policy == 'greedy'").groupby("point")[RATIO].mean()
-    rows = pd.Series([shown[0].row[RATIO], shown[1].row[RATIO], *means, 0.5, 0.9])
-    for ratio in rows:
-        assert f"{100 * ratio:.1f} %" in text

@@ -33,10 +33,3 @@ def test_a_column_per_metric_and_number_of_uavs(estimates: pd.DataFrame) -> None
     table = printed.beside_by_fleet(both, {1: PRINTED, 2: {"success": 0.5, "collection_ratio": 1}})
     assert [fleet for _, fleet in table.columns[1:]] == ["I = 1", "I = 2"] * 2
     assert table.iloc[:, 2].tolist() == ["50.0 %", "95.0 % [94.0, 96.0] ▲", "90.0 % [85.0, 92.0] ▲"]
-
-
-def test_policies_are_listed_by_where_their_intervals_lie(estimates: pd.DataFrame) -> None:
-    assert printed.positions_in_words(estimates, PRINTED).split("\n") == [
-        "- **Successful communication** (paper 93.0 %), above: tour; below: greedy.",
-        "- **Collection ratio** (paper 70.0 %), above: greedy; inconclusive: tour.",
-    ]

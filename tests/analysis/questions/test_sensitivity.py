@@ -7,10 +7,8 @@ from scipy.stats import norm
 
 from analysis.questions.sensitivity import (
     METRICS,
-    in_words,
     index_table,
     sensitivity,
-    without_shares,
 )
 from analysis.study.design import NOISE, Saltelli
 from dess import InputError
@@ -199,21 +197,9 @@ def shares(*rows):
     return table
 
 
-def test_words_name_the_largest_share_and_the_small_ones():
-    table = shares(("uavs", 0.5, 0.7), ("charge_start", 0.01, 0.029), ("quota", 0.0, 0.031),
-                   (NOISE, 0.1, 0.2))  # fmt: skip
-    text = in_words(table)
-    assert "**mine**: Number of UAVs matters most, alone 50.0 % [48.0, 52.0]" in text
-    assert "The noise leaves 20.0 % [18.0, 22.0]" in text
-    assert "Less than 5.0 % of it has to do with charging start capacity C_S, by" in text
-    assert "Less than" not in in_words(table[table["parameter"] != "charge_start"])
-
-
-def test_metrics_without_variance_have_a_sentence_and_no_row():
+def test_metrics_without_variance_have_no_row():
     table = shares(("uavs", np.nan, np.nan), (NOISE, np.nan, np.nan))
     known = shares(("uavs", 0.5, 0.7), (NOISE, 0.1, 0.2)).assign(metric="collection_ratio")
     both = pd.concat([table, known])
-    assert "There are no shares of successful communication of mine: " in without_shares(both)
-    assert without_shares(known) == ""
     assert index_table(both)["Metric"].tolist() == ["Collection ratio"] * 2
     assert index_table(both)["Parameter"].tolist() == ["Number of UAVs", "noise"]

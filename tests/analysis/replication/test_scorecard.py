@@ -346,7 +346,7 @@ def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
         == HOLDS
     )
     assert passes.findings[0].quantities[0].value == pytest.approx(0.4)
-    assert higher.findings[0].note == "trainings quick and no transfer: above at every step"
+    assert higher.findings[0].note == "trainings quick and no transfer: is above in all of phase II"
 
 
 def test_learning_that_fails_is_told() -> None:

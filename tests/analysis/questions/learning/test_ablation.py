@@ -4,16 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
-from tests.analysis.questions.test_learning import several
 
 from analysis.questions.learning.ablation import (
     ablation,
     ablation_table,
     difference,
     finals,
-    positions_in_words,
-    significant_in_words,
 )
+from tests.analysis.questions.learning.test_curves import several
 
 
 def test_the_difference_of_means_is_welchs():
@@ -78,11 +76,5 @@ def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
     assert rows.loc["base"].tolist() == [3, "72.0 % [67.0, 77.0]", "", "", "100.0 %", "82.0 %"]
     assert rows.loc["once", "Collection ratio and communication"] == "73.0 %"
     assert rows.loc["worse", "To base [points]"].startswith("−61.0 [")
+    assert [cell[-1:] for cell in rows["To base [points]"]] == ["≈", "", "▼"]
     assert rows.loc["worse", "p (Holm)"] == "< 0.001"
-
-
-def test_variants_are_listed_by_where_their_intervals_lie(last: pd.DataFrame) -> None:
-    table = ablation(last, "final_collection_ratio_and_communication", "base")
-    assert positions_in_words(table) == "- **worse**: worse\n- **inconclusive**: once"
-    assert significant_in_words(table) == "**worse**"
-    assert significant_in_words(table[table["variant"] == "once"]) == "nothing"

@@ -45,7 +45,7 @@ def test_averages_of_trainings_do_not_mix():
     alone = [learning.smoothed(table, METRIC)["value"].tolist() for table in (one, two)]
     mixed = pd.concat([one, two]).sort_values("updates", ignore_index=True)
     table = learning.smoothed(mixed, METRIC)
-    assert [own["value"].tolist() for _, own in table.groupby("seed")] == alone
+    assert [part["value"].tolist() for _, part in table.groupby("seed")] == alone
 
 
 @pytest.mark.parametrize("n", [2, 3, 5])
@@ -99,10 +99,8 @@ def test_transfer_is_judged_in_the_last_phase_alone():
 
 
 def test_a_curve_has_settled_where_it_stays_near_its_end():
-    curve = training("one", 1, [0.5, 0.2, 0.9, 0.9], before=1)
-    assert learning.settled(curve, METRIC, 1.0)["updates"] == STEPS[1]
-    assert learning.settled(curve, METRIC, 0.2)["updates"] == STEPS[2]
-    assert learning.settled(curve, METRIC, 0.0)["updates"] == STEPS[3]
+    averages = pd.Series([0.2, 0.55, 0.725])
+    assert [learning.settled(averages, margin) for margin in (1.0, 0.2, 0.0)] == [0, 1, 2]
 
 
 def described(using, without, metric=learning.REWARD):
@@ -125,25 +123,6 @@ def test_the_product_is_in_points_and_equal_ends_are_named():
     row = described([0.5, 0.5], [0.5, 0.5], learning.PRODUCT)
     assert row["Difference at the end"] == "0.0, the same in all trainings"
     assert row["With transfer, the mean curve"] == "ends below, or level"
-
-
-def test_verdicts_are_counted_in_order_of_appearance():
-    words = learning.counts_in_words([INCONCLUSIVE, HOLDS, INCONCLUSIVE])
-    assert words == "**inconclusive** in 2 and **holds** in 1"
-
-
-def test_open_ends_are_counted():
-    ends = [[5.0, 5.1, 5.2], [9.0, 9.1, 9.2], [5.0, 5.1, 5.3], [5.0, 5.0, 5.0]]
-    base = [5.0, 5.1, 5.2]
-    transfers = [compared(values, base) for values in ends[:3]]
-    assert learning.open_ends_in_words(transfers) == (
-        "the interval of the last difference holds 0 in 2 of 3 comparisons"
-    )
-    transfers = [compared(ends[3], ends[3]), compared(ends[1], base)]
-    assert learning.open_ends_in_words(transfers) == (
-        "the interval of the last difference holds 0 in 1 of 2 comparisons; in 1 of these all "
-        "trainings end alike"
-    )
 
 
 def test_pairs_need_trainings_of_both_variants():
