@@ -15,6 +15,7 @@ from scipy import stats
 from analysis import numbers
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.questions import summary
+from analysis.questions.missions import estimate
 from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, settings_of
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
@@ -88,29 +89,26 @@ def verdict(answer: Any) -> str:
     return position(answer) if known else INCONCLUSIVE
 
 
-def missions_needed(answer: Any, power: float = POWER) -> float:
+def missions_needed(answer: Any) -> float:
     """How many missions show a difference of the size that a row of ``answers`` has.
 
     By the normal approximation, with the spread that was seen: both are estimates themselves.
 
-    Args:
-        answer: The row.
-        power: Probability that the interval of that many missions leaves out 0.
-
     Returns:
-        The number; infinite if there is no difference, or its spread is unknown.
+        The number whose interval leaves out 0 with probability ``POWER``; infinite if there is no
+        difference, or its spread is unknown.
     """
     if not answer.difference or answer.low == answer.high:
         return np.inf
     quantile = stats.norm.isf((1 - LEVEL) / 2)
     half = (answer.high - answer.low) / 2 / abs(answer.difference)
-    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(power) / quantile)) ** 2))
+    return float(np.ceil(answer.n * (half * (1 + stats.norm.ppf(POWER) / quantile)) ** 2))
 
 
-def differences(results: Results, policy: str, metric: str = PRODUCT) -> pd.Series:
-    """Variation - baseline of a metric of a policy, by replication."""
+def differences(results: Results, policy: str) -> pd.Series:
+    """Variation - baseline in collection ratio and communication of a policy, by replication."""
     missions = results.missions[results.missions["policy"] == policy]
-    sides = missions.pivot(index="replication", columns="point", values=metric)
+    sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
     return sides[VARIATION] - sides[BASELINE]
 
 
@@ -169,10 +167,8 @@ def _missing(answer: Any) -> str:
 
 def best_of_side(results: Results, point: int) -> str:
     """The best policy of a side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
-    policy, table = best_policy(results, point), means(results)
-    side = table[(table["point"] == point) & (table["metric"] == PRODUCT)]
-    mean = side.set_index("policy").loc[policy, ["mean", "low", "high"]]
-    return f"{policy}, {numbers.interval(*mean)}"
+    policy = best_policy(results, point)
+    return f"{policy}, {numbers.estimate(estimate(results, policy, point=point))}"
 
 
 def winners(changes: Mapping[str, pd.Series]) -> str:

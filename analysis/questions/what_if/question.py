@@ -13,7 +13,7 @@ import json
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 import tomli_w
@@ -34,15 +34,6 @@ BASELINE, VARIATION = 0, 1  # the design points
 SIDES = ("baseline", "variation")
 
 _RANGES = (*SAMPLED, "initial_data")  # fields that hold [low, high]
-
-
-class Change(NamedTuple):
-    """A field that the variation changes, with its values in words."""
-
-    field: str
-    meaning: str
-    before: str
-    after: str
 
 
 def question(
@@ -133,56 +124,27 @@ def ask(study: Study, folder: str | Path, workers: int = 1) -> Results:
     return run_study(study, Path(folder) / NAME / key_of(study), workers)
 
 
-def changes(results: Results) -> list[Change]:
-    """What the variation changes, in the order of the settings."""
+def fields(results: Results, names: Iterable[str]) -> pd.DataFrame:
+    """Fields of the scenario in the baseline and in the variation, as a table to print."""
     before, after = (results.scenario(point) for point in (BASELINE, VARIATION))
-    return [
-        Change(field, _meaning(field), in_words(before, field), in_words(after, field))
-        for field in results.store.manifest.points[VARIATION].values
-    ]
+    rows = [(name, _meaning(name), in_words(before, name), in_words(after, name)) for name in names]
+    return pd.DataFrame(rows, columns=["Field", "Meaning", "Baseline", "Variation"])
 
 
 def listed(results: Results) -> pd.DataFrame:
-    """``changes`` as a table to print."""
-    return pd.DataFrame(changes(results)).set_axis(
-        ["Field", "Meaning", "Baseline", "Variation"], axis="columns"
-    )
+    """The fields that the variation changes, that both sides set and that every mission draws."""
+    manifest, space = results.store.manifest, results.scenario(BASELINE)
+    changed, shared = manifest.points[VARIATION].values, manifest.study["set"]
+    ranges = {name: getattr(space, name) for name in _RANGES}
+    drawn = [name for name, (low, high) in ranges.items() if low < high]
+    return fields(results, dict.fromkeys([*changed, *shared, *drawn]))
 
 
 def settings_of(results: Results) -> tuple[list[str], list[str]]:
     """The changed fields with their values in the baseline and in the variation: ``uavs 3``."""
-    listed = changes(results)
-    before = [f"{change.field} {change.before}" for change in listed]
-    return before, [f"{change.field} {change.after}" for change in listed]
-
-
-def asked(results: Results) -> str:
-    """What a question asks: what is changed, what is set in both sides, and what is drawn."""
-    changed = [f"`{c.field}` = {c.after} instead of {c.before}" for c in changes(results)]
-    sentences = {"Set in both": shared(results), "Drawn by every mission": drawn(results)}
-    rest = [
-        f"{text}: {numbers.words([f'`{field}` {value}' for field, value in fields.items()])}."
-        for text, fields in sentences.items()
-        if fields
-    ]
-    scenario = results.store.manifest.study["scenario"]
-    return " ".join(
-        [f"What if a mission had {numbers.words(changed)}?\n\nScenario: **{scenario}**.", *rest]
-    )
-
-
-def drawn(results: Results) -> dict[str, str]:
-    """The fields that every mission draws for itself, in baseline and variation alike."""
-    changed = results.store.manifest.points[VARIATION].values
-    space = results.scenario(BASELINE)
-    ranges = {field: getattr(space, field) for field in _RANGES if field not in changed}
-    return {field: in_words(space, field) for field, (low, high) in ranges.items() if low < high}
-
-
-def shared(results: Results) -> dict[str, str]:
-    """The fields that are set in baseline and variation alike."""
-    space = results.scenario(BASELINE)
-    return {field: in_words(space, field) for field in results.store.manifest.study["set"]}
+    table = fields(results, results.store.manifest.points[VARIATION].values)
+    before, after = (table["Field"] + " " + table[side] for side in ("Baseline", "Variation"))
+    return [*before], [*after]
 
 
 def in_words(space: ScenarioSpace, field: str) -> str:
