@@ -23,7 +23,7 @@ from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.intervals import wilson
 from analysis.stats.paired import compare
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_by_test
 from dess import InputError
 
 AHEAD, BEHIND = "ahead", "behind"
@@ -162,40 +162,18 @@ def verdict(difference: float, p_adjusted: float) -> str:
     return _VERDICTS[position_by_test(difference, p_adjusted)]
 
 
-def standing(name: str, comparison: pd.DataFrame) -> str:
-    """How a policy or a learner compares with its baseline in every metric, in a sentence.
+def pairing(comparison: pd.DataFrame) -> str:
+    """How many times as many missions it would take without common ones, for as narrow intervals.
 
     Args:
-        name: The name of the policy or learner.
-        comparison: A row per metric, as of ``stats.paired.compare``.
+        comparison: Rows of ``overall``.
     """
-    metrics: dict[str, list[str]] = {AHEAD: [], BEHIND: [], INCONCLUSIVE: []}
-    for row in comparison.itertuples():
-        text = f"{METRICS[row.metric].lower()} ({_points(row)} points)"
-        metrics[verdict(row.difference, row.p_adjusted)].append(text)
-    parts = [f"{which} in {numbers.words(texts)}" for which, texts in metrics.items() if texts]
-    return f"**{name}** against {comparison['baseline'].iloc[0]}: {'; '.join(parts)}."
-
-
-def standings(learners: pd.DataFrame) -> str:
-    """How every learner of ``learners_against_baseline`` compares, as a list in Markdown."""
-    groups = learners.groupby("learner", sort=False)
-    return "\n".join(f"- {standing(str(name), rows)}" for name, rows in groups)
-
-
-def standing_of_pair(missions: pd.DataFrame, pair: Pair) -> str:
-    """How a policy compares with its baseline, and what their common missions are worth."""
-    comparison = overall(missions, pair)
     reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
-    factor = f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
-    return (
-        f"{standing(pair.policy, comparison)} With missions of its own for each policy, it would "
-        f"take {factor} for intervals as narrow."
-    )
+    return f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
 
 
 def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
-    """Comparisons as a table to print: differences and p-values, a row per policy.
+    """Comparisons as a table to print: marked differences and p-values, a row per policy.
 
     Args:
         comparisons: A row per policy and metric, as of ``stats.paired.compare``.
@@ -205,7 +183,9 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
     for policy, rows in comparisons.groupby(name, sort=False) if len(comparisons) else ():
         line = {("", "Difference"): f"{policy} − {rows['baseline'].iloc[0]}"}
         for row in rows.itertuples():
-            line[METRICS[row.metric], "points"] = _points(row)
+            side = position_by_test(row.difference, row.p_adjusted)
+            points = numbers.points(row.difference, row.low, row.high)
+            line[METRICS[row.metric], "points"] = f"{points} {MARKS[side]}"
             line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
         lines.append(line)
     return numbers.headed(lines)
@@ -291,7 +271,3 @@ def _ranked(results: Results) -> tuple[list[list[str]], list[str]]:
     learned = {policy for trainings in trained for policy in trainings}
     ranked = ranked_policies(results.missions)
     return trained, [policy for policy in ranked if policy not in learned]
-
-
-def _points(row: Any) -> str:
-    return numbers.points(row.difference, row.low, row.high)

@@ -50,25 +50,25 @@ html.say(head_to_head.introduction(study, pair, missions))
 # the same realisation of initial data, arrivals and shadowing for both policies: they are compared
 # mission by mission. Verdicts are by p-values at the 5 % level, after Holm's correction for the
 # number of comparisons and Bonferroni's for the choice of the pair, or of the best policy, by these
-# data. The 95 % intervals are of one difference each.
+# data: ▲ ahead, ▼ behind, ≈ inconclusive. The 95 % intervals are of one difference each.
 
 # %%
 learners = head_to_head.learners_against_baseline(study)
-html.say(head_to_head.standings(learners))
+comparison = head_to_head.overall(missions, pair)
+worth = head_to_head.pairing(comparison)
+display(
+    html.table(
+        head_to_head.by_metric(comparison),
+        f"With missions of its own for each policy, it would take {worth} for intervals as narrow",
+    ),
+    html.table(head_to_head.by_metric(learners, "learner"), "Every learner and the best heuristic"),
+    html.table(head_to_head.by_metric(summary.comparisons(study)), "Every policy and the best one"),
+)
 
 # %% [markdown]
 # Of several trainings, the claim is about the learner, trainings to come included. Of a single one,
 # it is about this checkpoint: another training of the same learner may turn out better or worse.
 # The rest of this page is about one policy: of several trainings the first, whatever came of it.
-
-# %%
-html.say(head_to_head.standing_of_pair(missions, pair))
-
-# %%
-display(
-    html.table(head_to_head.by_metric(learners, "learner"), "Every learner and the best heuristic"),
-    html.table(head_to_head.by_metric(summary.comparisons(study)), "Every policy and the best one"),
-)
 
 # %% [markdown]
 # ### Mission by mission
