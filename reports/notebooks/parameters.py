@@ -160,17 +160,17 @@ html.say(
     ranges=sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"]),
 )
 
+# %% [markdown]
+# The figures are about collection ratio and communication. Estimates are not cut: that of a small
+# share may be negative, an interval may go beyond 100 %. Below the dotted line: noise.
+
 # %%
 indices = summary.sensitivities(sobol)
 of_product = indices[indices["metric"] == names.PRODUCT].dropna()
-caption = (
-    f"Collection ratio and communication of {{}}. n = {indices['n'].min():,} missions; lines: "
-    f"{level} intervals by bootstrap. Estimates are not cut: that of a small share may be "
-    "negative, an interval may go beyond 100 %. Below the dotted line: noise."
-)
+caption = f"n = {indices['n'].min():,} missions; lines: {level} intervals by bootstrap."
 html.gallery(
     [
-        (figures.sensitivity(rows, policy), f"Sobol indices of {policy}", caption.format(policy))
+        (figures.sensitivity(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
         for policy, rows in of_product.groupby("policy", sort=False)
     ]
 )
