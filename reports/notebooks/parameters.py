@@ -65,7 +65,7 @@ html.gallery(
         (
             figures.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
-            f"n = {effects.loc[effects['field'] == field, 'n'].min():,} missions per point, bars are "
+            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per point, bars are "
             f"{level} intervals.",
         )
         for field, pairs in changes.items()
