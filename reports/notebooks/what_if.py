@@ -51,8 +51,9 @@ means, answers = what_if_answer.means(study), what_if_answer.answers(study)
 # %% [markdown]
 # What if a mission had the settings of the variation in place of those of the baseline? The table
 # has the fields of the scenario that the variation changes; then those that are set in both, and
-# those that every mission draws for itself, in both alike. Every policy acts in as many missions of the baseline as of the variation. Replication by
-# replication, all that the variation does not set is equal: initial data, arrivals and shadowing.
+# those that every mission draws for itself, in both alike. Every policy acts in as many missions of
+# the baseline as of the variation. Replication by replication, all that the variation does not set
+# is equal: initial data, arrivals and shadowing.
 
 # %%
 html.table(what_if.listed(study), f"Scenario {scenario}, {missions:,} missions of each policy")
