@@ -47,8 +47,7 @@ means, answers = what_if_answer.means(study), what_if_answer.answers(study)
 
 # %% [markdown]
 # ## The question
-
-# %% [markdown]
+#
 # What if a mission had the settings of the variation in place of those of the baseline? The table
 # has the fields of the scenario that the variation changes; then those that are set in both, and
 # those that every mission draws for itself, in both alike. Every policy acts in as many missions of

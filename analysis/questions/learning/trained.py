@@ -58,7 +58,8 @@ def course_in_words(policy: Trained, margin: float) -> str:
     near = policy.curve.iloc[settled(averages, margin) - len(averages)]
     return (
         f"- **{policy.name}** ends at {numbers.percent(averages.iloc[-1])} after "
-        f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots and {end['seconds'] / 60:.0f} minutes. "
+        f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots "
+        f"and {end['seconds'] / 60:.0f} minutes. "
         f"From update {near['updates']:,} on ({near['seconds'] / 60:.0f} minutes) it stays within "
         f"{numbers.margin(margin)} of that: the other "
         f"{numbers.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
