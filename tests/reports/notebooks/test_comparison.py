@@ -139,7 +139,8 @@ def test_policies_can_be_chosen(results: Path) -> None:
     text = said(results, learned="random", heuristic="nearest")
     assert "random is a policy of the study that has not learned, nearest a policy" in text
     assert "random minus nearest" in text
-    assert re.search(r"random against nearest: behind in collection ratio", text)
+    # success, then collection ratio
+    assert re.search(r"random − nearest [^▲▼≈]*[▲▼≈][^▲▼≈]*▼", text)
     with pytest.raises(InputError, match="learned: 'none' is not in the study; allowed: "):
         said(results, learned="none")
 
