@@ -171,7 +171,8 @@ def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]
         table: The ``effects``.
         changes: ``changes_by_field``.
     """
-    rows = table[table["metric"] == PRODUCT].set_index(["policy", "field", "position"])
+    rows = table[table["metric"] == PRODUCT]
+    rows = rows.set_index(["policy", "field", "position"]).sort_index()
     lines = []
     for field, pairs_of_field in changes.items():
         for policy, pairs in pairs_of_field.items():

@@ -55,7 +55,8 @@ means, answers = what_if_answer.means(study), what_if_answer.answers(study)
 # is equal: initial data, arrivals and shadowing.
 
 # %%
-html.table(what_if.listed(study), f"Scenario {scenario}, {missions:,} missions of each policy")
+name = study.manifest["study"]["scenario"]
+html.table(what_if.listed(study), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %% [markdown]
 # ## The answer
