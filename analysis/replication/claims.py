@@ -9,9 +9,10 @@ from functools import partial
 from typing import NamedTuple
 
 from analysis.names import METRICS, PRODUCT, RATIO, SHARES, SUCCESS, value_text
-from analysis.replication import measures, paper, rules
+from analysis.replication import measures, paper
+from analysis.replication import verdict_rules as rules
 from analysis.replication.measures import Measured, Quantity
-from analysis.replication.rules import Rule
+from analysis.replication.verdict_rules import Rule
 
 TRAININGS = "trainings"  # beside the names of studies, for claims on learning curves
 

@@ -20,7 +20,7 @@ from analysis.replication.evidence_of_policy import (
     MissingError,
     negated,
 )
-from analysis.replication.rules import MARGIN
+from analysis.replication.verdict_rules import MARGIN
 from analysis.stats.intervals import Interval, mean_interval, summary, wilson
 
 Unit = Literal["share", "points", "reward", "steps", "number"]

@@ -19,7 +19,7 @@ from analysis.replication.evidence_of_policy import (
     evidence_of_trainings,
 )
 from analysis.replication.measures import Measured, Quantity
-from analysis.replication.rules import MARGIN, NO_RESULTS
+from analysis.replication.verdict_rules import MARGIN, NO_RESULTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import INCONCLUSIVE, position
 from dess import InputError

@@ -29,7 +29,8 @@ from analysis.names import PRODUCT
 from analysis.questions.learning import ablation
 from analysis.questions.learning import curves as learning
 from analysis.questions.learning import trained as policies
-from analysis.replication import paper, rules
+from analysis.replication import paper
+from analysis.replication import verdict_rules as rules
 from policies.registry import TRAINED
 from reports.pages import html
 

@@ -29,7 +29,7 @@ from analysis.figures.policies import performance
 from analysis.questions import main_effects, sensitivity, summary
 from analysis.replication import paper, scorecard, sweet_spot
 from analysis.replication.claims import FIG_5
-from analysis.replication.rules import NO_RESULTS
+from analysis.replication.verdict_rules import NO_RESULTS
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 

@@ -28,7 +28,7 @@ from analysis.names import METRICS, parameter
 from analysis.stats.intervals import LEVEL
 from analysis.verification import checks, draws
 from analysis.verification.suite import Suite
-from reports.pages import html, stress
+from reports.pages import html, stress_des
 
 # %%
 suite = Suite.load(results)
@@ -176,7 +176,7 @@ html.gallery(figures)
 
 # %%
 others = [study.manifest for study in suite.others.values()]
-model = stress.describe(suite.study.manifest, others)
+model = stress_des.describe(suite.study.manifest, others)
 display(Markdown("\n\n".join(model.sections[number] for number in "12")))
 html.figure(
     drawings.slot(*model.overview),

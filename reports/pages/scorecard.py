@@ -12,8 +12,8 @@ from IPython.display import HTML
 from analysis import numbers
 from analysis.replication import paper
 from analysis.replication.measures import Quantity
-from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Finding, Row
+from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.template import template

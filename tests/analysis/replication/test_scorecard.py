@@ -14,8 +14,8 @@ from analysis import load_study, run_study
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.replication import claims, paper
 from analysis.replication import scorecard as module
-from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Finding, Row, departures, of_policy, scorecard
+from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from policies.registry import TRAINED

@@ -10,8 +10,8 @@ from scipy.stats import t
 
 from analysis import load_results, load_study, run_study
 from analysis.replication.claims import FIG_5
-from analysis.replication.rules import NO_RESULTS
 from analysis.replication.scorecard import scorecard
+from analysis.replication.verdict_rules import NO_RESULTS
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
 PRODUCT = "collection_ratio_and_communication"

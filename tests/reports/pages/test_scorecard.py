@@ -8,11 +8,12 @@ from html.parser import HTMLParser
 import pytest
 
 from analysis import numbers
-from analysis.replication import measures, paper, rules
+from analysis.replication import measures, paper
+from analysis.replication import verdict_rules as rules
 from analysis.replication.claims import Claim, Section
 from analysis.replication.measures import Quantity
-from analysis.replication.rules import NO_RESULTS, VERDICTS
 from analysis.replication.scorecard import Finding, Row
+from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.scorecard import as_html
 

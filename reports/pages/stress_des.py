@@ -1,7 +1,7 @@
 """The model described after the STRESS-DES checklist, filled in from what studies were run with.
 
-All words stand in the template ``stress.md``, a heading per section of the checklist; this module
-passes it numbers and lists:
+All words stand in the template ``stress_des.md``, a heading per section of the checklist; this
+module passes it numbers and lists:
 
     description = describe(results.manifest)
     Markdown(description.sections["4"])
@@ -71,7 +71,7 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
     }
-    page = template("stress.md", words=words, number=_number, span=_span, counted=_counted)
+    page = template("stress_des.md", words=words, number=_number, span=_span, counted=_counted)
     text: Any = page.make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(text)) if part.strip()}
     return Description(sections, (text.steps, text.repeated, text.end), _parameters(space))

@@ -10,7 +10,7 @@ from analysis.figures import verification as drawings
 from analysis.results.manifest import Manifest
 from analysis.stats.intervals import LEVEL
 from dess.scenario import Scenario
-from reports.pages import stress
+from reports.pages import stress_des
 
 # Monks et al. (2019), Table 1.
 CHECKLIST = {"1": 3, "2": 4, "2.5": 5, "3": 4, "4": 3, "5": 4, "6": 1}
@@ -60,7 +60,7 @@ def manifest(**changes: Any) -> dict[str, Any]:
 
 def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
     """All words of the checklist, its diagram and its table."""
-    description = stress.describe(data, others)
+    description = stress_des.describe(data, others)
     steps, *rest = description.overview
     texts = [*description.sections.values(), *rest, *(word for step in steps for word in step)]
     return "\n".join([*texts, *description.parameters["Value"]])
@@ -68,7 +68,7 @@ def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
 
 def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
     """The texts of the items, each in one line, by their numbers."""
-    sections = "\n".join(stress.describe(data, others).sections.values())
+    sections = "\n".join(stress_des.describe(data, others).sections.values())
     parts = re.split(r"^(?:\*\*([\d.]+) [^*]+\.\*\*|### .*)", sections, flags=re.M)[1:]
     pairs = zip(parts[::2], parts[1::2], strict=True)
     return {number: " ".join(text.split()) for number, text in pairs if number}
@@ -81,11 +81,11 @@ def test_every_item_of_the_checklist_is_on_the_page() -> None:
     ]
     assert sorted(texts) == sorted(expected)
     assert all(texts.values())
-    assert [*stress.describe(manifest()).sections] == ["1", "2", "3", "4", "5", "6"]
+    assert [*stress_des.describe(manifest()).sections] == ["1", "2", "3", "4", "5", "6"]
 
 
 def test_every_input_parameter_is_in_the_table() -> None:
-    table = stress.describe(manifest()).parameters
+    table = stress_des.describe(manifest()).parameters
     fields = table["Input parameter [unit]"].str.partition(":")[0]
     assert set(fields) == set(Scenario.model_fields) == set(OTHER)
     assert table.notna().all(axis=None)
@@ -140,7 +140,7 @@ def test_scarce_pads_make_a_queue() -> None:
 
 def test_no_text_of_the_diagram_leaves_its_box() -> None:
     for changes in ({}, OTHER):
-        figure = drawings.slot(*stress.describe(manifest(set=changes)).overview)
+        figure = drawings.slot(*stress_des.describe(manifest(set=changes)).overview)
         figure.canvas.draw()
         (ax,) = figure.axes
         for text in ax.texts:

@@ -13,7 +13,8 @@ from scipy import stats
 from analysis.questions import main_effects
 from analysis.questions.learning.curves import Transfer
 from analysis.questions.main_effects import Shape
-from analysis.replication import paper, rules
+from analysis.replication import paper
+from analysis.replication import verdict_rules as rules
 from analysis.replication.evidence_of_policy import Pairs, negated
 from analysis.stats.intervals import Interval
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
