@@ -29,8 +29,7 @@ from analysis.names import PRODUCT
 from analysis.questions.learning import ablation
 from analysis.questions.learning import curves as learning
 from analysis.questions.learning import trained as policies
-from analysis.replication import paper
-from analysis.replication import verdict_rules as rules
+from analysis.replication import paper, verdict_rules
 from policies.registry import TRAINED
 from reports.pages import html
 
@@ -72,12 +71,12 @@ html.gallery([with_and_without(name, metric) for name in drawn for metric in met
 
 # %%
 transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
-by_metric = dict(zip(metrics, (rules.throughout, rules.passes), strict=True))
+by_metric = dict(zip(metrics, (verdict_rules.throughout, verdict_rules.passes), strict=True))
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 html.say(
     "**The rules here**, with Welch's t over the trainings:\n\n"
     "- of the reward: {rules[0]}\n- of collection ratio and communication: {rules[1]}",
-    rules=[rule.in_words(rules.MARGIN) for rule in by_metric.values()],
+    rules=[rule.in_words(verdict_rules.MARGIN) for rule in by_metric.values()],
 )
 
 # %%
@@ -168,7 +167,7 @@ html.gallery([once(policy) for policy in shipped])
 html.say(
     "Where more training stops paying, by the exponential moving average of collection ratio and "
     "communication. Minutes are those of the clock, whatever else the machine did.\n\n{courses}",
-    courses="\n".join(policies.course_in_words(policy, rules.MARGIN) for policy in shipped),
+    courses="\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped),
 )
 
 # %% [markdown]

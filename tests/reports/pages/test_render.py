@@ -206,7 +206,7 @@ def test_pages_carry_the_evidence_of_their_studies(files: dict[str, str], result
     manifest = load_results(results / "trial").store.manifest
     for name in ("mission.html", "index.html"):
         (evidence,) = (json.loads(text) for text in embedded(STUDY, files[name]))
-        assert (evidence["study"], evidence["key"]) == ("trial", manifest.key)
+        assert (evidence["study"]["name"], evidence["key"]) == ("trial", manifest.key)
 
 
 def test_files_show_no_paths_and_no_times(files: dict[str, str], results: Path) -> None:
