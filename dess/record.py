@@ -122,7 +122,7 @@ def empty_records(missions: int, uavs: int) -> Records:
 
 @dataclass
 class EventLog:
-    """The events of one mission, in the order in which they happened.
+    """The events of one mission, in the order in which they happened; columns are attributes too.
 
     ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per
     node (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering
@@ -143,6 +143,13 @@ class EventLog:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def __getattr__(self, name: str) -> list:
+        """A column as a list, as in ``log.event``."""
+        if name not in _EVENT_COLUMNS:
+            raise AttributeError(name)
+        index = [*_EVENT_COLUMNS].index(name)
+        return [row[index] for row in self.rows]
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""

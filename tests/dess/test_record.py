@@ -170,6 +170,15 @@ def test_the_metrics_of_a_record_are_attributes() -> None:
     assert copy.uavs.tobytes() == record.uavs.tobytes()
 
 
+def test_the_columns_of_a_log_are_attributes() -> None:
+    log = simulate(ScenarioSpace.of(), Commuter(), 3, 4, events=True).events
+    assert log is not None and log.event[0] == "mission_start"
+    for name, column in log.columns().items():
+        assert getattr(log, name) == column.tolist()
+    with pytest.raises(AttributeError, match="colour"):
+        _ = log.colour
+
+
 def test_the_collection_ratio_without_data_is_one() -> None:
     scenario = Scenario.of(initial_data=0, arrival_rate=0, uavs=1)
     record = simulate(scenario, Commuter(), 0, 0)
