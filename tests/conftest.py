@@ -13,7 +13,7 @@ from hypothesis import is_hypothesis_test, settings
 
 os.environ["OMP_NUM_THREADS"] = "1"
 
-settings.register_profile("default", max_examples=25, deadline=None, derandomize=True)
+settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
 settings.load_profile("default")
 
