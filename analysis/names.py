@@ -52,6 +52,13 @@ PARAMETERS = {
 }
 
 
+# The fields that an operator decides on. All others are conditions, which a fleet has to meet.
+DECISIONS = (
+    *("uavs", "pads", "zone", "forbid_swaps", "altitude"),
+    *("flying_time", "charge_start", "charge_complete", "charge_rate"),
+)
+
+
 def parameter(field: str) -> Parameter:
     """How a field of a scenario is called; by the name of the field, if it has no other."""
     return PARAMETERS.get(field, Parameter(field, field))

@@ -164,6 +164,11 @@ class _Constants(BaseModel):
         """Number of cells of the start and charging zone."""
         return self.zone[2] * self.zone[3]
 
+    @property
+    def charging_pads(self) -> int:
+        """Number of charging pads: ``pads``, or as many as the zone has cells."""
+        return self.zone_cells if self.pads is None else self.pads
+
     def to_toml(self) -> str:
         """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))

@@ -126,8 +126,8 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
         if field in SAMPLED:
             mission[field] = getattr(scenario, field)[0]
         elif field != "nodes" and field in type(scenario).model_fields:
-            value = getattr(scenario, field)
-            mission[field] = scenario.zone_cells if field == "pads" and value is None else value
+            name = "charging_pads" if field == "pads" else field
+            mission[field] = getattr(scenario, name)
     mission["nodes"] = len(scenario.nodes)
     for field, value in zip(
         ("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True

@@ -94,7 +94,7 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
             )  # fmt: skip
             base = top
     ax.step(edges, base, where="post", color=style.INK, linewidth=1, gid="occupancy")
-    pads = scenario.zone_cells if scenario.pads is None else scenario.pads
+    pads = scenario.charging_pads
     if pads <= scenario.uavs:
         ax.axhline(pads, color=style.MUTED, linewidth=0.9)
     hatched = "; hatched: waiting" if slots["waiting"].any() else ""

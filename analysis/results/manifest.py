@@ -21,6 +21,7 @@ from analysis.results.provenance import (
     library_versions,
     team_of,
 )
+from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint
 from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
@@ -34,6 +35,7 @@ SCHEMA_VERSION = 3
 _PARTS: dict[str, TypeAdapter] = {
     "set": TypeAdapter(dict[str, Any]),
     "design": TypeAdapter(Design | None),
+    "costs": TypeAdapter(Costs | None),
     "precision": TypeAdapter(Precision | None),
     "selection": TypeAdapter(Selection | None),
 }
@@ -83,6 +85,7 @@ class Origin(Document):
     @field_validator("study")
     @classmethod
     def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
+        study = {"costs": None} | study  # which results of earlier versions lack
         numbers = (study.get("missions"), study.get("logged"))
         if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
             raise ValueError("is not the data of a study")

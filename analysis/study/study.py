@@ -15,6 +15,7 @@ from pydantic import (
     model_validator,
 )
 
+from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable
@@ -76,6 +77,7 @@ class Study(StrictTable):
     selection: Selection | None = Field(
         None, description="a rule: as many missions as finding the best design point takes"
     )
+    costs: Costs | None = Field(None, description="prices, for questions about costs")
     seed: Integer = Field(0, ge=0, le=MAX_SEED)
     engine: Literal["batch", "events"] = "batch"
     logged: Integer = Field(

@@ -59,7 +59,7 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "manifests": [manifest, *others],
         "space": space,
         "m": space.communication_slots,
-        "pads": _pads(space),
+        "pads": space.charging_pads,
         "zone_x": (x, x + width - 1),
         "zone_y": (y, y + height - 1),
         "drawn": [f"`{f}` {_span(ends)}" for f, ends in ranges.items() if ends[0] < ends[1]],
@@ -107,7 +107,7 @@ def _parameters(space: ScenarioSpace) -> pd.DataFrame:
 
 def _value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
-    value: Any = _pads(space) if field == "pads" else getattr(space, field)
+    value: Any = space.charging_pads if field == "pads" else getattr(space, field)
     if field == "nodes":
         return _cells(value)
     if field in SAMPLED or field == "initial_data":
@@ -123,10 +123,6 @@ def _cells(nodes: Sequence[tuple[int, int]]) -> str:
     if len(columns) * len(rows) == len(nodes):
         return f"x in {{{', '.join(map(str, columns))}}}, y in {{{', '.join(map(str, rows))}}}"
     return ", ".join(f"({x}, {y})" for x, y in nodes)
-
-
-def _pads(space: ScenarioSpace) -> int:
-    return space.zone_cells if space.pads is None else space.pads
 
 
 def _number(value: float) -> str:

@@ -33,7 +33,7 @@ class Playback:
         self.end = len(self.residual) - 1
         self.filled = np.isin(range(scenario.uavs), log.loc[log["event"] == "quota_filled", "uav"])
         self.fleet = self._fleet()
-        self.pads = scenario.zone_cells if scenario.pads is None else scenario.pads
+        self.pads = scenario.charging_pads
         self.uav_colours = uav_colours(scenario.uavs)
         self.node_colours = node_colours(len(scenario.nodes))
 

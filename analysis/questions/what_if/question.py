@@ -209,4 +209,4 @@ def _assignments(values: Mapping[str, Any]) -> list[str]:
 def _value(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; the number of pads where it follows from the zone."""
     value = getattr(space, field)
-    return space.zone_cells if field == "pads" and value is None else value
+    return space.charging_pads if field == "pads" else value

@@ -1,0 +1,41 @@
+"""Costs: what a fleet costs over the missions that it is to fly, by the prices of a study.
+
+    costs = Costs(uav=20_000, pad=3_000, hour=120, slot_seconds=60, missions=500)
+
+A study's table ``[costs]`` holds the prices. ``analysis.questions.costs`` makes costs of missions.
+"""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from analysis.study.stopping import StrictTable
+from dess.scenario import Integer, Number
+
+
+class Costs(StrictTable):
+    """Prices in one currency.
+
+    UAVs and pads are bought once. Charges, hours and lost UAVs are paid for in each of the
+    ``missions`` that the fleet is to fly.
+
+    Raises:
+        pydantic.ValidationError: If a price is below 0, or hours are without ``slot_seconds``.
+    """
+
+    currency: str = Field("EUR", min_length=1, max_length=16, description="name of the currency")
+    uav: Number = Field(0.0, ge=0, description="price of a UAV")
+    pad: Number = Field(0.0, ge=0, description="price of a charging pad")
+    charge: Number = Field(0.0, ge=0, description="price of charging a battery from 0 to 100 %")
+    hour: Number = Field(0.0, ge=0, description="price of an hour of a mission")
+    lost_uav: Number = Field(0.0, ge=0, description="price of a UAV whose battery is depleted")
+    missions: Integer = Field(1, ge=1, description="missions that the fleet is to fly")
+    slot_seconds: Number | None = Field(
+        None, gt=0, description="length of a mission slot [s]; needed for the price of an hour"
+    )
+
+    @model_validator(mode="after")
+    def _hours_have_a_length(self) -> Self:
+        if self.hour and self.slot_seconds is None:
+            raise ValueError("slot_seconds: is missing; allowed: with hour, the seconds of a slot")
+        return self
