@@ -9,7 +9,7 @@ import typer
 
 from dess import InputError
 from reports.cli import console
-from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting, with_absolute_paths
+from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting
 
 if TYPE_CHECKING:
     from reports.pages.verify import Check
@@ -50,8 +50,7 @@ def report(
     ] = None,
 ) -> None:
     """Run the notebooks on the results and render them to HTML, with an index."""
-    parsed = [setting(text, "--parameter", PARAMETER) for text in parameters or []]
-    values = {name: with_absolute_paths(value) for name, value in parsed}
+    values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:
             raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")

@@ -4,7 +4,6 @@ Values are in TOML syntax: ``setting("initial_data=[5, 20]")`` is ``("initial_da
 """
 
 import math
-import os
 import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -66,22 +65,6 @@ def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str
     if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
         raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
-
-
-def with_absolute_paths(value: Any) -> Any:
-    """A parameter's value with absolute paths, since notebooks run in another folder.
-
-    A path is a word with a path separator, or one that ends with ``.toml``, also inside a team:
-    ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
-    """
-    if isinstance(value, list):
-        return [with_absolute_paths(item) for item in value]
-    if not isinstance(value, str):
-        return value
-    return ",".join(
-        os.path.abspath(word) if os.sep in word or word.endswith(".toml") else word
-        for word in value.split(",")
-    )
 
 
 def _is_plain(value: Any) -> bool:

@@ -2,13 +2,13 @@
 
 A notebook is a Python file in jupytext's percent format. Its heading and the paragraph below are
 the title and the description of its page, its metadata name the studies that it reads, and one of
-its cells is tagged ``parameters``:
+its cells is tagged ``parameters``. Cells tagged ``jupyter`` are in the notebook beside the page,
+and neither run for the page nor shown on it:
 
     report = read("what-if")
     report.set({"missions": 500})
 """
 
-import ast
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from dess import InputError
+from reports.pages.parameters import values_of, with_paths, with_values
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
 SCORECARD = "scorecard"  # the index shows all of it
@@ -33,7 +34,8 @@ NAMES = (  # in the order of the index
     "verification",
     SCORECARD,
 )
-VALUES = "cell-parameters"  # id of the cell that sets parameters to other values
+# Tags of cells: the parameters, and what only Jupyter shows.
+PARAMETERS, IN_JUPYTER = "parameters", "jupyter"
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
@@ -48,7 +50,7 @@ class Report:
         description: The paragraph below the heading.
         studies: Names of the results folders that it reads.
         source: The text of its file.
-        notebook: The cells without the heading, with values for parameters.
+        notebook: The cells of the page, with values for parameters.
         begun: Id of the cell that was begun last.
         done: Number of cells that have been run.
         failure: The cell that failed and its error, if one did.
@@ -77,26 +79,32 @@ class Report:
         return [cell for cell in self.notebook.cells if cell.cell_type == "code"]
 
     @property
-    def parameters(self) -> set[str]:
-        """The names that the cell tagged ``parameters`` assigns."""
-        source = self.notebook.cells[_parameters_cell(self.notebook)].source
-        targets = (n.targets[0] for n in ast.parse(source).body if isinstance(n, ast.Assign))
-        return {target.id for target in targets if isinstance(target, ast.Name)}
+    def parameters(self) -> dict[str, Any]:
+        """The names that the cell tagged ``parameters`` assigns, with their values."""
+        return values_of(_parameters_cell(self.notebook).source)
+
+    @property
+    def code(self) -> list[str]:
+        """The code of every cell; of a path of this machine it has the last name only."""
+        names = {name: with_paths(v, os.path.basename) for name, v in self.parameters.items()}
+        changed = _parameters_cell(self.notebook)
+        return [with_values(c.source, names) if c is changed else c.source for c in self.cells]
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters to other values; parameters of other notebooks are ignored."""
-        _set(self.notebook, self._of_parameters(values))
+        _set(self.notebook, values)
 
     def for_jupyter(self, results: Path, out: Path, values: Mapping[str, Any]) -> str:
         """The notebook as a file that Jupyter opens in ``out``, with the values it ran with."""
+
+        def write(path: str) -> str:
+            return Path(os.path.relpath(path, out)).as_posix()
+
         notebook = _parsed(self.source)
-        folder = {"results": Path(os.path.relpath(results, out)).as_posix()}
-        _set(notebook, self._of_parameters({**values, **folder}))
+        moved = {name: with_paths(value, write) for name, value in values.items()}
+        _set(notebook, {**moved, "results": write(str(results))})
         notebook.metadata = {"kernelspec": _KERNEL}
         return nbformat.writes(notebook) + "\n"
-
-    def _of_parameters(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: value for name, value in values.items() if name in self.parameters}
 
 
 def names_in(folder: Path = SHIPPED) -> list[str]:
@@ -116,6 +124,7 @@ def read(name: str, folder: Path = SHIPPED) -> Report:
     notebook = _parsed(source)
     title, description = notebook.cells[0].source.removeprefix("# ").split("\n\n", 1)
     del notebook.cells[0]  # the header of the page shows them
+    drop(notebook, IN_JUPYTER)
     studies = notebook.metadata["dess"]["studies"]
     return Report(name, title, " ".join(description.split()), studies, source, notebook)
 
@@ -136,6 +145,11 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
             )
 
 
+def drop(notebook: NotebookNode, tag: str) -> None:
+    """Remove the cells of a notebook that have a tag."""
+    notebook.cells = [cell for cell in notebook.cells if tag not in _tags(cell)]
+
+
 def _file(folder: Path, name: str) -> Path:
     return folder / f"{name.replace('-', '_')}.py"
 
@@ -147,15 +161,15 @@ def _parsed(source: str) -> NotebookNode:
     return notebook
 
 
-def _parameters_cell(notebook: NotebookNode) -> int:
-    """The number of the cell tagged ``parameters``."""
-    tagged = ("parameters" in cell.metadata.get("tags", []) for cell in notebook.cells)
-    return list(tagged).index(True)
+def _tags(cell: NotebookNode) -> list[str]:
+    return cell.metadata.get("tags", [])
+
+
+def _parameters_cell(notebook: NotebookNode) -> NotebookNode:
+    return next(cell for cell in notebook.cells if PARAMETERS in _tags(cell))
 
 
 def _set(notebook: NotebookNode, values: Mapping[str, Any]) -> None:
-    """Insert a cell with the values after the cell tagged ``parameters``."""
-    if values:
-        source = "\n".join(f"{name} = {value!r}" for name, value in values.items())
-        cell = nbformat.v4.new_code_cell(source, id=VALUES)
-        notebook.cells.insert(_parameters_cell(notebook) + 1, cell)
+    """Write values into the cell tagged ``parameters``."""
+    cell = _parameters_cell(notebook)
+    cell.source = with_values(cell.source, values)

@@ -26,7 +26,8 @@ from dess.files import writable
 from reports.pages import missions
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
-from reports.pages.notebook import SHIPPED, VALUES, Report, check_parameters, names_in, read
+from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read
+from reports.pages.parameters import with_paths
 from reports.pages.template import fill
 
 log = logging.getLogger(__name__)
@@ -56,7 +57,8 @@ def render(
         results: The folder that holds a results folder per study.
         out: The folder to write to.
         progress: Called after every mission that the pages need beside the results, and every cell.
-        parameters: Values for the parameters of the notebooks, beside ``results``.
+        parameters: Values for the parameters of the notebooks, beside ``results``; paths in them
+            are relative to the working directory.
         notebooks: The folder of the notebooks.
 
     Returns:
@@ -68,7 +70,8 @@ def render(
         ReportError: If a notebook fails; after all others. Its page is written under another name,
             up to the cell that failed.
     """
-    results, out, values = Path(results), Path(out), parameters or {}
+    results, out, given = Path(results), Path(out), parameters or {}
+    values = {name: with_paths(value, os.path.abspath) for name, value in given.items()}
     reports = [read(name, notebooks) for name in dict.fromkeys(names) or names_in(notebooks)]
     check_parameters(reports, values)
     for study in dict.fromkeys(study for report in reports for study in report.studies):
@@ -131,9 +134,7 @@ def _check_results(folder: Path) -> None:
 
 def _page(report: Report) -> str:
     """The page of a report that has been run."""
-    # Without the values of parameters, which may be paths of this machine: the notebook has them.
-    sources = [cell.source for cell in report.cells if cell.id != VALUES]
-    code = highlight("\n\n\n".join(sources), PythonLexer(), HtmlFormatter())
+    code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
     body = html_of(report.notebook)
     return fill("report.html", report=report, body=body, code=Markup(code))
 

@@ -17,6 +17,7 @@ from typing import Any
 import nbformat
 import pytest
 from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError
 
 from analysis import load_results, run_study
 from dess import InputError
@@ -224,8 +225,8 @@ def test_indices_are_set_in_text_only() -> None:
 
 @pytest.mark.usefixtures("files")
 def test_progress_counts_the_cells(progress: list[tuple[int, int, str]]) -> None:
-    # Of the mission five cells with code, of the scorecard two; in each, values of parameters.
-    assert [(done, total) for done, total, _ in progress] == [(n, 9) for n in range(1, 10)]
+    # Of the mission five cells with code, of the scorecard two.
+    assert [(done, total) for done, total, _ in progress] == [(n, 7) for n in range(1, 8)]
     assert {name for *_, name in progress} == {*TINY}
 
 
@@ -320,11 +321,48 @@ def test_a_notebook_that_refuses_its_input_leaves_nothing(
 # --- notebooks ---
 
 
-def test_values_of_parameters_follow_the_cell_that_they_override(notebooks: Path) -> None:
-    report = read("mission", notebooks)
-    (before,) = [n for n, cell in enumerate(report.notebook.cells) if cell.metadata.get("tags")]
-    report.set({"results": "here", "policy": "tour", "other": 1})
-    assert report.notebook.cells[before + 1].source == "results = 'here'\npolicy = 'tour'"
+def test_values_stand_in_the_cell_of_the_parameters_and_run_from_there(
+    results: Path, notebooks: Path, tmp_path: Path
+) -> None:
+    render(["mission"], results, tmp_path, parameters={"policy": "random"}, notebooks=notebooks)
+    notebook = nbformat.read(tmp_path / "mission.ipynb", as_version=4)
+    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert len(code) == len(read("mission", notebooks).cells)
+    folder = Path(os.path.relpath(results, tmp_path)).as_posix()
+    assert code[0].source == f"results = {folder!r}\npolicy = 'random'"
+    assert "'random'" in (tmp_path / "mission.html").read_text("utf-8").replace("&#39;", "'")
+
+
+def test_an_edited_parameter_is_that_of_the_notebook(
+    results: Path, notebooks: Path, tmp_path: Path
+) -> None:
+    render(["mission"], results, tmp_path, parameters={"policy": "random"}, notebooks=notebooks)
+    notebook = nbformat.read(tmp_path / "mission.ipynb", as_version=4)
+    first = next(cell for cell in notebook.cells if cell.cell_type == "code")
+    first.source = first.source.replace("random", "nobody")
+    with pytest.raises(CellExecutionError, match="policy: nobody is not in the study"):
+        NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
+
+
+def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
+    results: Path, notebooks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = MISSION.replace("if policy", "if not Path(policy).is_absolute() and policy")
+    folder = write_notebooks(tmp_path / "notebooks", mission=source)
+    monkeypatch.chdir(tmp_path)
+    render(["mission"], results, "out", parameters={"policy": "./sea.toml"}, notebooks=folder)
+    (cell,) = [c for c in nbformat.read("out/mission.ipynb", 4).cells if c.metadata.get("tags")]
+    assert "policy = '../sea.toml'" in cell.source
+    page = Path("out/mission.html").read_text("utf-8")
+    assert str(tmp_path) not in page and "sea.toml" in page
+
+
+def test_cells_for_jupyter_are_in_the_notebook_only(results: Path, tmp_path: Path) -> None:
+    source = MISSION + '\n# %% tags=["jupyter"]\n"a cell for Jupyter"\n'
+    folder = write_notebooks(tmp_path / "notebooks", mission=source)
+    render(["mission"], results, tmp_path, notebooks=folder)
+    assert "a cell for Jupyter" in (tmp_path / "mission.ipynb").read_text("utf-8")
+    assert "a cell for Jupyter" not in (tmp_path / "mission.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -360,7 +398,7 @@ def test_a_kernel_that_dies_at_its_start_is_started_once_more(
 def test_a_kernel_that_dies_in_a_cell_is_not_started_again(results: Path, tmp_path: Path) -> None:
     source = FAILING.replace("raise", "import os; os._exit(1) #")
     notebooks = write_notebooks(tmp_path / "notebooks", mission=source)
-    with pytest.raises(ReportError, match=r"^report mission: cell 4 of 5 \(import os.*Kernel died"):
+    with pytest.raises(ReportError, match=r"^report mission: cell 3 of 4 \(import os.*Kernel died"):
         render(["mission"], results, tmp_path, notebooks=notebooks)
 
 
@@ -374,11 +412,11 @@ def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
         render([], results, tmp_path, notebooks=notebooks)
     partial_page = tmp_path / "mission.partial.html"
     assert str(caught.value) == (
-        'report mission: cell 4 of 5 (raise ArithmeticError("no such number")): '
+        'report mission: cell 3 of 4 (raise ArithmeticError("no such number")): '
         f"ArithmeticError: no such number; partial page: {partial_page}"
     )
     text = words_of(partial_page.read_text("utf-8"))
-    assert "This page is incomplete. report mission: cell 4 of 5" in text
+    assert "This page is incomplete. report mission: cell 3 of 4" in text
     assert "the cell before" in text and "the cell after" not in text
     assert (tmp_path / "mission.html").read_text() == "before"  # the complete page stays
     assert "the cell after" in words_of((tmp_path / "performance.html").read_text("utf-8"))

@@ -1,0 +1,55 @@
+"""The parameters of a notebook: the assignments of plain values in one of its cells.
+
+values_of('missions = 500  # of every policy')                     # {'missions': 500}
+with_values('missions = 500  # of every policy', {"missions": 40})  # comments stay
+"""
+
+import ast
+import os
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+
+def values_of(source: str) -> dict[str, Any]:
+    """The parameters that a cell assigns, with their values."""
+    return {name: ast.literal_eval(value) for name, value in _assignments(source)}
+
+
+def with_values(source: str, values: Mapping[str, Any]) -> str:
+    """The source of a cell that assigns other values to its parameters; all else stays.
+
+    Args:
+        source: The cell.
+        values: By name; those of other cells are ignored.
+    """
+    before = values_of(source)
+    lines = source.encode().split(b"\n")  # columns of a syntax tree count bytes
+    for name, node in reversed([*_assignments(source)]):
+        if name in values and values[name] != before[name]:
+            first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
+            head, tail = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
+            lines[first : last + 1] = [head + repr(values[name]).encode() + tail]
+    return b"\n".join(lines).decode()
+
+
+def with_paths(value: Any, write: Callable[[str], str]) -> Any:
+    """The value of a parameter with its paths written in another way.
+
+    A path is a word with a path separator, or one that ends with ``.toml``, also inside a team:
+    with ``os.path.abspath``, ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
+    """
+    if isinstance(value, list):
+        return [with_paths(item, write) for item in value]
+    if not isinstance(value, str):
+        return value
+    return ",".join(
+        write(word) if os.sep in word or word.endswith(".toml") else word
+        for word in value.split(",")
+    )
+
+
+def _assignments(source: str) -> Iterator[tuple[str, ast.expr]]:
+    """The name and the value of every assignment, in their order."""
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            yield node.targets[0].id, node.value

@@ -1,0 +1,68 @@
+"""The cell of a notebook's parameters: read, and written with other values."""
+
+import os
+from functools import partial
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reports.pages.parameters import values_of, with_paths, with_values
+
+CELL = """results = "../../results"  # the folder
+settings = {
+    "uavs": 5,  # of them
+}  # what is set
+# A comment — of its own
+missions = 500  # of every policy
+name = "é"; shown = None
+"""
+PLAIN = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.text()
+    | st.floats(allow_nan=False, allow_infinity=False),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+def test_the_values_of_a_cell_are_read() -> None:
+    assert values_of(CELL) == {
+        **{"results": "../../results", "settings": {"uavs": 5}, "missions": 500},
+        **{"name": "é", "shown": None},
+    }
+
+
+def test_other_values_leave_comments_and_other_lines_as_they_are() -> None:
+    written = with_values(CELL, {"settings": {"pads": 2}, "shown": "tour", "unknown": 1})
+    assert written == CELL.replace(
+        """{
+    "uavs": 5,  # of them
+}""",
+        "{'pads': 2}",
+    ).replace("None", "'tour'")
+    assert with_values(CELL, values_of(CELL)) == CELL
+
+
+@given(st.fixed_dictionaries({}, optional=dict.fromkeys(values_of(CELL), PLAIN)))
+def test_what_is_written_is_read(values: dict[str, Any]) -> None:
+    written = with_values(CELL, values)
+    assert values_of(written) == values_of(CELL) | values
+    assert written.count("#") >= 4 and "# A comment — of its own" in written
+
+
+@pytest.mark.parametrize(
+    ("value", "moved"),
+    [
+        ("greedy,./mine", f"greedy,{os.path.abspath('mine')}"),
+        (["sea.toml", "paper", 3], [os.path.abspath("sea.toml"), "paper", 3]),
+        ({"uavs": 3}, {"uavs": 3}),
+    ],
+)
+def test_paths_are_written_another_way_and_words_are_not(value: Any, moved: Any) -> None:
+    assert with_paths(value, os.path.abspath) == moved
+    relative = partial(os.path.relpath, start=os.getcwd())
+    assert with_paths(moved, relative) == with_paths(value, os.path.normpath)
