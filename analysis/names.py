@@ -3,6 +3,8 @@
 import re
 from typing import NamedTuple
 
+import numpy as np
+
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 
@@ -18,6 +20,8 @@ SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "produc
 # All metrics of a mission: shares of missions, and means over missions.
 SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)
+COST = "cost"  # of a study with prices
+LESS_IS_BETTER = (COST,)
 
 
 class Parameter(NamedTuple):
@@ -49,6 +53,11 @@ PARAMETERS = {
     "charge_complete": Parameter("Charging complete capacity C_C", "C_C", "%"),
     "initial_data": Parameter("Initial data per node", "Initial data", "data units"),
     "flying_time": Parameter("Flying time", "Flying time", "mission slots"),
+    "pads": Parameter("Number of charging pads", "Pads"),
+    "zone": Parameter("Start and charging zone", "Zone"),
+    "nodes": Parameter("Sensor nodes", "Nodes"),
+    "quota": Parameter("Communication quota", "Quota", "communication slots"),
+    "arrival_rate": Parameter("Arrival rate", "Arrivals", "data units per node and slot"),
 }
 
 
@@ -64,11 +73,18 @@ def parameter(field: str) -> Parameter:
     return PARAMETERS.get(field, Parameter(field, field))
 
 
+def metric_name(metric: str) -> str:
+    """What a metric is called on pages."""
+    return METRICS.get(metric, metric.replace("_", " ").capitalize())
+
+
 def value_text(value: object) -> str:
-    """A value of a parameter: ``12.5``, or ``5–7.5`` of a range."""
+    """A value of a parameter: ``12.5``, ``5–7.5`` of a range, ``yes``; text as it is."""
     if isinstance(value, list | tuple):
         return "–".join(map(value_text, value))
-    return f"{value:g}"
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    return value if isinstance(value, str) else f"{value:g}"
 
 
 def _tex(text: str) -> str:

@@ -71,7 +71,7 @@ def panels(
     """
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
     axes = figure.subplots(rows, **options)
-    for ax in np.atleast_1d(axes):
+    for ax in np.ravel(axes):
         grid_of(values, ax)
     return figure, axes
 

@@ -1,0 +1,319 @@
+"""Figures of the settings of a study: curves, heat maps, main effects, single design points.
+
+Each returns a figure of its own; nothing touches pyplot's state. Shares are in percent.
+"""
+
+from collections.abc import Sequence
+from math import ceil
+from textwrap import fill
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis, XAxis, YAxis
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, PercentFormatter
+from pandas.api.types import is_numeric_dtype
+
+from analysis.figures import style
+from analysis.names import (
+    LESS_IS_BETTER,
+    METRICS,
+    PRODUCT,
+    metric_name,
+    parameter,
+    value_text,
+)
+from analysis.questions import settings
+from analysis.results.tables import Results
+
+MOST_PANELS = 9  # values of a third field that have a panel of their own
+MOST_TICKS = 12
+MARK = "#d55e00"  # of the best cell, and those that are not significantly worse
+COLUMNS = 3  # of panels
+
+
+def plot(
+    results: Results,
+    x: str,
+    hue: str | None = None,
+    metric: str = PRODUCT,
+    policy: str | None = None,
+) -> Figure:
+    """A metric against a field, with 95 % intervals: a curve per policy, or per value of ``hue``.
+
+    Args:
+        results: The study.
+        x: The field; all fields but ``x`` and ``hue`` are averaged over the design.
+        hue: A field with a curve per value, in a panel per policy.
+        metric: The metric.
+        policy: The policy; all, if not given.
+
+    Raises:
+        InputError: If there is no such field, metric or policy.
+    """
+    rows = settings.averaged(results, [x, hue] if hue else [x], metric, policy)
+    colours = style.policy_colours(results.policies)
+    names = rows["policy"].unique()
+    parts = {name: rows[rows["policy"] == name] for name in names} if hue else {"": rows}
+    with style.look():
+        figure, axes = style.panels(3.1 * len(parts) + 0.8, len(parts), "y", sharex=True,
+                                    sharey=True, squeeze=False)  # fmt: skip
+        for ax, (name, part) in zip(axes.flat, parts.items(), strict=True):
+            looks = {policy: colours[policy] for policy in names}
+            if hue:
+                part = part.assign(policy=part[hue].map(value_text))
+                looks = _graded(settings.varied(results)[hue])
+            _curves(part, x, looks, settings.varied(results)[x], ax)
+            ax.set(title=f"{metric_name(metric)}{': ' * bool(name)}{name}")
+            _of_metric(ax.yaxis, metric)
+        axes.flat[-1].set_xlabel(parameter(x).label)
+        title = parameter(hue).label if hue else None
+        handles = axes.flat[0].get_legend_handles_labels()
+        figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
+    return figure
+
+
+def heat_map(
+    results: Results,
+    x: str,
+    y: str,
+    metric: str = PRODUCT,
+    policy: str | None = None,
+    facet: str | None = None,
+) -> Figure:
+    """A metric of a policy over two fields: the best cell, and those that may be as good.
+
+    A star marks the best cell; framed cells are not significantly worse (``averaged``).
+
+    Args:
+        results: The study.
+        x: The field of the columns; fields that are not named are averaged over the design.
+        y: The field of the rows.
+        metric: The metric.
+        policy: The policy; that of the best setting, if not given.
+        facet: A third field, with a panel per value: ``shown`` says which.
+
+    Raises:
+        InputError: If there is no such field, metric or policy.
+    """
+    policy = policy or str(settings.ranked(results, metric)["policy"].iloc[0])
+    fields = [y, x, facet] if facet else [y, x]
+    rows = settings.averaged(results, fields, metric, policy)
+    values = settings.varied(results)
+    best = rows["mean"].idxmin() if metric in LESS_IS_BETTER else rows["mean"].idxmax()
+    rows = rows.assign(best=rows.index == best, row=_places(rows[y], values[y]),
+                       column=_places(rows[x], values[x]))  # fmt: skip
+    facets = shown(values[facet]) if facet else [None]
+    columns = min(COLUMNS, len(facets))
+    lines = ceil(len(facets) / columns)
+    height = min(1.6 + 0.5 * len(values[y]), 5.5) if not facet else 0.9 + 1.75 * lines
+    with style.look():
+        figure, axes = style.panels(height, lines, "xy", ncols=columns, sharex=True, sharey=True,
+                                    squeeze=False)  # fmt: skip
+        for ax, value in zip(axes.flat, facets, strict=False):
+            part = rows if value is None else rows[rows[facet] == value]
+            ends = rows["mean"].min(), rows["mean"].max()
+            mesh = _cells(part, (len(values[y]), len(values[x])), ends, metric, columns, ax)
+            if value is not None:
+                ax.set_title(f"{parameter(str(facet)).tick} {value_text(value)}", fontsize=9)
+            _name_ticks(ax.xaxis, values[x], MOST_TICKS if columns == 1 else 4, 0.5)
+            _name_ticks(ax.yaxis, values[y], MOST_TICKS if columns == 1 else 5, 0.5)
+        for ax in axes.flat[len(facets) :]:
+            ax.set_visible(False)
+        bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
+        _of_metric(bar.ax.yaxis, metric)
+        figure.supxlabel(parameter(x).label, fontsize=10)
+        figure.supylabel(parameter(y).tick, fontsize=10)
+        figure.suptitle(f"{metric_name(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
+                        ha="left")  # fmt: skip
+    return figure
+
+
+def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
+    """The partial dependence of a metric on every varied field, a panel each, with intervals.
+
+    Args:
+        results: The study; its design varies one field or more.
+        metric: The metric.
+        policy: The policy; all, if not given.
+    """
+    effects = settings.main_effects(results, metric, policy)
+    fields = settings.by_influence(effects)
+    colours = style.policy_colours(results.policies)
+    looks = {name: colours[name] for name in effects["policy"].unique()}
+    with style.look():
+        figure, axes = _panels(len(fields))
+        for ax, field in zip(axes.flat, fields, strict=False):
+            part = effects[effects["field"] == field]
+            ticks = part.drop_duplicates("position").sort_values("position")["value"].tolist()
+            style.policy_means(part, "position", looks, 0.02 * len(ticks), ax)
+            _name_ticks(ax.xaxis, ticks, 6)
+            ax.set(xlim=(-0.5, len(ticks) - 0.5), xlabel=_label(field))
+            _of_metric(ax.yaxis, metric)
+        figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
+        style.legend_below(figure, axes.flat[0], 4)
+    return figure
+
+
+def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
+    """The mean of a metric at every design point against every varied field, a panel each.
+
+    Args:
+        results: The study; its design varies one field or more.
+        metric: The metric.
+        policy: The policy; all, if not given.
+    """
+    table = settings.ranked(results, metric, policy)
+    values = settings.varied(results)
+    colours = style.policy_colours(results.policies)
+    with style.look():
+        figure, axes = _panels(len(values))
+        for ax, field in zip(axes.flat, values, strict=False):
+            places, names = _axis(values[field])
+            for name, part in table.groupby("policy", sort=False):
+                spots = part[field].map(dict(zip(values[field], places, strict=True)))
+                ax.scatter(spots, part[metric], s=18, alpha=0.7, color=colours[str(name)][0],
+                           marker=colours[str(name)][1], linewidths=0, label=name,
+                           rasterized=len(table) > 2000)  # fmt: skip
+            if names:
+                _name_ticks(ax.xaxis, names, 6)
+            elif len(places) <= 6:
+                ax.set_xticks(places)
+            ax.set_xlabel(_label(field))
+            _of_metric(ax.yaxis, metric)
+        figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
+        style.legend_below(figure, axes.flat[0], 4)
+    return figure
+
+
+def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
+    """The share of missions with at most a value of a metric: a curve per policy.
+
+    Args:
+        missions: A row per mission, with ``policy`` and the metric.
+        metric: The metric.
+    """
+    colours = style.policy_colours(missions["policy"])
+    with style.look():
+        figure, ax = style.panels(3.9)
+        for number, (name, part) in enumerate(missions.groupby("policy", sort=False)):
+            ax.ecdf(part[metric], label=str(name), color=colours[str(name)][0], linewidth=1.7,
+                    linestyle=style.LINES[number % 4])  # fmt: skip
+        ax.set(xlabel=metric_name(metric), ylabel="share of the missions", ylim=(-0.02, 1.02))
+        ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        _of_metric(ax.xaxis, metric)
+        style.legend_below(figure, ax, 4)
+    return figure
+
+
+def shown(values: Sequence[Any]) -> list[Any]:
+    """The values of a third field that ``heat_map`` has a panel for: evenly spread, if many."""
+    places = np.linspace(0, len(values) - 1, min(MOST_PANELS, len(values)))
+    return [values[round(place)] for place in places]
+
+
+def _curves(
+    rows: pd.DataFrame, x: str, looks: dict[str, tuple[str, str]], values: Sequence[Any], ax: Axes
+) -> None:
+    """Means with intervals along the values of a field: numbers at their places, others evenly."""
+    places, names = _axis(values)
+    spots = rows[x].map(dict(zip(values, places, strict=True))).astype(float)
+    gap = float(np.diff(places).min()) if len(places) > 1 else 1.0
+    half_width = min(0.12 * gap, 0.02 * float(np.ptp(places)))
+    style.policy_means(rows.assign(spot=spots), "spot", looks, half_width, ax)
+    if names or len(values) <= MOST_TICKS:
+        ax.set_xticks(places, names or [*map(value_text, values)])
+
+
+def _cells(
+    rows: pd.DataFrame,
+    shape: tuple[int, int],
+    ends: tuple[float, float],
+    metric: str,
+    columns: int,
+    ax: Axes,
+) -> Any:
+    """The cells of a panel, coloured; framed where they may be the best, with a star on it."""
+    means = np.full(shape, np.nan)
+    means[rows["row"], rows["column"]] = rows["mean"]
+    shades = "YlGnBu_r" if metric in LESS_IS_BETTER else "YlGnBu"
+    mesh = ax.pcolormesh(means, cmap=shades, vmin=ends[0], vmax=ends[1], edgecolors="white",
+                         linewidth=0.6, rasterized=means.size > 400)  # fmt: skip
+    roomy = shape[1] * columns <= 9 and shape[0] * columns <= 12
+    dark = 0.55 * (ends[1] - ends[0])
+    for row in rows.itertuples():
+        if row.tied:
+            corner, width = (row.column + 0.06, row.row + 0.06), 1.6 if columns == 1 else 1
+            ax.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK, linewidth=width))
+        if row.best:
+            ax.plot(row.column + 0.5, row.row + (0.76 if roomy else 0.5), marker="*", color=MARK,
+                    markersize=11 if columns == 1 else 8, markeredgecolor="white",
+                    markeredgewidth=0.7, linestyle="")  # fmt: skip
+        if roomy and not np.isnan(row.mean):
+            is_dark = (row.mean - ends[0] > dark) != (metric in LESS_IS_BETTER)
+            ax.text(row.column + 0.5, row.row + 0.42, _short(row.mean, metric), ha="center",
+                    va="center", fontsize=8.5, color="white" if is_dark else style.INK)  # fmt: skip
+    ax.grid(visible=False)
+    return mesh
+
+
+def _panels(count: int) -> tuple[Figure, np.ndarray]:
+    """A panel per field, two beside each other, with one axis of values."""
+    columns = min(2, count)
+    lines = ceil(count / columns)
+    figure, axes = style.panels(0.9 + 2.3 * lines, lines, "y", ncols=columns, sharey=True,
+                                squeeze=False)  # fmt: skip
+    for ax in axes.flat[count:]:
+        ax.set_visible(False)
+    return figure, axes
+
+
+def _label(field: str) -> str:
+    """The name of a field below a narrow panel."""
+    return fill(parameter(field).label, 28)
+
+
+def _axis(values: Sequence[Any]) -> tuple[list[float], list[str]]:
+    """Where values are on an axis, and the names of those that are no numbers."""
+    if is_numeric_dtype(pd.Series(values)):
+        return [*map(float, values)], []
+    return [*map(float, range(len(values)))], [*map(value_text, values)]
+
+
+def _name_ticks(axis: XAxis | YAxis, values: Sequence[Any], most: int, first: float = 0.0) -> None:
+    """Names of values at places one apart; of every second or third alone if they are many."""
+    places = range(0, len(values), ceil(len(values) / most))
+    names = [value_text(values[place]) for place in places]
+    axis.set_ticks([place + first for place in places], names)
+    spec = axis.axes.get_subplotspec()
+    if isinstance(axis, XAxis) and spec and sum(map(len, names)) > 55 / spec.get_gridspec().ncols:
+        axis.set_tick_params(rotation=30)
+
+
+def _places(column: pd.Series, values: Sequence[Any]) -> pd.Series:
+    """The number of every value."""
+    return column.map({value: place for place, value in enumerate(values)}).astype(int)
+
+
+def _graded(values: Sequence[Any]) -> dict[str, tuple[str, str]]:
+    """Colours from light to dark and markers, for values in their order."""
+    shades = sns.color_palette("flare", len(values)).as_hex()
+    return {value_text(v): (shades[k], "os^vPX*"[k % 7]) for k, v in enumerate(values)}
+
+
+def _of_metric(axis: Axis, metric: str) -> None:
+    """Ticks of a metric: in percent, or as numbers."""
+    style.round_ticks(axis, 6)
+    if metric in METRICS:
+        axis.set_major_formatter(PercentFormatter(1, decimals=None))
+    else:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+
+
+def _short(value: float, metric: str) -> str:
+    """A value in a cell."""
+    return f"{100 * value:.1f}" if metric in METRICS else f"{value:,.0f}"

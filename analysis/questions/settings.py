@@ -1,0 +1,350 @@
+"""The settings of a study: a policy at a design point each, ranked, compared and averaged.
+
+    results = load_results("results/fleets")
+    ranked(results)  # the best setting first, and those that may be as good
+    averaged(results, ["uavs"])  # by number of UAVs, over all else that the design varies
+
+All functions compare settings on common replications: every setting meets the same realisation of
+all random draws. ``metric`` is a column of ``results.missions``.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from pandas.api.types import is_numeric_dtype
+from scipy import stats
+
+from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, SHARES, parameter, value_text
+from analysis.results.tables import Results
+from analysis.stats.correction import adjust
+from analysis.stats.intervals import LEVEL, wilson
+from analysis.stats.paired import paired
+from analysis.stats.screening import may_be_best
+from dess import InputError
+
+MOST_VALUES, BINS = 12, 5  # a field with more numbers than that has its main effect in bins
+
+
+def varied(results: Results) -> dict[str, list[Any]]:
+    """The fields that have more than one value over the design, in the order of the study.
+
+    Returns:
+        Field -> its values: numbers in ascending order, others as text in the order of the study.
+    """
+    table = points(results)
+    return {str(field): _ordered(table[field]) for field in table}
+
+
+def points(results: Results) -> pd.DataFrame:
+    """The values of the varied fields at every design point.
+
+    Returns:
+        A row per design point, a column per field. A field that a point does not set has the value
+        of the scenario. What is no number is text: a range is ``5–7.5``.
+    """
+    manifest = results.store.manifest
+    fields = dict.fromkeys(field for point in manifest.points for field in point.values)
+    columns = {}
+    for field in fields:
+        values = [{**manifest.scenario, **point.values}[field] for point in manifest.points]
+        if field == "pads":  # without a number, it depends on the zone
+            values = [results.scenario(number).charging_pads for number in range(len(values))]
+        texts = _hashable(field, values)
+        if len({*texts}) > 1:
+            columns[field] = texts
+    return pd.DataFrame(columns, index=range(len(manifest.points)))
+
+
+def labelled(results: Results) -> pd.DataFrame:
+    """The missions with a column per varied field, whose values are those of ``points``."""
+    table = points(results)
+    at_points = {field: results.missions["point"].map(table[field]) for field in table}
+    return results.missions.assign(**at_points)
+
+
+def in_words(results: Results) -> list[str]:
+    """Every design point in words, as ``number of UAVs 3, arrival rate 0.02``."""
+    rows = points(results).to_dict("records")
+    return [
+        ", ".join(f"{parameter(str(f)).within} {value_text(v)}" for f, v in row.items())
+        or "the scenario"
+        for row in rows
+    ]
+
+
+def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -> pd.DataFrame:
+    """The settings by the mean of a metric, the best first.
+
+    Args:
+        results: The study.
+        metric: The metric that ranks them.
+        policy: The policy whose settings are ranked; all policies, if not given.
+
+    Returns:
+        A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, per
+        metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as of
+        ``analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the best, by
+        ``may_be_best`` over all rows. Of those alike the first in the study has the lower rank.
+
+    Raises:
+        InputError: If there is no such metric or policy.
+    """
+    missions = _missions(results, metric, policy)
+    others = [name for name in (*SHARES, *MEANS) if name != metric]
+    cells = missions.groupby(["policy", "point"], sort=False)
+    table = cells.size().rename("n").reset_index()
+    table = table.join(points(results), on="point")
+    for name in (*others, metric):
+        wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
+        wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[["policy", "point"]]))
+        ends = intervals(wide, name)
+        table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
+    table["tied"] = _tied(wide, metric)  # of the metric that ranks, the last of all
+    sign = 1 if metric in LESS_IS_BETTER else -1
+    table = table.iloc[np.argsort(sign * table[metric], kind="stable")].reset_index(drop=True)
+    table.insert(0, "rank", np.arange(1, len(table) + 1))
+    return table
+
+
+def averaged(
+    results: Results, by: Sequence[str], metric: str = PRODUCT, policy: str | None = None
+) -> pd.DataFrame:
+    """Means of every policy at each combination of values of some fields.
+
+    Where several design points have the values, the mean is over these points: the partial
+    dependence on the fields, over the design. All points share the replications, so a replication's
+    mean over the points is the unit of the intervals, which hold for the design as it is. Counted
+    are the replications that all these points have.
+
+    Args:
+        results: The study.
+        by: Varied fields; some, at least.
+        metric: The metric.
+        policy: The policy; all, if not given.
+
+    Returns:
+        A row per policy and combination, in the order of the study: ``policy``, the fields,
+        ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` that the mean is over,
+        and ``tied``: whether the combination may be the best of this policy.
+
+    Raises:
+        InputError: If there is no such field, metric or policy.
+    """
+    table = points(results)
+    if unknown := [field for field in by if field not in table]:
+        allowed = ", ".join(map(str, table)) or "none"
+        raise InputError(f"{unknown[0]}: has not several values in the study; allowed: {allowed}")
+    return _averaged(results, table[[*by]], metric, policy)
+
+
+def main_effects(
+    results: Results, metric: str = PRODUCT, policy: str | None = None
+) -> pd.DataFrame:
+    """The partial dependence of a metric on every varied field, as of ``averaged``.
+
+    A field with more than ``MOST_VALUES`` numbers, as of a sampled design, is cut into bins with
+    about as many design points.
+
+    Returns:
+        A row per field, policy and value: ``field``, ``value`` in words, ``position`` (0, 1, ... in
+        the order of the values) and the columns of ``averaged`` but the fields.
+    """
+    tables = []
+    for field, values in points(results).items():
+        binned = _binned(values)
+        order = {value: place for place, value in enumerate(_ordered(binned))}
+        rows = _averaged(results, binned.to_frame("value"), metric, policy)
+        rows.insert(0, "field", field)
+        rows.insert(2, "position", rows["value"].map(order).astype(int))
+        rows["value"] = rows["value"].map(value_text)
+        tables.append(rows.sort_values(["policy", "position"], kind="stable", key=_in_order))
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
+
+
+def by_influence(effects: pd.DataFrame) -> list[str]:
+    """The fields by how far the metric moves along their values, the widest first.
+
+    Args:
+        effects: Rows of ``main_effects``.
+    """
+    means = effects.groupby(["field", "policy"], sort=False)["mean"]
+    spans = (means.max() - means.min()).groupby("field", sort=False).mean()
+    return [str(field) for field in spans.sort_values(ascending=False, kind="stable").index]
+
+
+def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) -> pd.DataFrame:
+    """Every design point against a baseline point, for the same policy on the same replications.
+
+    Args:
+        results: The study.
+        point: The number of the baseline point.
+        metrics: The metrics.
+
+    Returns:
+        A row per metric, policy and other design point: ``metric``, ``policy``, ``point``, the
+        varied fields, ``difference`` (positive if more than at the baseline) with ``low`` and
+        ``high`` (95 % each), ``p``, ``p_adjusted`` (Holm, over the rows of the metric) and ``n``
+        pairs. A point without a replication of the baseline has no row.
+
+    Raises:
+        InputError: If there is no such point or metric.
+    """
+    count = len(results.store.manifest.points)
+    if not 0 <= point < count:
+        raise InputError(f"baseline: {point} is no design point; allowed: 0..{count - 1}")
+    tables = []
+    for metric in metrics:
+        rows = []
+        for policy in results.policies:
+            missions = _missions(results, metric, policy)
+            wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
+            rows += _differences(wide, policy, point, metric)
+        columns = ["metric", "policy", "point", "difference", "low", "high", "p", "n"]
+        table = pd.DataFrame(rows, columns=columns)
+        tables.append(table.assign(p_adjusted=adjust(table["p"].to_numpy(float), "holm")))
+    whole = pd.concat(tables, ignore_index=True)
+    fields = points(results).loc[whole["point"]].reset_index(drop=True)
+    measured = ["difference", "low", "high", "p", "p_adjusted", "n"]
+    return pd.concat([whole[["metric", "policy", "point"]], fields, whole[measured]], axis=1)
+
+
+def intervals(values: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Means of columns with 95 % intervals, as ``analysis.summary`` has them, for many columns.
+
+    Args:
+        values: (R, K) a row per replication, nan where a column lacks one.
+        metric: What the values are; shares have Wilson's interval, save means of several missions
+            that differ: these have Student's t, like all other metrics.
+
+    Returns:
+        (K, 4): ``mean``, ``low``, ``high``, ``n``, with the index of the columns.
+    """
+    n, mean = values.count(), values.mean()
+    errors = values.sem().fillna(0.0)
+    half = errors * stats.t.isf((1 - LEVEL) / 2, np.maximum(n - 1, 1))
+    table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
+    if metric in SHARES:
+        whole = values.isin((0, 1)) | values.isna()
+        table = _with_wilson(table, (whole.all() | (errors == 0)).to_numpy())
+    return table
+
+
+def _with_wilson(table: pd.DataFrame, rows: np.ndarray) -> pd.DataFrame:
+    """Estimates with Wilson's interval in some rows; each pair of numbers is computed once."""
+    successes = (table["mean"] * table["n"]).round().astype(int)
+    pairs = list(zip(successes[rows], table["n"][rows], strict=True))
+    known = {pair: wilson(*pair) for pair in {*pairs} if pair[1]}
+    ends = np.array([known.get(pair, (np.nan,) * 3) for pair in pairs]).reshape(-1, 3)
+    table.loc[rows, ["low", "high"]] = ends[:, 1:]
+    return table
+
+
+def _averaged(
+    results: Results, labels: pd.DataFrame, metric: str, policy: str | None
+) -> pd.DataFrame:
+    """Means at each combination of labels of design points, as ``averaged`` has them."""
+    groups = labels.groupby([*labels], sort=False)
+    cell_of, cells = groups.ngroup().to_numpy(), labels.drop_duplicates(ignore_index=True)
+    sizes = np.bincount(cell_of)
+    missions = _missions(results, metric, policy)
+    design = results.manifest["study"]["design"] or {}
+    if sampled := design.get("kind") == "saltelli":  # its samples A and B alone are independent
+        last = len(design["ranges"]) + 2
+        missions = missions[(missions["point"] % (last + 1)).isin((0, last))]
+    missions = missions.assign(cell=cell_of[missions["point"].to_numpy()])
+    tables = []
+    for name, part in missions.groupby("policy", sort=False):
+        units = part.groupby(["cell", "replication"])[metric].agg(["mean", "size"])
+        if not sampled:  # replications that all points of a cell have
+            units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
+        wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
+        table = pd.concat([cells, intervals(wide, metric)], axis=1)
+        table = table.assign(points=sizes, tied=_tied(wide, metric))
+        table.insert(0, "policy", name)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
+    """The missions of a policy, or of all, if they have the metric.
+
+    Raises:
+        InputError: If there is no such metric or policy.
+    """
+    missions = results.missions
+    known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in missions]
+    if metric not in known:
+        raise InputError(f"metric: {metric!r} is unknown; allowed: {', '.join(known)}")
+    if policy is None:
+        return missions
+    if policy not in results.policies:
+        allowed = ", ".join(results.policies)
+        raise InputError(f"policy: {policy!r} is not in the study; allowed: {allowed}")
+    return missions[missions["policy"] == policy]
+
+
+def _in_order(column: pd.Series) -> pd.Series:
+    """Policies by their order of appearance, other columns as they are: a key to sort by."""
+    return column if is_numeric_dtype(column) else pd.Series(pd.factorize(column)[0], column.index)
+
+
+def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
+    sign = -1.0 if metric in LESS_IS_BETTER else 1.0
+    return may_be_best(sign * values.to_numpy(float), metric in SHARES)
+
+
+def _differences(wide: pd.DataFrame, policy: str, baseline: int, metric: str) -> list[tuple]:
+    """Every other column of (replications, points) against the baseline's."""
+    rows = []
+    for point in wide.columns.drop(baseline):
+        pairs = wide[[point, baseline]].dropna().to_numpy()
+        if len(pairs):
+            of = paired(pairs[:, 0], pairs[:, 1], share=metric in SHARES)
+            rows.append((metric, policy, point, of.difference, of.low, of.high, of.p, of.n))
+    return rows
+
+
+def _ordered(values: pd.Series) -> list[Any]:
+    """The different values: numbers and bins in ascending order, others as they come."""
+    unique = values.drop_duplicates()
+    ascends = is_numeric_dtype(unique) or isinstance(unique.dtype, pd.CategoricalDtype)
+    return (unique.sort_values() if ascends else unique).tolist()
+
+
+def _binned(values: pd.Series) -> pd.Series:
+    """Values, or the bins that they are in, if they are too many numbers."""
+    if not is_numeric_dtype(values) or values.nunique() <= MOST_VALUES:
+        return values
+    places = pd.qcut(values, BINS, labels=False, duplicates="drop")
+    ends = values.groupby(places).agg(["min", "max"])
+    names = [f"{low:.3g}–{high:.3g}" for low, high in ends.to_numpy()]
+    return places.map(dict(enumerate(names))).astype(pd.CategoricalDtype(names, ordered=True))
+
+
+def _hashable(field: str, values: Sequence[Any]) -> list[Any]:
+    """Values as they are, if all are numbers, or as text."""
+    plain = [
+        v[0] if isinstance(v, list | tuple) and len({*map(str, v)}) == 1 else v for v in values
+    ]
+    if field == "nodes":
+        return _numbered([f"{len(nodes)} cells" for nodes in values], values)
+    if field == "zone":
+        return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
+    plain = [v[0] if isinstance(v, list | tuple) and v[0] == v[-1] else v for v in values]
+    if any(isinstance(value, bool | list | tuple) for value in plain):
+        return [value_text(value) for value in plain]
+    return plain
+
+
+def _numbered(names: Sequence[str], values: Sequence[Any]) -> list[str]:
+    """Names with a number, where different values have the same."""
+    found: dict[str, list[Any]] = {}
+    for name, value in zip(names, values, strict=True):
+        if value not in found.setdefault(name, []):
+            found[name].append(value)
+    return [
+        name if len(found[name]) == 1 else f"{name} ({found[name].index(value) + 1})"
+        for name, value in zip(names, values, strict=True)
+    ]
