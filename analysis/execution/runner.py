@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.workers import Cluster, Here, Pool
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
 from analysis.results.manifest import Cell
+from analysis.results.reuse import sources
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.study import Study, load_study
@@ -68,6 +70,7 @@ def run_study(
     progress: Progress | None = None,
     announce: Callable[[Round], object] | None = None,
     accept_code: bool = False,
+    reuse: Sequence[Path] = (),
 ) -> Results:
     """Run a study into a results folder; what is there already is kept.
 
@@ -83,6 +86,8 @@ def run_study(
         announce: Called before each round.
         accept_code: Whether to go on with missions that other code has simulated. What is accepted
             is written into the manifest.
+        reuse: Other results folders, whose missions are taken over where they are those of the
+            study. Those that are damaged, or of other code or another seed, are not.
 
     Raises:
         InputError: If the study is not valid, the folder cannot be written, is in use or holds
@@ -94,7 +99,7 @@ def run_study(
     check_workers(workers)
     pool = Cluster(scheduler) if scheduler else Here(workers)
     with pool, Store.open(study, out, accept_code) as store:
-        _Run(study, store, pool, progress, announce).complete()
+        _Run(study, store, pool, progress, announce, reuse).complete()
         return results_of(store)
 
 
@@ -117,6 +122,7 @@ class _Run:
     pool: Pool
     progress: Progress | None
     announce: Callable[[Round], object] | None
+    reuse: Sequence[Path]
     rounds: int = 0  # so far
     asked: int = 0  # missions of these rounds
 
@@ -156,6 +162,7 @@ class _Run:
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
         """Do the missing missions of a round, whose parts these are, and the logs."""
+        self._take_over(parts)
         jobs, present = [*logs], 0
         for chunk in split(parts, CHUNK[self.study.engine]):
             missing = self.store.missing(chunk)
@@ -169,6 +176,16 @@ class _Run:
         if self.progress:
             self.progress(present)
         self._do(jobs)
+
+    def _take_over(self, parts: Sequence[Part]) -> None:
+        """Take what is missing of the parts from the other folders, as far as it is there."""
+        if self.reuse and any(map(self.store.missing, split(parts, CHUNK[self.study.engine]))):
+            for source in self._sources:
+                self.store.take_over(source, parts)
+
+    @cached_property
+    def _sources(self) -> list[Store]:
+        return sources(self.reuse, self.store.manifest)
 
     def _log_jobs(self) -> list[Job]:
         """The missions to simulate again, whose event logs are wanted and missing."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -60,6 +61,17 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
     uavs |= {name: records.uavs[name][present] for name in UAV_RECORD.names or ()}
     uavs["end"] = np.array(END_NAMES)[uavs["end"]]
     return Tables(_table(missions, MISSIONS, chunk), _table(uavs, UAVS, chunk))
+
+
+def tables_with(chunk: Chunk, missions: pd.DataFrame, uavs: pd.DataFrame) -> Tables:
+    """The rows of the missions of a chunk, as ``rows_of`` has them, as tables of the chunk."""
+    keys = {part.cell.point: part.cell.key for part in chunk.parts}
+    tables = []
+    for rows, schema in ((missions, MISSIONS), (uavs, UAVS)):
+        columns = {name: rows[name].to_numpy() for name in schema.names if name != "cell"}
+        columns["cell"] = rows["point"].map(keys).to_numpy()
+        tables.append(_table(columns, schema, chunk))
+    return Tables(*tables)
 
 
 def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> pa.Table:

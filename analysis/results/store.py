@@ -10,7 +10,7 @@ in which order or by how many workers it was computed.
 
 import json
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Self
@@ -22,7 +22,7 @@ import pyarrow as pa
 from filelock import FileLock, Timeout
 
 from analysis.results import parquet
-from analysis.results.chunks import Chunk, Failure, Part, gaps, short_hash
+from analysis.results.chunks import Chunk, Failure, Part, gaps, short_hash, split
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.rows import rows_of
 from analysis.study.study import Study
@@ -173,7 +173,48 @@ class Store:
         Raises:
             ValueError: If they are not those of the chunk.
         """
-        tables = parquet.tables_of(chunk, records)
+        self._keep(chunk, parquet.tables_of(chunk, records))
+
+    def take_over(self, other: "Store", parts: Sequence[Part]) -> None:
+        """Keep those of the missing missions of parts that another folder has.
+
+        Cells of equal keys have equal records, so nothing but time depends on it.
+
+        Args:
+            other: The other folder, of any study.
+            parts: Of the study of this folder.
+
+        Nothing is taken over from a folder that has different records of a mission.
+        """
+        whose = {key: team for team, key in other._present}
+        for chunk in split(parts, sum(len(part.replications) for part in parts)):
+            shared = other._shared(self.missing(chunk), whose)
+            if shared:
+                teams = {whose[part.cell.key] for part in shared.parts}
+                held = [tables for (team, _), tables in other._tables.items() if team in teams]
+                try:
+                    missions, uavs = (rows_of(shared.parts, k) for k in zip(*held, strict=True))
+                except InputError:
+                    return
+                self._keep(shared, parquet.tables_with(shared, missions, uavs))
+
+    def _shared(self, chunk: Chunk | None, whose: Mapping[str, int]) -> Chunk | None:
+        """What is there of a chunk of another folder, if anything.
+
+        Args:
+            chunk: The chunk; its cells have teams and points of the other folder.
+            whose: The team of every cell here, by its key.
+        """
+        parts = []
+        for part in chunk.parts if chunk else ():
+            key = part.cell.key
+            present = self._present[whose[key], key] if key in whose else []
+            absent = gaps(part.replications, present)
+            parts += [Part(part.cell, there) for there in gaps(part.replications, absent)]
+        return Chunk(chunk.team, tuple(parts)) if chunk and parts else None
+
+    def _keep(self, chunk: Chunk, tables: parquet.Tables) -> None:
+        """Write the tables of a chunk."""
         parquet.check(tables.missions, chunk, self.manifest.seed)
         # Missions last: a chunk is present when they are.
         parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)

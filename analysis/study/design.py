@@ -6,15 +6,17 @@ function of its fields, in their written order.
 """
 
 import sys
+from abc import abstractmethod
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from math import prod
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 
 from analysis.study.stopping import StrictTable
+from dess import InputError
 from dess.scenario import Integer, Scenario, validation_line
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
@@ -90,13 +92,22 @@ PowerOfTwo = Annotated[Integer, AfterValidator(_is_power_of_two)]
 
 
 class _Design(StrictTable):
+    @property
+    @abstractmethod
+    def count(self) -> int:
+        """Number of design points, known without making them."""
+
     @cached_property
     def points(self) -> tuple[DesignPoint, ...]:
         """The design points, in order."""
         return tuple(self._points())
 
-    def _points(self) -> Iterator[DesignPoint]:
-        raise NotImplementedError
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number."""
+        return self.points[number]
+
+    @abstractmethod
+    def _points(self) -> Iterator[DesignPoint]: ...
 
 
 class Grid(_Design):
@@ -107,9 +118,23 @@ class Grid(_Design):
         {}, description="field -> values; without any, the one point is the scenario as it is"
     )
 
+    @property
+    def count(self) -> int:
+        """The product of the numbers of values."""
+        return prod(map(len, self.values.values()))
+
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number, made alone: there may be too many to make all."""
+        chosen = {}
+        for field, values in reversed(self.values.items()):
+            number, place = divmod(number, len(values))
+            chosen[field] = values[place]
+        return DesignPoint({field: chosen[field] for field in self.values})
+
     def _points(self) -> Iterator[DesignPoint]:
-        for combination in product(*self.values.values()):
-            yield DesignPoint(dict(zip(self.values, combination, strict=True)))
+        if self.count > MAX_SIZE:
+            raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
+        return map(self.point, range(self.count))
 
 
 class OneAtATime(_Design):
@@ -121,6 +146,11 @@ class OneAtATime(_Design):
     kind: Literal["one-at-a-time"] = "one-at-a-time"
     values: Values = Field(min_length=1, description="field -> values")
 
+    @property
+    def count(self) -> int:
+        """The sum of the numbers of values."""
+        return sum(map(len, self.values.values()))
+
     def _points(self) -> Iterator[DesignPoint]:
         for field, values in self.values.items():
             yield from (DesignPoint({field: value}) for value in values)
@@ -131,6 +161,11 @@ class Table(_Design):
 
     kind: Literal["table"] = "table"
     rows: Rows = Field(min_length=1, description="tables of field -> value, one per point")
+
+    @property
+    def count(self) -> int:
+        """The number of rows."""
+        return len(self.rows)
 
     def _points(self) -> Iterator[DesignPoint]:
         return map(DesignPoint, self.rows)
@@ -156,6 +191,11 @@ class LatinHypercube(_Sampled):
 
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     size: Integer = Field(ge=1, le=MAX_SIZE, description="number of points")
+
+    @property
+    def count(self) -> int:
+        """The size."""
+        return self.size
 
     def _points(self) -> Iterator[DesignPoint]:
         from scipy.stats import qmc
@@ -184,6 +224,11 @@ class Saltelli(_Sampled):
         le=MAX_REPLICATION + 1,
         description="number of replications that the noise is drawn from",
     )
+
+    @property
+    def count(self) -> int:
+        """``base`` blocks of D + 2 points, for D factors."""
+        return self.base * (len(self.ranges) + 3)
 
     @property
     def problem(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Studies: policies x design points x replications, as data."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -32,6 +32,9 @@ from dess.streams import MAX_SEED
 from policies import load_team
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
+
+# With more design points, a study checks them when they are made, not when it is.
+MANY_POINTS = 100_000
 
 # The first replication of the missions that check a selected setting: none that selected it.
 CHECK = MOST
@@ -99,7 +102,10 @@ class Study(StrictTable):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         self._check_rule()
-        self._check_design()
+        if self.size <= MANY_POINTS:
+            self.points  # noqa: B018 - they are checked when they are made
+        else:
+            self.point(0)
         if self.logged > self.first:
             raise ValueError(
                 f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
@@ -119,24 +125,23 @@ class Study(StrictTable):
             )
 
     def _check_budget(self) -> None:
-        """A selection must be able to afford its first round; needs valid design points."""
-        least = self.first * len(self.points)
+        """A selection must be able to afford its first round."""
+        least = self.first * self.size
         if self.selection and least > self.selection.budget:
             raise ValueError(
                 f"selection.budget: {self.selection.budget} is less than the first missions of all "
                 f"design points; allowed: {least} or more"
             )
 
-    def _check_design(self) -> None:
-        designs = [point.values for point in self._rows]
-        for values in designs:
-            if both := sorted(self.set.keys() & values.keys()):
-                raise ValueError(f"design: {both[0]} is also in set; allowed: either")
+    def _check_rows(self, rows: Sequence[DesignPoint]) -> None:
+        for row in rows:
+            if both := sorted(self.set.keys() & row.values.keys()):
+                raise InputError(f"design: {both[0]} is also in set; allowed: either")
         if hasattr(self.design, "ranges"):  # drawn integers may well fall together
             return
-        for shown, count in Counter(map(_shown, designs)).items():
+        for shown, count in Counter(_shown(row.values) for row in rows).items():
             if count > 1:
-                raise ValueError(f"design: {shown} is listed twice; allowed: once")
+                raise InputError(f"design: {shown} is listed twice; allowed: once")
 
     @property
     def command(self) -> list[str]:
@@ -156,16 +161,35 @@ class Study(StrictTable):
         """Replications of every cell before a rule, if there is one, asks for more."""
         return self.rule.first if self.rule else self.missions
 
+    @property
+    def size(self) -> int:
+        """Number of design points, known without making them."""
+        return self.design.count if self.design else 1
+
     @cached_property
     def points(self) -> tuple[Point, ...]:
-        """The design points in the order of the design."""
-        return tuple(
-            Point(p.values, self._scenario_at(p.values), p.replication) for p in self._rows
-        )
+        """The design points in the order of the design.
 
-    @property
-    def _rows(self) -> tuple[DesignPoint, ...]:
-        return self.design.points if self.design else (DesignPoint({}),)
+        Raises:
+            InputError: If there are too many, one is listed twice or has no valid scenario; of a
+                study that has been made, only with more than ``MANY_POINTS``.
+        """
+        rows = self.design.points if self.design else (DesignPoint({}),)
+        self._check_rows(rows)
+        return tuple(map(self._point, rows))
+
+    def point(self, number: int) -> Point:
+        """A design point by its number, made alone.
+
+        Raises:
+            InputError: If it has no valid scenario.
+        """
+        row = self.design.point(number) if self.design else DesignPoint({})
+        self._check_rows([row])
+        return self._point(row)
+
+    def _point(self, row: DesignPoint) -> Point:
+        return Point(row.values, self._scenario_at(row.values), row.replication)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         try:
