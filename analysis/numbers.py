@@ -65,6 +65,13 @@ def seconds(time: float) -> str:
     return f"{float(f'{time / size:.3g}'):g} {unit}"
 
 
+def duration(time: float) -> str:
+    """A long time [s] in its largest unit, as ``50 seconds``, ``12 minutes`` or ``1,200 days``."""
+    units = (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0), ("seconds", 1.0))
+    unit, size = next((pair for pair in units if time >= 2 * pair[1]), units[-1])
+    return f"{time / size:,.0f} {unit}"
+
+
 def span(values: Iterable[float], form: str = "{:,}") -> str:
     """The least and the largest of some numbers: ``300``, or ``20 to 1,200``."""
     ordered = sorted(values)

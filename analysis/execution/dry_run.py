@@ -1,20 +1,26 @@
 """The plan of a run of a study: its missions, those that are present already, and the time."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis import numbers
 from analysis.execution.runner import CHUNK, check_workers
 from analysis.results.chunks import check_parts, parts_of, split
+from analysis.results.reuse import sources
 from analysis.results.store import Store
-from analysis.study.study import Study
-from dess import simulate, simulate_batch
+from analysis.study.design import MAX_SIZE
+from analysis.study.study import MANY_POINTS, Study
+from dess import InputError, simulate, simulate_batch
 from policies import load_team
 
 # Missions that are timed to estimate the time of all; more, as long as they take no time.
 TRIAL, LONG_TRIAL, ENOUGH = 48, 240, 0.2  # the last in seconds
 TRIAL_SEED = 400_000_000
+
+# A run that takes longer than this [s] has to be confirmed. Few missions are run without a trial.
+LONG_RUN, FEW = 3600.0, 10_000
 
 
 @dataclass(frozen=True)
@@ -87,6 +93,55 @@ def plan_study(
     return Plan(tuple(rows), len(study.points), at_most, seconds)
 
 
+def check_effort(
+    study: Study,
+    out: str | Path,
+    workers: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
+    accept_code: bool = False,
+    reuse: Sequence[Path] = (),
+    yes: bool = False,
+) -> None:
+    """Refuse a run of more than an hour or of very many design points, before these are made.
+
+    Args:
+        study: The study.
+        out: The results folder, which need not exist.
+        workers: Processes.
+        clock: Tells the time [s].
+        accept_code: As of ``run_study``.
+        reuse: As of ``run_study``.
+        yes: Whether it may take as long as it takes.
+
+    Raises:
+        InputError: If it would take long, with the number of missions and the estimated time; if
+            the folder holds something else, or there is no worker.
+    """
+    check_workers(workers)
+    if yes and study.size <= MAX_SIZE:
+        return
+    teams = range(len(study.policies))
+    if study.size > MANY_POINTS:
+        missing = [study.size * study.first for _ in teams]
+    else:
+        store = Store.peek(study, out, accept_code)
+        for source in sources(reuse, store.manifest):
+            store.count(source)
+        missing = [_missing(study, store, team)[0] for team in teams]
+    if sum(missing) <= FEW:
+        return
+    times = [missing[t] * _seconds_per_mission(study, t, clock) for t in teams if missing[t]]
+    seconds = sum(times) / workers
+    if study.size > MANY_POINTS or seconds > LONG_RUN:
+        confirmed = "--yes, or less" if study.size <= MAX_SIZE else f"{MAX_SIZE:,} design points"
+        least = "at least " if study.rule else ""
+        raise InputError(
+            f"study {study.name}: {least}{sum(missing):,} missions to simulate "
+            f"({len(study.policies)} policies, {study.size:,} design points), about "
+            f"{numbers.duration(seconds)} with {workers} at work; allowed: {confirmed}"
+        )
+
+
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
     """Missions of a team that are missing, and all that are wanted for now."""
     manifest = store.manifest
@@ -109,8 +164,8 @@ def _seconds_per_mission(study: Study, team: int, clock: Callable[[], float]) ->
     policies = load_team(study.policies[team])
 
     def trial(missions: int) -> float:
-        numbers = [(n * len(study.points)) // missions for n in range(missions)]
-        spaces = [study.points[number].scenario for number in numbers]
+        places = [(n * study.size) // missions for n in range(missions)]
+        spaces = [study.point(place).scenario for place in places]
         begin = clock()
         if study.engine == "batch":
             simulate_batch(spaces, policies, TRIAL_SEED, missions)

@@ -178,13 +178,12 @@ class Store:
     def take_over(self, other: "Store", parts: Sequence[Part]) -> None:
         """Keep those of the missing missions of parts that another folder has.
 
-        Cells of equal keys have equal records, so nothing but time depends on it.
+        Cells of equal keys have equal records, so nothing but time depends on it. A folder that has
+        two different records of a mission gives none.
 
         Args:
             other: The other folder, of any study.
             parts: Of the study of this folder.
-
-        Nothing is taken over from a folder that has different records of a mission.
         """
         whose = {key: team for team, key in other._present}
         for chunk in split(parts, sum(len(part.replications) for part in parts)):
@@ -197,6 +196,13 @@ class Store:
                 except InputError:
                     return
                 self._keep(shared, parquet.tables_with(shared, missions, uavs))
+
+    def count(self, other: "Store") -> None:
+        """Count the missions of another folder as if they were here, to plan a run."""
+        held = {key: present for (_, key), present in other._present.items()}
+        for cells in self.manifest.cells:
+            for cell in cells:
+                self._present[cell.team, cell.key] += held.get(cell.key, [])
 
     def _shared(self, chunk: Chunk | None, whose: Mapping[str, int]) -> Chunk | None:
         """What is there of a chunk of another folder, if anything.

@@ -1,20 +1,15 @@
 """``dess study``: run a study into a results folder, and show its results."""
 
 import json
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from dess import InputError
 from reports.cli import console
+from reports.cli.running import YesOption, complete
 from reports.cli.settings import RESULTS, JsonOption, WorkersOption
-
-if TYPE_CHECKING:
-    from analysis.execution.runner import Round
 
 app = typer.Typer(help="Studies: policies x design points x replications.")
 
@@ -44,9 +39,11 @@ def run(
         bool,
         typer.Option("--accept-code", help="Keep missions simulated by other code, and note it."),
     ] = False,
+    yes: YesOption = False,
 ) -> None:
     """Run a study into a results folder; run again to resume or to top up."""
-    from analysis.execution.runner import ChunkError, run_study
+    from analysis.execution.dry_run import check_effort, plan_study
+    from analysis.execution.runner import run_study
     from analysis.study.study import load_study
     from reports.cli import study_tables
 
@@ -54,43 +51,20 @@ def run(
     study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
     out = out or RESULTS / study.name
     if dry_run:
-        from analysis.execution.dry_run import plan_study
-
         with console.compile_notice():
             plan = plan_study(study, out, workers, accept_code=accept_code)
             study_tables.print_plan(plan, study, out, workers)
         return
-    try:
-        with console.compile_notice(), _bar() as (progress, announce):
-            results = run_study(study, out, workers, scheduler, progress, announce, accept_code)
-    except KeyboardInterrupt:
-        line = "interrupted: run the same command again to complete it"
-        raise typer.Exit(console.fail(line, 1)) from None
-    except ChunkError as error:
-        for path, failure in error.failures.items():
-            console.fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)
-        count = len(error.failures)
-        line = f"dess: error: {count} of the chunks of study {study.name} failed, the rest is done"
-        raise typer.Exit(console.fail(line, 1)) from None
+    with console.compile_notice():
+        check_effort(study, out, workers, accept_code=accept_code, yes=yes)
+    results = complete(
+        study.name,
+        lambda progress, announce: run_study(
+            study, out, workers, scheduler, progress, announce, accept_code
+        ),
+    )
     study_tables.print_summary(results, out, short=True)
     print(f"more: dess study show {out}")
-
-
-@contextmanager
-def _bar() -> "Iterator[tuple[Callable[[int], object], Callable[[Round], object]]]":
-    """Progress in missions: callbacks for missions done, and for rounds, which add missions."""
-    with console.bar("mission") as bar:
-
-        def begin(started: "Round") -> None:
-            if started.number:
-                bar.set_description(f"round {started.number + 1}", refresh=False)
-            else:
-                present = f", {started.present:,} of them present" if started.present else ""
-                print(f"{started.missions:,} missions{present}", file=sys.stderr)
-            bar.total = started.missions
-            bar.initial += started.present  # took no time
-
-        yield bar.update, begin
 
 
 @app.command("show")
