@@ -47,12 +47,16 @@ class Parameter(NamedTuple):
         return _tex(self.short)
 
 
+# The parameters of the paper (its Fig. 5), which every mission has values of.
 PARAMETERS = {
     "uavs": Parameter("Number of UAVs", "UAVs"),
     "charge_start": Parameter("Charging start capacity C_S", "C_S", "%"),
     "charge_complete": Parameter("Charging complete capacity C_C", "C_C", "%"),
     "initial_data": Parameter("Initial data per node", "Initial data", "data units"),
     "flying_time": Parameter("Flying time", "Flying time", "mission slots"),
+}
+# Others that studies vary.
+_OTHERS = {
     "pads": Parameter("Number of charging pads", "Pads"),
     "zone": Parameter("Start and charging zone", "Zone"),
     "nodes": Parameter("Sensor nodes", "Nodes"),
@@ -70,7 +74,7 @@ DECISIONS = (
 
 def parameter(field: str) -> Parameter:
     """How a field of a scenario is called; by the name of the field, if it has no other."""
-    return PARAMETERS.get(field, Parameter(field, field))
+    return (PARAMETERS | _OTHERS).get(field, Parameter(field, field))
 
 
 def metric_name(metric: str) -> str:
