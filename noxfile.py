@@ -19,6 +19,7 @@ STUDIES: dict[str, list[str]] = {
     "sweet-spot": ["ddqn", "greedy"],
     "sensitivity": [],
     "comparison": [],
+    "explorer": [],
     "verification": [],
 }
 # Two test files at a time, in the order of their collection.

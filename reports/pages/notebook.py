@@ -30,6 +30,7 @@ NAMES = (  # in the order of the index
     "learning",
     "parameters",
     "comparison",
+    "explorer",
     "what-if",
     "verification",
     SCORECARD,

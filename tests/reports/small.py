@@ -29,6 +29,11 @@ STUDIES: dict[str, dict[str, Any]] = {
     "verification": {"missions": 200, "logged": 8},
     "fig4": {"policies": POLICIES, "missions": 8, "logged": 2},
     "fig5": {"policies": POLICIES, "missions": 8},
+    "explorer": {
+        "policies": POLICIES,
+        "missions": 8,
+        "design": {"kind": "grid", "values": {"uavs": [1, 3], "initial_data": [[5, 7.5], 10]}},
+    },
     "sweet-spot": {
         "policies": POLICIES,
         "selection": RULE,

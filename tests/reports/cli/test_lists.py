@@ -12,8 +12,8 @@ def test_names_are_listed(dess):
         "policies": ["random", "nearest", "greedy", "tour", *trained_names()],
         "scenarios": ["fig1", "fig4", "paper"],
         "studies": [
-            *("charge-limits", "comparison", "fig1", "fig4", "fig5", "precise", "screening"),
-            *("sensitivity", "sweet-spot", "table4", "verification"),
+            *("charge-limits", "comparison", "explorer", "fig1", "fig4", "fig5", "precise"),
+            *("screening", "sensitivity", "sweet-spot", "table4", "verification"),
         ],
     }.items():
         code, out, err = dess(command)

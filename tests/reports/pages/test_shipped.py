@@ -38,6 +38,7 @@ FIGURES = {
     "learning": 7 + len(trained_names()),
     "parameters": 9,
     "comparison": 12 + 4,
+    "explorer": 3,
     "what-if": 9,
     "verification": 13,
     "scorecard": 0,

@@ -1,0 +1,172 @@
+"""The explorer shows the means of the grid, wherever its sliders stand, in a real browser."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser, Locator, Page
+from scipy import stats
+
+from analysis import run_study
+from analysis.names import METRICS, SUCCESS
+from analysis.results.tables import Results
+from dess import InputError
+from reports.explorer import Grid, explorer
+from tests.analysis.small import grid, small_study
+from tests.reports.browser import Visit
+
+DESIGN = {"uavs": [3, 1, 2], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
+START = (1, 1, 1)  # the places of the sliders at first
+POLICIES = ["greedy", "random"]
+MISSIONS = 12
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("explorer")
+    study = small_study(folder, policies=POLICIES, missions=MISSIONS, design=grid(**DESIGN))
+    return run_study(study, folder / "results")
+
+
+@pytest.fixture(scope="module")
+def document(results: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("page") / "page.html"
+    head = (
+        '<!DOCTYPE html><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+    )
+    path.write_text(head + explorer(results).data, "utf-8")
+    return path
+
+
+def estimate(results: Results, places: tuple[int, ...], policy: str, metric: str) -> list[float]:
+    """A mean and its interval in percent, computed anew from the files of the results."""
+    sliders = zip(DESIGN.items(), places, strict=True)
+    values = {field: values[place] for (field, values), place in sliders}
+    manifest = results.store.manifest
+    (point,) = (n for n, p in enumerate(manifest.points) if p.values == values)
+    missions = pd.read_parquet(results.store.folder / "missions")
+    cell = manifest.cells[POLICIES.index(policy)][point].key
+    sample = missions.loc[missions["cell"].astype(str) == cell, metric]
+    assert len(sample) == MISSIONS
+    if metric == SUCCESS:
+        ends = stats.binomtest(int(sample.sum()), MISSIONS).proportion_ci(0.95, "wilson")
+    else:
+        ends = stats.ttest_1samp(sample, 0).confidence_interval(0.95)
+    return [100 * sample.mean(), 100 * ends[0], 100 * ends[1]]
+
+
+def text_of(mean: float, low: float, high: float) -> str:
+    return f"{mean:.1f} % [{low:.1f}, {high:.1f}], n = {MISSIONS}".replace("-", "−")
+
+
+def row(page: Page, metric: str, policy: str) -> Locator:
+    return page.locator(f'[data-metric="{metric}"] tr[data-policy="{policy}"]')
+
+
+def check(page: Page, results: Results, places: tuple[int, ...]) -> None:
+    """The numbers and the dots of all policies and metrics are those of the setting."""
+    for metric in METRICS:
+        for policy in POLICIES:
+            mean, *ends = estimate(results, places, policy, metric)
+            shown = row(page, metric, policy)
+            assert shown.locator(".estimate").text_content() == text_of(mean, *ends)
+            dot = shown.locator("circle").get_attribute("cx")
+            whisker = shown.locator("line").nth(3)
+            drawn = [dot, *(whisker.get_attribute(name) for name in ("x1", "x2"))]
+            exact = [mean, *(min(max(end, 0), 100) for end in ends)]
+            for text, value in zip(drawn, exact, strict=True):
+                assert float(str(text).removesuffix("%")) == pytest.approx(value, abs=0.051)
+
+
+def check_curve(page: Page, results: Results, places: tuple[int, ...], along: int) -> None:
+    """The curve has a dot for every policy and every value of a slider."""
+    read = "dots => dots.map(dot => parseFloat(dot.getAttribute('cy')))"
+    heights = page.locator(".curve circle").evaluate_all(read)
+    metric = [*METRICS][int(page.locator("[name=metric]").input_value())]
+    stops = [
+        tuple(n if slider == along else place for slider, place in enumerate(places))
+        for n in range(len([*DESIGN.values()][along]))
+    ]
+    means = [estimate(results, stop, policy, metric)[0] for policy in POLICIES for stop in stops]
+    assert heights == pytest.approx([100 - mean for mean in means], abs=0.051)
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_moving_a_slider_shows_the_figures_of_the_grid(
+    visit: Callable[[Path, int], Visit], results: Results, document: Path, width: int
+) -> None:
+    opened = visit(document, width)
+    page, places = opened.page, [*START]
+    check(page, results, START)
+    for number, (field, values) in enumerate(DESIGN.items()):
+        slider = page.locator(f"input[name={field}]")
+        page.locator("[name=along]").select_option(str(number))
+        for key, place in (("Home", 0), ("ArrowRight", 1), ("End", len(values) - 1)):
+            slider.press(key)
+            places[number] = place
+            check(page, results, tuple(places))
+            check_curve(page, results, tuple(places), number)
+    page.locator("[name=metric]").select_option("0")
+    check_curve(page, results, tuple(places), len(DESIGN) - 1)
+    assert (
+        page.locator("input[name=initial_data]").get_attribute("aria-valuetext") == "5 data units"
+    )
+    assert page.get_by_role("slider", name="Number of UAVs").get_attribute("name") == "uavs"
+    command = page.locator(".setting code").text_content()
+    assert command == "--set uavs=2 --set charge_complete=60 --set initial_data=5"
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert opened.complaints == []
+    assert opened.requests == [document.as_uri()]
+
+
+def test_policies_are_chosen(visit: Callable[[Path, int], Visit], document: Path) -> None:
+    page = visit(document, 1280).page
+    page.get_by_role("checkbox", name="greedy").uncheck()
+    for metric in METRICS:
+        assert row(page, metric, "greedy").is_hidden()
+        assert row(page, metric, "random").is_visible()
+    assert page.locator(".curve circle").count() == len(DESIGN["uavs"])
+
+
+def test_without_scripts_one_setting_is_shown(
+    chromium: Browser, results: Results, document: Path
+) -> None:
+    page = chromium.new_page(java_script_enabled=False)
+    page.goto(document.as_uri())
+    assert "The sliders need JavaScript" in str(page.locator("noscript").inner_html())
+    for metric in METRICS:
+        shown = row(page, metric, "greedy").locator(".estimate").inner_text()
+        assert shown == text_of(*estimate(results, START, "greedy", metric))
+    assert page.get_by_label("Metric").is_hidden()
+    page.close()
+
+
+def test_the_grid_starts_in_the_middle(results: Results) -> None:
+    opened = Grid(results)
+    values = {"uavs": 1, "charge_complete": 60, "initial_data": 5}
+    assert results.store.manifest.points[opened.start].values == values
+    assert opened.in_words(opened.start) == (
+        "number of UAVs 1, charging complete capacity C_C 60 %, initial data per node 5 data units"
+    )
+
+
+def test_the_same_results_give_the_same_bytes(results: Results) -> None:
+    assert explorer(results).data == explorer(results).data
+
+
+@pytest.mark.parametrize(
+    "design",
+    [
+        {"kind": "table", "rows": [{"uavs": 1, "quota": 50}, {"uavs": 2, "quota": 60}]},
+        grid(uavs=[1, 2]),
+        None,
+    ],
+)
+def test_what_is_no_grid_is_refused(design: Any, tmp_path: Path) -> None:
+    changes = {"design": design} if design else {}
+    study = small_study(tmp_path, policies=["random"], missions=2, **changes)
+    results = run_study(study, tmp_path / "results")
+    with pytest.raises(InputError, match="trial is no full grid of two fields or more; allowed"):
+        explorer(results)
