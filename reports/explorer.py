@@ -19,20 +19,21 @@ from IPython.display import HTML
 from analysis import names, numbers
 from analysis.figures import style
 from analysis.questions import summary
+from analysis.questions.settings import points, varied
 from analysis.results.tables import Results
 from dess import InputError
 from reports.pages.template import template
 
 
 class Slider(NamedTuple):
-    """A field of the grid: its values in their order, and the place that is shown at first."""
+    """A field of the grid, and its values in their order."""
 
     field: str
     values: Sequence[Any]
 
     @property
     def start(self) -> int:
-        """The number of the value in the middle."""
+        """The place of the value in the middle, which is shown at first."""
         return len(self.values) // 2
 
     @property
@@ -71,53 +72,44 @@ class Grid:
             InputError: If the study is no full grid of two fields or more.
         """
         self.results = results
-        self._points = [point.values for point in results.store.manifest.points]
-        fields = dict.fromkeys(field for values in self._points for field in values)
-        columns = {field: _distinct([v.get(field) for v in self._points]) for field in fields}
-        self.sliders = [Slider(f, values) for f, values in columns.items() if len(values) > 1]
-        settings = {self._position(point) for point in range(len(self._points))}
-        combinations = math.prod(len(slider.values) for slider in self.sliders)
-        if len(self.sliders) < 2 or not len(settings) == len(self._points) == combinations:
+        self.sliders = [Slider(field, values) for field, values in varied(results).items()]
+        table = points(results)
+        places = {s.field: table[s.field].map(s.values.index) for s in self.sliders}
+        self._places = pd.DataFrame(places).sort_values([*places])
+        settings = math.prod(len(slider.values) for slider in self.sliders)
+        if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
             study = results.manifest["study"]["name"]
             raise InputError(
                 f"explorer: {study} is no full grid of two fields or more; allowed: a study with "
                 'kind = "grid"'
             )
 
+    @property
+    def start(self) -> int:
+        """The design point in the middle of all sliders."""
+        middle = [slider.start for slider in self.sliders]
+        return int(self._places.index[(self._places == middle).all(axis=1)][0])
+
     @cached_property
     def means(self) -> pd.DataFrame:
-        """The means of the paper's metrics: by design point, policy and metric.
+        """The means of the paper's metrics, by design point, policy and metric.
 
         Design points are in the order of the sliders, of which the last one moves first.
         """
         table = summary.means(self.results)
         table = table[table["metric"].isin([*names.METRICS])]
-        order = {point: self._position(point) for point in range(len(self._points))}
+        order = {point: number for number, point in enumerate(self._places.index)}
         return table.sort_values("point", key=lambda p: p.map(order), kind="stable")
 
-    @property
-    def start(self) -> int:
-        """The design point in the middle of all sliders."""
-        middle = tuple(slider.start for slider in self.sliders)
-        return next(p for p in range(len(self._points)) if self._position(p) == middle)
+    def at_start(self) -> pd.DataFrame:
+        """The rows of ``means`` of the design point ``start``."""
+        return self.means[self.means["point"] == self.start]
 
-    def at(self, point: int) -> pd.DataFrame:
-        """The rows of ``means`` of a design point."""
-        return self.means[self.means["point"] == point]
-
-    def in_words(self, point: int) -> str:
-        """The setting of a design point: ``UAVs 2, flying time 70 mission slots``."""
-        position = self._position(point)
-        parts = [
-            f"{slider.name[0].lower()}{slider.name[1:]} {slider.texts[number]} {slider.unit}"
-            for slider, number in zip(self.sliders, position, strict=True)
-        ]
-        return ", ".join(part.strip() for part in parts)
-
-    def _position(self, point: int) -> tuple[int, ...]:
-        """The place of every slider at a design point."""
-        values = self._points[point]
-        return tuple(s.values.index(values.get(s.field)) for s in self.sliders)
+    def settings(self, field: str) -> list[str]:
+        """How ``--set`` has the values of a field: ``initial_data=[5, 7.5]``."""
+        first = self._places.reset_index().groupby(field)["index"].first()
+        design = self.results.store.manifest.points
+        return [f"{field}={json.dumps(design[point].values[field])}" for point in first]
 
 
 def explorer(results: Results) -> HTML:
@@ -132,10 +124,9 @@ def explorer(results: Results) -> HTML:
     grid = Grid(results)
     colours = style.policy_colours(results.policies)
     looks = {policy: colours[policy][0] for policy in results.policies}
-    at_start = grid.at(grid.start).set_index(["metric", "policy"])
     texts = {
-        (metric, policy): f"{numbers.estimate(row)}, n = {row['n']:,}"
-        for (metric, policy), row in at_start.iterrows()
+        (row.metric, row.policy): f"{numbers.interval(row.mean, row.low, row.high)}, n = {row.n:,}"
+        for row in grid.at_start().itertuples()
     }
     shown = {"sliders": grid.sliders, "policies": looks, "metrics": names.METRICS, "texts": texts}
     data = json.dumps(_data(grid), separators=(",", ":")).replace("<", "\\u003c")
@@ -158,7 +149,7 @@ def _data(grid: Grid) -> dict[str, Any]:
                 "option": slider.option,
                 "unit": slider.unit,
                 "values": slider.texts,
-                "settings": [f"{slider.field}={json.dumps(v)}" for v in slider.values],
+                "settings": grid.settings(slider.field),
             }
             for slider in grid.sliders
         ],
@@ -169,8 +160,3 @@ def _data(grid: Grid) -> dict[str, Any]:
 def _tenths(share: float) -> int:
     """A share in tenths of a percent, as ``numbers.percent`` rounds it."""
     return round(10 * float(f"{100 * share:.1f}"))
-
-
-def _distinct(values: Sequence[Any]) -> list[Any]:
-    """Values without duplicates, in order of appearance; lists are values, too."""
-    return [value for number, value in enumerate(values) if value not in values[:number]]
