@@ -125,9 +125,11 @@ def check_effort(
         missing = [study.size * study.first for _ in teams]
     else:
         store = Store.peek(study, out, accept_code)
-        for source in sources(reuse, store.manifest):
-            store.count(source)
         missing = [_missing(study, store, team)[0] for team in teams]
+        if sum(missing) > FEW:
+            for source in sources(reuse, store.manifest):
+                store.count(source)
+            missing = [_missing(study, store, team)[0] for team in teams]
     if sum(missing) <= FEW:
         return
     times = [missing[t] * _seconds_per_mission(study, t, clock) for t in teams if missing[t]]

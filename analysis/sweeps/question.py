@@ -1,0 +1,229 @@
+"""A sweep as a study: made from values of fields, kept under a name, and run.
+
+    study = question({"uavs": range(2, 6), "pads": [1, 2, 3], "quota": 600}, "my-sea.toml")
+    results = ask(study, "results")  # in results/sweeps/uavs-pads-0123456789abcdef
+
+The name tells the question, but not the number of missions: more of them top up its folder. What a
+sweep needs and another one has is taken from there. The file of the study lies beside the folder:
+``dess study run results/sweeps/NAME.toml --out results/sweeps/NAME`` completes it.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import ValidationError
+
+import dess
+from analysis.names import METRICS, PRODUCT, RATIO
+from analysis.execution.dry_run import check_effort
+from analysis.execution.jobs import Progress
+from analysis.execution.runner import Round, run_study
+from analysis.results.chunks import short_hash
+from analysis.results.manifest import Manifest
+from analysis.results.provenance import engine_code, team_of
+from analysis.results.store import MANIFEST
+from analysis.results.tables import Results
+from analysis.study.design import Grid
+from analysis.study.study import Study
+from analysis.sweeps.values import values_of
+from dess import InputError, simulate_batch
+from dess.files import replacing, writable
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
+from policies import load_team
+
+FOLDER = "sweeps"
+LONGEST = 60  # characters of the fields in a name
+ALIASES = {"ratio": RATIO, "product": PRODUCT}  # short names of metrics that may be required
+
+BUDGET = 1000  # missions per setting that the search of the cheapest one may take, on average
+LITTLE = 0.01  # of the prices: a saving that does not matter
+
+
+def question(
+    fields: Mapping[str, Any],
+    scenario: str | Path = "paper",
+    policies: Iterable[str] = ("greedy",),
+    missions: int = 300,
+    seed: int = 0,
+    prices: Mapping[str, Any] | None = None,
+    requirements: Mapping[str, float] | None = None,
+    name: str | None = None,
+) -> Study:
+    """The study of a sweep.
+
+    Args:
+        fields: Fields of the scenario; one value is fixed, several are swept (``values_of``).
+        scenario: A shipped scenario, or a TOML file.
+        policies: Teams: ``"P"`` or ``"P,P,..."``.
+        missions: Of every policy and setting. With requirements: further ones, that check the
+            selected settings.
+        seed: Of the missions.
+        prices: Fields of ``Costs``.
+        requirements: Metric -> its least mean. With them the study looks for the cheapest setting
+            that meets them, and needs prices.
+        name: Names the study; without one, it is made of the fields and a hash.
+
+    Raises:
+        InputError: If a field, a value, a policy, a price or a requirement is not allowed.
+    """
+    values = {field: values_of(field, given) for field, given in fields.items()}
+    fixed = {field: of_field[0] for field, of_field in values.items() if len(of_field) == 1}
+    swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
+    load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
+    data = {
+        "name": name or "sweep",
+        "description": "a sweep: every combination of the values",
+        "scenario": str(scenario),
+        "set": fixed,
+        "design": {"kind": "grid", "values": swept},
+        "policies": [policies] if isinstance(policies, str) else [*policies],
+        "seed": seed,
+        **({"costs": dict(prices)} if prices else {}),
+        **({} if requirements else {"missions": missions}),
+    }
+    if requirements:
+        data["selection"] = _cheapest(requirements, missions, _study(data))
+    study = _study(data)
+    return study if name else study.model_copy(update={"name": _name_of(study, swept)})
+
+
+def folder_of(study: Study, folder: str | Path) -> Path:
+    """The results folder of a sweep."""
+    return Path(folder) / FOLDER / study.name
+
+
+def file_of(study: Study, folder: str | Path) -> Path:
+    """The file of the study of a sweep."""
+    return Path(folder) / FOLDER / f"{study.name}.toml"
+
+
+def ask(
+    study: Study,
+    folder: str | Path,
+    workers: int = 1,
+    progress: Progress | None = None,
+    announce: Callable[[Round], object] | None = None,
+    yes: bool = False,
+) -> Results:
+    """Write the file of a sweep, and run it as far as its missions are in no sweep of the folder.
+
+    Args:
+        study: As of ``question``.
+        folder: Where results are kept.
+        workers: Processes.
+        progress: As of ``run_study``.
+        announce: As of ``run_study``.
+        yes: Whether it may take as long as it takes.
+
+    Raises:
+        InputError: If a policy cannot act in the scenario, the sweep would take long or the name is
+            that of another question, before anything is written; if the folder cannot be written.
+        ChunkError: As of ``run_study``.
+    """
+    out = folder_of(study, folder)
+    others = [path.parent for path in out.parent.glob(f"*/{MANIFEST}") if path.parent != out]
+    _check_name(study, out)
+    check_effort(study, out, workers, reuse=sorted(others), yes=yes)
+    check_policies(study)
+    write(study, folder)
+    return run_study(study, out, workers, None, progress, announce, reuse=sorted(others))
+
+
+def check_policies(study: Study) -> None:
+    """Have every policy act in a mission of every value, with the first value of all other fields.
+
+    Raises:
+        InputError: If a policy cannot act in one of them.
+    """
+    spaces = _spaces(study)
+    for policy in study.policies:
+        simulate_batch(spaces, load_team(policy), study.seed, len(spaces))
+
+
+def write(study: Study, folder: str | Path) -> Path:
+    """Write the file of the study, which ``dess study run`` takes; its path."""
+    path = file_of(study, folder)
+    data = study.model_dump(mode="json", exclude_unset=True)
+    if study.scenario not in scenario_names():
+        data["scenario"] = Path(os.path.relpath(study.scenario, path.parent)).as_posix()
+    with writable(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as temporary, writable(path):
+        temporary.write_text(tomli_w.dumps(data), "utf-8")
+    return path
+
+
+def _study(data: dict[str, Any]) -> Study:
+    try:
+        return Study.model_validate(data)
+    except ValidationError as error:
+        raise InputError(validation_line(error, "sweep", Study)) from None
+
+
+def _cheapest(
+    requirements: Mapping[str, float], missions: int, study: Study
+) -> dict[str, Any]:
+    """The rule that looks for the cheapest setting that meets requirements."""
+    prices = study.costs
+    if not prices:
+        raise InputError("requirements: need prices; allowed: prices, such as uav=20000")
+    least = {}
+    for metric, share in requirements.items():
+        full = ALIASES.get(metric, metric)
+        if full not in METRICS:
+            allowed = ", ".join([*METRICS, *ALIASES])
+            raise InputError(f"requirements: {metric!r} is unknown; allowed: {allowed}")
+        least[full] = share
+    spaces = _spaces(study)
+    fleet = prices.uav * max(space.uavs[1] for space in spaces)
+    fleet += prices.pad * max(space.charging_pads for space in spaces)
+    running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)
+    if not fleet and not running:
+        raise InputError("prices: all are 0; allowed: one or more above 0")
+    return {
+        "procedure": "cheapest",
+        "requirements": least,
+        "indifference": LITTLE * (fleet or running),
+        "budget": BUDGET * max(study.size, 100),
+        "check": missions,
+    }
+
+
+def _spaces(study: Study) -> list[ScenarioSpace]:
+    """A scenario for every value of every field, all other fields at their first value."""
+    design = study.design
+    assert isinstance(design, Grid)
+    numbers, step = [0], design.count
+    for values in design.values.values():
+        step //= len(values)
+        numbers += [step * place for place in range(1, len(values))]
+    return [study.point(number).scenario for number in numbers]
+
+
+def _name_of(study: Study, fields: Iterable[str]) -> str:
+    """The swept fields, and a hash of all that the records depend on but their number."""
+    data = study.model_dump(mode="json", exclude={"missions": True, "selection": {"check"}})
+    about = {
+        "version": dess.__version__,
+        "engine": engine_code(),
+        "teams": [team_of(policy).model_dump(mode="json") for policy in study.policies],
+        "base": load_scenario(study.scenario, **study.set).model_dump(mode="json"),
+        "study": data | {"scenario": Path(study.scenario).name},
+    }
+    key = short_hash(json.dumps(about, sort_keys=True).encode())
+    return f"{'-'.join(fields)[:LONGEST] or 'sweep'}-{key}"
+
+
+def _check_name(study: Study, out: Path) -> None:
+    """Refuse a name that another question has."""
+    path = out / MANIFEST
+    if path.exists():
+        try:
+            Manifest.read(path).extended_to(Manifest.of(study), path, None)
+        except InputError as error:
+            what = str(error).partition("; allowed:")[0]
+            raise InputError(f"{what}; allowed: another name, or remove the folder") from None

@@ -1,0 +1,133 @@
+"""``analysis.sweep``: ask every combination of values of some fields, in one line.
+
+    results = sweep("my-sea.toml", policies=["greedy", "ddqn"], uavs=range(2, 6), pads=[1, 2, 3])
+    results.table()
+    results.plot("uavs", hue="pads")
+    results.best()
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.execution.jobs import Progress
+from analysis.execution.runner import Round
+from analysis.figures import settings as figures
+from analysis.names import PRODUCT
+from analysis.questions import settings
+from analysis.results.tables import Results
+from analysis.study.study import Study
+from analysis.sweeps.question import ask, folder_of, question
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """The answer of a sweep.
+
+    Attributes:
+        study: What was asked.
+        path: The results folder.
+        results: The missions, ``results.missions``, as a tidy table, and all else of the folder.
+    """
+
+    study: Study
+    path: Path
+    results: Results
+
+    def table(self, metric: str = PRODUCT) -> pd.DataFrame:
+        """The settings, a policy with values of the swept fields each, the best first.
+
+        Args:
+            metric: Ranks them.
+
+        Returns:
+            Columns ``rank``, ``policy``, the swept fields, every metric with the ends of its 95 %
+            interval (``success``, ``success_low``, ``success_high``), the number of missions ``n``,
+            and ``tied``: not significantly worse than the best.
+        """
+        return settings.ranked(self.results, metric)
+
+    def best(self, metric: str = PRODUCT) -> pd.Series:
+        """The best setting: the first row of the table."""
+        return self.table(metric).iloc[0]
+
+    def plot(self, x: str, hue: str | None = None, metric: str = PRODUCT) -> Figure:
+        """Curves of a metric over a swept field, with 95 % intervals, for every policy.
+
+        Args:
+            x: The field.
+            hue: A field that has a curve for each of its values.
+            metric: What is drawn.
+        """
+        return figures.plot(self.results, x, hue, metric)
+
+
+def sweep(
+    scenario: str | Path = "paper",
+    policies: Iterable[str] = ("greedy",),
+    missions: int = 300,
+    seed: int = 0,
+    folder: str | Path = "results",
+    workers: int = 1,
+    prices: Mapping[str, Any] | None = None,
+    requirements: Mapping[str, float] | None = None,
+    name: str | None = None,
+    progress: bool | Progress = True,
+    yes: bool = False,
+    **fields: Any,
+) -> Sweep:
+    """Simulate every combination of values of fields, and keep it.
+
+    Asked again, it answers at once; with more missions or other values, it simulates only what no
+    sweep in the folder has. All settings meet the same replications (common random numbers).
+
+    Args:
+        scenario: A shipped scenario, or a TOML file.
+        policies: Teams to compare: ``"P"`` or ``"P,P,..."``.
+        missions: Of every policy and setting. With requirements: further ones, that check the
+            selected settings.
+        seed: Of the missions.
+        folder: Where results are kept, in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
+        workers: Processes. Two or more take seconds to start, and pay for long runs only.
+        prices: Fields of ``analysis.study.costs.Costs``, such as ``{"uav": 20_000}``.
+        requirements: Metric -> its least mean, such as ``{"success": 0.99}``. With them, as many
+            missions are simulated as the search of the cheapest setting that meets them takes.
+        name: Of the sweep; without one, it is made of the fields and a hash.
+        progress: Whether to show a bar; or called with the number of missions done since its last
+            call.
+        yes: Whether it may take more than an hour.
+        **fields: Fields of the scenario. One value is fixed; a list, range, tuple or array of
+            several is swept. ``initial_data=[5, 20]`` is one range; see ``analysis.sweeps.values``.
+
+    Raises:
+        InputError: If a field, a value or a policy is not allowed, a policy cannot act in the
+            scenario, or it would take long: before anything is written.
+        ChunkError: If something could not be computed; after all that could.
+    """
+    study = question(
+        fields, scenario, policies, missions, seed, prices, requirements, name
+    )
+    if callable(progress):
+        results = ask(study, folder, workers, progress, yes=yes)
+    else:
+        with _bar(progress) as (bar, announce):
+            results = ask(study, folder, workers, bar, announce, yes)
+    return Sweep(study, folder_of(study, folder), results)
+
+
+@contextmanager
+def _bar(shown: bool) -> Iterator[tuple[Progress, Any]]:
+    """A bar that counts missions; its total grows where a rule asks for more."""
+    from tqdm.auto import tqdm
+
+    with tqdm(unit="mission", disable=None if shown else True, delay=1) as bar:
+
+        def begin(started: Round) -> None:
+            bar.total = started.missions
+
+        yield bar.update, begin

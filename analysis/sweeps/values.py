@@ -1,0 +1,75 @@
+"""The values of a field in a sweep: one that is fixed, or several that are swept.
+
+    values_of("uavs", range(2, 6))  # (2, 3, 4, 5)
+    values_of("initial_data", [5, 20])  # ((5, 20),): one range, which every mission draws from
+    values_of("initial_data", [[5, 10], [10, 20]])  # ((5, 10), (10, 20))
+
+A list, tuple, range or array is several values, unless it is a value of the field itself: two
+numbers of ``initial_data``, four of ``zone``, cells of ``nodes``. The fields that a mission draws,
+such as ``uavs``, take a range inside a list: ``uavs=[[1, 3]]``.
+"""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from analysis.study.design import MAX_SIZE
+from dess import InputError
+
+_LENGTHS = {"initial_data": 2, "zone": 4}  # of fields whose value is a list of numbers
+
+
+def values_of(field: str, given: Any) -> tuple[Any, ...]:
+    """The values of a field: one is fixed, several are swept.
+
+    Args:
+        field: The field.
+        given: A value, or a list, tuple, range or array of values.
+
+    Raises:
+        InputError: If there is none, one is listed twice, or there are too many.
+    """
+    if _is_value(field, given):
+        return (_plain(given),)
+    if len(given) > MAX_SIZE:
+        raise InputError(f"{field}: {len(given):,} values; allowed: {MAX_SIZE:,} at most")
+    values = tuple(_plain(value) for value in given)
+    if not values:
+        raise InputError(f"{field}: has no values; allowed: one or more")
+    known = set()
+    for value in values:
+        text = json.dumps(value, default=str)
+        if text in known:
+            raise InputError(f"{field}: {text} is listed twice; allowed: distinct values")
+        known.add(text)
+    return values
+
+
+def _is_value(field: str, given: Any) -> bool:
+    """Whether what is given is one value of the field, and not several."""
+    if isinstance(given, np.ndarray):
+        return given.ndim == 0
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        return True
+    if isinstance(given, range):
+        return False
+    if field == "nodes":
+        return all(map(_is_cell, given)) and len(given) > 0
+    return len(given) == _LENGTHS.get(field) and all(map(_is_number, given))
+
+
+def _is_cell(item: Any) -> bool:
+    return isinstance(item, list | tuple) and len(item) == 2 and all(map(_is_number, item))
+
+
+def _is_number(item: Any) -> bool:
+    return isinstance(item, int | float | np.number)
+
+
+def _plain(value: Any) -> Any:
+    """A value as TOML has it: no numpy, no tuples."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
