@@ -20,6 +20,7 @@ _HOME = {
     "bootstrap_interval": "stats.bootstrap",
     "compare": "stats.paired",
     "compare_learners": "stats.learners",
+    "sweep": "sweeps.sweep",
 }
 
 __all__ = [*_HOME]

@@ -18,7 +18,7 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 ROOMS = {
     "analysis": (
         *("names", "numbers", "stats", "study", "results", "execution", "questions"),
-        *("replication", "verification", "figures"),
+        *("replication", "verification", "figures", "sweeps"),
     ),
     "reports": ("player", "tools", "pages", "explorer", "cli"),
 }

@@ -18,10 +18,10 @@ import tomli_w
 from pydantic import ValidationError
 
 import dess
-from analysis.names import METRICS, PRODUCT, RATIO
 from analysis.execution.dry_run import check_effort
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
+from analysis.names import METRICS, PRODUCT, RATIO
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
@@ -164,9 +164,7 @@ def _study(data: dict[str, Any]) -> Study:
         raise InputError(validation_line(error, "sweep", Study)) from None
 
 
-def _cheapest(
-    requirements: Mapping[str, float], missions: int, study: Study
-) -> dict[str, Any]:
+def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) -> dict[str, Any]:
     """The rule that looks for the cheapest setting that meets requirements."""
     prices = study.costs
     if not prices:

@@ -1,9 +1,9 @@
 """``analysis.sweep``: ask every combination of values of some fields, in one line.
 
-    results = sweep("my-sea.toml", policies=["greedy", "ddqn"], uavs=range(2, 6), pads=[1, 2, 3])
-    results.table()
-    results.plot("uavs", hue="pads")
-    results.best()
+results = sweep("my-sea.toml", policies=["greedy", "ddqn"], uavs=range(2, 6), pads=[1, 2, 3])
+results.table()
+results.plot("uavs", hue="pads")
+results.best()
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -109,9 +109,7 @@ def sweep(
             scenario, or it would take long: before anything is written.
         ChunkError: If something could not be computed; after all that could.
     """
-    study = question(
-        fields, scenario, policies, missions, seed, prices, requirements, name
-    )
+    study = question(fields, scenario, policies, missions, seed, prices, requirements, name)
     if callable(progress):
         results = ask(study, folder, workers, progress, yes=yes)
     else:
