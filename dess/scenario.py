@@ -288,6 +288,8 @@ def validation_line(
     if first["type"] == "value_error":
         return f"{where}: {key + ': ' if key else ''}{message}"
     field = fields.get(key.partition(".")[0])
+    if field and first["type"] == "missing" and len(first["loc"]) == 1:
+        return f"{where}: {key}: is missing; allowed: {field.description}"
     if field and first["type"] in _WRONG_FORM:
         return (
             f"{where}: {key}: {first['input']!r} has the wrong form; allowed: {field.description}"

@@ -10,6 +10,7 @@ from analysis.execution.runner import CHUNK, check_workers
 from analysis.results.chunks import check_parts, parts_of, split
 from analysis.results.reuse import sources
 from analysis.results.store import Store
+from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
 from analysis.study.study import MANY_POINTS, Study
 from dess import InputError, simulate, simulate_batch
@@ -147,7 +148,7 @@ def check_effort(
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
     """Missions of a team that are missing, and all that are wanted for now."""
     manifest = store.manifest
-    parts = parts_of(manifest, team) + check_parts(manifest, team, manifest.selected[team])
+    parts = parts_of(manifest, team) + check_parts(manifest, team)
     missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
     wanted = sum(len(part.replications) for part in parts)
     return sum(chunk.missions for chunk in missing if chunk), wanted
@@ -156,7 +157,8 @@ def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
 def _budget(study: Study) -> int:
     """Missions of a policy that the rule of a study may ask for."""
     if study.selection:
-        return study.selection.budget + study.selection.check
+        checked = len(study.points) if isinstance(study.selection, Cheapest) else 1
+        return study.selection.budget + study.selection.check * checked
     assert study.precision
     return study.precision.budget * len(study.points)
 

@@ -20,10 +20,11 @@ import numpy as np
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.workers import Cluster, Here, Pool
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
-from analysis.results.manifest import Cell
+from analysis.results.manifest import Cell, Selected
 from analysis.results.reuse import sources
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
+from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
 from dess import InputError, simulate_batch
 from dess.record import Records
@@ -141,8 +142,8 @@ class _Run:
             before, logs = wanted, []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
-        manifest = self.store.manifest
-        checks = [part for team in teams for part in check_parts(manifest, team, selected[team])]
+        manifest = self.store.manifest.model_copy(update={"selected": selected})
+        checks = [part for team in teams for part in check_parts(manifest, team)]
         if any(part.replications for part in checks):
             self._round(checks, [])
         self.store.finish(wanted, selected)
@@ -150,11 +151,15 @@ class _Run:
     def _more(self, team: int, counts: list[int]) -> list[int]:
         """How many missions the rule wants of a team's points, now that these are there."""
         rule = self.study.rule
+        if isinstance(rule, Cheapest):
+            return rule.wanted(self._samples(team, counts), self.store.manifest.settings)
         return rule.wanted(self._samples(team, counts)) if rule else counts
 
-    def _select(self, team: int, counts: list[int]) -> int | None:
-        """The design point that is selected for a team, if the study selects."""
+    def _select(self, team: int, counts: list[int]) -> Selected:
+        """What is selected for a team, if the study selects."""
         rule = self.study.selection
+        if isinstance(rule, Cheapest):
+            return rule.choice(self._samples(team, counts), self.store.manifest.settings).selected
         return rule.choice(self._samples(team, counts)).best if rule else None
 
     def _samples(self, team: int, counts: list[int]) -> list[dict[str, np.ndarray]]:

@@ -66,15 +66,14 @@ def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None)
     return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
 
-def check_parts(manifest: Manifest, team: int, point: int | None) -> list[Part]:
-    """The missions that check the design point selected for a team, if one is.
+def check_parts(manifest: Manifest, team: int) -> list[Part]:
+    """The missions that check the design points selected for a team.
 
-    None of them has selected it.
+    None of them has selected one.
     """
-    if point is None:
-        return []
-    missions = manifest.study["selection"]["check"]
-    return [Part(manifest.cells[team][point], range(CHECK, CHECK + missions))]
+    points = manifest.selected_points(team)
+    check = range(CHECK, CHECK + manifest.study["selection"]["check"]) if points else range(0)
+    return [Part(manifest.cells[team][point], check) for point in points]
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:

@@ -21,9 +21,9 @@ from analysis.results.provenance import (
     library_versions,
     team_of,
 )
+from analysis.study.cheapest import AnySelection, Setting
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint
-from analysis.study.selection import Selection
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
 from dess import InputError
@@ -37,8 +37,12 @@ _PARTS: dict[str, TypeAdapter] = {
     "design": TypeAdapter(Design | None),
     "costs": TypeAdapter(Costs | None),
     "precision": TypeAdapter(Precision | None),
-    "selection": TypeAdapter(Selection | None),
+    "selection": TypeAdapter(AnySelection | None),
 }
+
+
+# What is selected for a team: a design point, or those of all questions; None without a selection.
+Selected = int | list[int] | None
 
 
 class Cell(NamedTuple):
@@ -130,14 +134,15 @@ class Manifest(Origin):
 
     Attributes:
         missions: Wanted of every team and design point; grows where a rule decides it.
-        selected: The design point that was selected for every team, if the study selects.
+        selected: For every team the design point that was selected, or all of them in a list, where
+            one is selected for each of several conditions; None, if the study selects nothing.
         complete: Whether all of it is there.
     """
 
     schema_version: int
     points: list[DesignPoint]
     missions: list[list[int]]
-    selected: list[int | None]
+    selected: list[Selected]
     complete: bool
 
     @model_validator(mode="after")
@@ -150,9 +155,15 @@ class Manifest(Origin):
             raise ValueError("missions, selected: not one for every policy and design point")
         if not all(1 <= n <= CHECK for of_team in self.missions for n in of_team):
             raise ValueError(f"missions: out of range; allowed: 1..{CHECK}")
-        if not all(best is None or best in range(len(self.points)) for best in self.selected):
+        teams = range(len(self.policies))
+        if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
             raise ValueError("selected: no design point")
         return self
+
+    def selected_points(self, team: int) -> list[int]:
+        """The design points that were selected for a team; none, if the study selects nothing."""
+        selected = self.selected[team]
+        return [selected] if isinstance(selected, int) else selected or []
 
     @classmethod
     def of(cls, study: Study) -> "Manifest":
@@ -256,6 +267,24 @@ class Manifest(Origin):
         accepted = [change.data for change in self.accepted]
         content = _canonical([keys, self.missions, self.selected, accepted])
         return sha256(content.encode()).hexdigest()[:16]
+
+    @cached_property
+    def costs(self) -> Costs | None:
+        """The prices of the study, if it has any."""
+        prices = self.study["costs"]
+        return None if prices is None else Costs.model_validate(prices)
+
+    @cached_property
+    def selection(self) -> AnySelection | None:
+        """The rule by which the study selects, if it does."""
+        return _PARTS["selection"].validate_json(json.dumps(self.study["selection"]))
+
+    @cached_property
+    def settings(self) -> list[Setting]:
+        """The design points, as a search of the cheapest one takes them; of a study with prices."""
+        assert self.costs is not None
+        pairs = zip(self.points, self.scenarios, strict=True)
+        return [Setting.of(point.values, space, self.costs) for point, space in pairs]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:

@@ -23,7 +23,7 @@ from filelock import FileLock, Timeout
 
 from analysis.results import parquet
 from analysis.results.chunks import Chunk, Failure, Part, gaps, short_hash, split
-from analysis.results.manifest import Cell, Manifest
+from analysis.results.manifest import Cell, Manifest, Selected
 from analysis.results.rows import rows_of
 from analysis.study.study import Study
 from dess import InputError
@@ -243,7 +243,7 @@ class Store:
     def _failure(self, chunk: Chunk) -> Path:
         return self.folder / "failures" / f"{chunk.name}.json"
 
-    def finish(self, missions: Sequence[Sequence[int]], selected: Sequence[int | None]) -> None:
+    def finish(self, missions: Sequence[Sequence[int]], selected: Sequence[Selected]) -> None:
         """Note how many missions every team and design point has, and that all of it is there."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
@@ -254,10 +254,16 @@ class Store:
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of parts of one team, with their ``point``, in the order asked.
 
+        Where the study has prices, they have their ``cost``.
+
         Raises:
             InputError: If some are missing or damaged.
         """
-        return rows_of(parts, [tables.missions for tables in self._tables_with(parts)])
+        missions = rows_of(parts, [tables.missions for tables in self._tables_with(parts)])
+        if costs := self.manifest.costs:
+            cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
+            missions["cost"] = sum(cost.values())
+        return missions
 
     def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The UAVs of the same missions, in this order.

@@ -13,6 +13,7 @@ import pandas as pd
 from analysis.results.chunks import check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
+from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.selection import Choice, Selection
 from dess import InputError
 from dess.record import MISSION_RECORD
@@ -28,6 +29,7 @@ class Results:
         missions: A row per mission: ``policy``, ``point`` (number of the design point), the fields
             that the design sets and no record has, and those of ``MISSION_RECORD``; in the order
             of policy (as the study names them), point and replication.
+            Where the study has prices, ``cost`` is the last column.
         uavs: A row per UAV of each: ``policy``, ``point``, ``replication``, ``uav`` and the fields
             of ``UAV_RECORD``, with the name of its ``end``.
         checks: Missions, as above, of the design points that were selected; others than those that
@@ -74,12 +76,20 @@ class Results:
         return self.store.manifest.command(self.cell(policy, point), replication)
 
     def choice(self, policy: str) -> Choice | None:
-        """The design point that was selected for a policy, and what is known of it."""
+        """The design point that was selected for a policy as the best, and what is known of it."""
+        rule = self.store.manifest.selection
+        return rule.choice(self._samples(policy)) if isinstance(rule, Selection) else None
+
+    def cheapest(self, policy: str) -> CheapestChoice | None:
+        """The cheapest settings of a policy that meet the requirements, if a study selects them."""
         manifest = self.store.manifest
-        if manifest.study["selection"] is None:
+        if not isinstance(manifest.selection, Cheapest):
             return None
-        rule = Selection.model_validate_json(json.dumps(manifest.study["selection"]))
-        return rule.choice(self.store.samples(parts_of(manifest, self.policies.index(policy))))
+        return manifest.selection.choice(self._samples(policy), manifest.settings)
+
+    def _samples(self, policy: str) -> list[dict[str, np.ndarray]]:
+        manifest = self.store.manifest
+        return self.store.samples(parts_of(manifest, self.policies.index(policy)))
 
     def cell(self, policy: str, point: int) -> Cell:
         """A policy at a design point; its key is a hash of all that its records depend on.
@@ -116,7 +126,7 @@ def results_of(store: Store) -> Results:
     for number, team in enumerate(manifest.policies):
         parts = parts_of(manifest, number)
         missions[team.policy], uavs[team.policy] = store.missions(parts), store.uavs(parts)
-        if checked := check_parts(manifest, number, manifest.selected[number]):
+        if checked := check_parts(manifest, number):
             checks[team.policy] = store.missions(checked)
     if not manifest.complete:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")

@@ -2,15 +2,21 @@
 
     costs = Costs(uav=20_000, pad=3_000, hour=120, slot_seconds=60, missions=500)
 
-A study's table ``[costs]`` holds the prices. ``analysis.questions.costs`` makes costs of missions.
+A study's table ``[costs]`` holds the prices. The cost of a mission is the total cost of its setting
+if all missions were like this one: the purchase, and what the mission consumes, times the missions
+that the fleet is to fly. So the mean over missions estimates the total cost that is to be expected.
 """
 
-from typing import Self
+from collections.abc import Mapping, Sequence
+from typing import Any, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from analysis.study.stopping import StrictTable
-from dess.scenario import Integer, Number
+from dess.scenario import Integer, Number, ScenarioSpace
+
+PARTS = ("purchase", "charging", "hours", "losses")
 
 
 class Costs(StrictTable):
@@ -39,3 +45,30 @@ class Costs(StrictTable):
         if self.hour and self.slot_seconds is None:
             raise ValueError("slot_seconds: is missing; allowed: with hour, the seconds of a slot")
         return self
+
+    def parts(
+        self, spaces: Sequence[ScenarioSpace], missions: Mapping[str, Any], uavs: Mapping[str, Any]
+    ) -> dict[str, np.ndarray]:
+        """The parts of the cost of every mission, in the currency.
+
+        Args:
+            spaces: The scenario of every design point.
+            missions: Columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
+            uavs: Columns of the UAVs of these missions, in their order: ``slots_charging``, and
+                ``end`` by its name.
+
+        Returns:
+            Each of ``PARTS`` -> (n,) amounts.
+        """
+        fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
+        mission = np.repeat(np.arange(len(fleet)), fleet)
+        pads, rates = np.array([(space.charging_pads, space.charge_rate) for space in spaces]).T
+        slots = np.bincount(mission, np.asarray(uavs["slots_charging"]), len(fleet))
+        lost = np.bincount(mission, np.asarray(uavs["end"]) == "battery", len(fleet))
+        hours = np.asarray(missions["slots"]) * (self.slot_seconds or 0.0) / 3600
+        return {
+            "purchase": self.uav * fleet + self.pad * pads[points],
+            "charging": self.missions * self.charge * slots * rates[points] / 100,
+            "hours": self.missions * self.hour * hours,
+            "losses": self.missions * self.lost_uav * lost,
+        }

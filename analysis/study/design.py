@@ -11,13 +11,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from analysis.study.stopping import StrictTable
+from analysis.study.stopping import StrictTable, of_its_kind
 from dess import InputError
-from dess.scenario import Integer, Scenario, validation_line
+from dess.scenario import Integer, Scenario
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 # The factor of a Saltelli design that is no field of the scenario: which replication is run.
@@ -252,23 +252,8 @@ def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
     return min(float(high), float(low + u * (high - low)))
 
 
-_AnyDesign = Grid | OneAtATime | Table | LatinHypercube | Saltelli
-_KINDS: dict[str, type[_Design]] = {
-    kind.model_fields["kind"].default: kind for kind in get_args(_AnyDesign)
-}
-
-
-def _of_its_kind(value: Any) -> Any:
-    """A table as the design of its kind, or one line that speaks of this kind alone."""
-    if not isinstance(value, dict):
-        return value
-    kind = value.get("kind")
-    if not isinstance(kind, str) or kind not in _KINDS:
-        raise ValueError(f"kind: {kind!r} is unknown; allowed: {', '.join(_KINDS)}")
-    try:
-        return _KINDS[kind].model_validate(value)
-    except ValidationError as error:
-        raise ValueError(validation_line(error, kind, _KINDS[kind])) from None
-
-
-Design = Annotated[_AnyDesign, Field(discriminator="kind"), BeforeValidator(_of_its_kind)]
+Design = Annotated[
+    Grid | OneAtATime | Table | LatinHypercube | Saltelli,
+    Field(discriminator="kind"),
+    of_its_kind("kind", Grid, OneAtATime, Table, LatinHypercube, Saltelli),
+]

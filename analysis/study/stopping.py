@@ -2,13 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 from scipy.special import ndtri, stdtrit
 
-from dess.scenario import Integer, Number
+from dess.scenario import Integer, Number, validation_line
 
 Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
 
@@ -24,6 +31,29 @@ class StrictTable(BaseModel):
     """A table of a study's TOML file: frozen, of known keys, and of the types that TOML gives."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+
+def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
+    """Read a table as the model that one of its keys names, with one line that speaks of it alone.
+
+    Args:
+        key: The key; each model allows some literals for it.
+        models: The models.
+    """
+    kinds = {name: m for m in models for name in get_args(m.model_fields[key].annotation)}
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, dict):
+            return value
+        kind = value.get(key)
+        if not isinstance(kind, str) or kind not in kinds:
+            raise ValueError(f"{key}: {kind!r} is unknown; allowed: {', '.join(kinds)}")
+        try:
+            return kinds[kind].model_validate(value)
+        except ValidationError as error:
+            raise ValueError(validation_line(error, kind, kinds[kind])) from None
+
+    return BeforeValidator(read)
 
 
 class Target(StrictTable):

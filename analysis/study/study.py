@@ -15,9 +15,9 @@ from pydantic import (
     model_validator,
 )
 
+from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
-from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable
 from dess import InputError
 from dess.files import Shipped
@@ -77,7 +77,7 @@ class Study(StrictTable):
     precision: Precision | None = Field(
         None, description="a rule: as many missions as narrow intervals take"
     )
-    selection: Selection | None = Field(
+    selection: AnySelection | None = Field(
         None, description="a rule: as many missions as finding the best design point takes"
     )
     costs: Costs | None = Field(None, description="prices, for questions about costs")
@@ -119,6 +119,10 @@ class Study(StrictTable):
         if self.rule and "missions" in self.model_fields_set:
             rule = "precision" if self.precision else "selection"
             raise ValueError(f"missions: are decided by {rule}; allowed: either")
+        if isinstance(self.selection, Cheapest) and not self.costs:
+            raise ValueError(
+                "costs: are missing; allowed: a table of prices, for the selection of the cheapest"
+            )
         if isinstance(self.design, Saltelli) and (self.rule or self.missions != 1):
             raise ValueError(
                 "missions: every point of a saltelli design is one mission; allowed: missions = 1"
@@ -152,7 +156,7 @@ class Study(StrictTable):
         return ["dess", "study", "run", name or self.name, *policies, *missions]
 
     @property
-    def rule(self) -> Precision | Selection | None:
+    def rule(self) -> Precision | AnySelection | None:
         """What decides how many replications a design point gets, if they are not fixed."""
         return self.precision or self.selection
 

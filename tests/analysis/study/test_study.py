@@ -124,14 +124,30 @@ BAD = {
     "selection = {procedure = 'kn', indifference = 0.1}\n"
     "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
     "selection = {procedure = 'kn', indifference = -0.1}": [
-        "selection.indifference",
+        "selection: kn: indifference",
         "greater than 0",
     ],
     "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
         "selection.budget: 8",
         "9 or more",
     ],
-    "selection.procedure = 'best'": ["selection.procedure", "'kn'", "'kn-bounded'"],
+    "selection.procedure = 'best'": ["selection: procedure: 'best'", "kn, kn-bounded, cheapest"],
+    "selection = {procedure = 'cheapest', requirements.success = 0.99, indifference = 1}": [
+        "costs: are missing; allowed: a table of prices"
+    ],
+    "costs.uav = 1\nselection = {procedure = 'cheapest', requirements.success = 0.99}": [
+        "selection: cheapest: indifference: is missing; allowed: the least saving that matters"
+    ],
+    "costs.uav = 1\n"
+    "selection = {procedure = 'cheapest', requirements.success = 1.0, indifference = 1}": [
+        "requirements.success: 1 is out of range; allowed: between 0.005 and 0.995"
+    ],
+    "costs.uav = 1\n"
+    "selection = {procedure = 'cheapest', requirements.speed = 0.9, indifference = 1}": [
+        "selection: cheapest: requirements.speed",
+        "'success', 'collection_ratio' or 'collection_ratio_and_communication'",
+    ],
+    "costs.uav = -1": ["costs.uav", "greater than or equal to 0, not -1"],
     "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
     "missions = 1\n[design": ["not valid TOML"],
