@@ -108,6 +108,25 @@ class Origin(Document):
         """
         return ScenarioSpace.of(**self.scenario | values)
 
+    @property
+    def changes_here(self) -> list[str]:
+        """How the code and libraries of this process differ from those that made the results.
+
+        Raises:
+            InputError: If a policy is not there.
+        """
+        changes = []
+        if self.version != dess.__version__:
+            changes.append(f"made by dess {self.version}, not {dess.__version__}")
+        elif modules := differing(self.code, code_behind(team.policy for team in self.policies)):
+            changes.append(f"made by other code of {', '.join(modules)}")
+        if weights := [t.policy for t in self.policies if t.weights != team_of(t.policy).weights]:
+            changes.append(f"made by other weights of {', '.join(weights)}")
+        versions = library_versions()
+        if others := [n for n in versions if self.libraries.get(n) != versions[n]]:
+            changes.append(f"made with other versions of {', '.join(others)}")
+        return changes
+
     def simulate_command(self, policy: str, values: dict[str, Any], replication: int) -> str:
         """The command that simulates a mission again.
 

@@ -7,11 +7,12 @@ from typing import Annotated
 import typer
 
 from dess import InputError
-from reports.cli import console
+from reports.cli import console, diff
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import RESULTS, JsonOption, WorkersOption
 
 app = typer.Typer(help="Studies: policies x design points x replications.")
+app.add_typer(diff.app)
 
 
 @app.command("run")

@@ -71,7 +71,7 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
             print_rows(tables[name])
 
 
-def _print_frame(title: str, cells: pd.DataFrame) -> None:
+def print_frame(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text under its title; the index is its first column."""
     rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
     console.print_table([title, *map(str, cells.columns)], rows)
@@ -81,7 +81,7 @@ def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
     cells = selected.set_index("policy")[["setting", "missions", "left"]]
     cells["missions"] = cells["missions"].map("{:,}".format)
-    _print_frame("selected for", cells)
+    print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         print(f" {guarantee}")
 
@@ -91,7 +91,7 @@ def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) 
     cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], "policy")
     if printed:
         cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
-    _print_frame(title, cells.rename(columns=SHORT_METRICS))
+    print_frame(title, cells.rename(columns=SHORT_METRICS))
 
 
 def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
@@ -103,7 +103,7 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         return
     for metric in metrics:
         cells = numbers.wide(means[means["metric"] == metric], "point", "policy")
-        _print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
+        print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
 
 
 def _print_distributions(table: pd.DataFrame) -> None:
@@ -147,19 +147,19 @@ def _print_sensitivities(table: pd.DataFrame) -> None:
 
 def _print_comparisons(table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
-    cells, product = _differences(table, "policy")
+    cells, product = differences(table, "policy")
     cells["pairing saves"] = product["variance_reduction"].map(_gain)
-    _print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
+    print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
 
 
 def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
-    cells, product = _differences(table, "learner")
+    cells, product = differences(table, "learner")
     cells = cells.assign(about=product["about"], trainings=product["trainings"])
-    _print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
+    print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 
 
-def _differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Differences in every metric and the p-value of the product, as text; rows of the product."""
     estimates = table.rename(columns={"difference": "mean"})
     cells = numbers.wide(estimates, who, write=numbers.points).rename(columns=SHORT_METRICS)

@@ -13,9 +13,7 @@ from pathlib import Path
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
-import dess
 from analysis.results.evidence import Evidence, chosen, learned_files
-from analysis.results.provenance import code_behind, differing, library_versions, team_of
 from analysis.results.resimulate import difference
 from analysis.results.store import MANIFEST, Store
 from analysis.results.tables import results_of
@@ -137,7 +135,7 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
         if changed := difference(record, mission.record):
             command = evidence.simulate_command(policy, values, replication)
             lines.append(f"{changed}; command: {command}")
-    return Check(evidence.study["name"], len(numbers), lines, _notes(evidence))
+    return Check(evidence.study["name"], len(numbers), lines, evidence.changes_here)
 
 
 def _check_logs(store: Store, missions: int, seed: int) -> Check:
@@ -154,21 +152,6 @@ def _check_logs(store: Store, missions: int, seed: int) -> Check:
             command = manifest.command(cell, replication)
             lines.append(f"the event log is another one when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(numbers), lines)
-
-
-def _notes(evidence: Evidence) -> list[str]:
-    """How the code and libraries differ from those that made the results."""
-    notes, teams = [], evidence.policies
-    if evidence.version != dess.__version__:
-        notes.append(f"made by dess {evidence.version}, not {dess.__version__}")
-    elif changes := differing(evidence.code, code_behind(team.policy for team in teams)):
-        notes.append(f"made by other code of {', '.join(changes)}")
-    if changed := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
-        notes.append(f"made by other weights of {', '.join(changed)}")
-    versions = library_versions()
-    if others := [name for name in versions if evidence.libraries.get(name) != versions[name]]:
-        notes.append(f"made with other versions of {', '.join(others)}")
-    return notes
 
 
 def _check_files(text: str, path: Path) -> Check:

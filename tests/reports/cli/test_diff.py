@@ -1,0 +1,104 @@
+"""``dess study diff``: whether two results folders are identical, or which missions differ."""
+
+import json
+import re
+import shlex
+import shutil
+
+import pyarrow.parquet as pq
+
+from analysis.results.parquet import content_hash, short_hash
+from tests.analysis.small import files_of
+
+
+def forged(folder, policy, replication, field, change):
+    """Change the record of a mission, as if the code had made it."""
+    for path in (folder / "missions" / f"policy={policy}").glob("*.parquet"):
+        table = pq.read_table(path, partitioning=None)
+        rows = table.to_pylist()
+        if all(row["replication"] != replication for row in rows):
+            continue
+        values = [row[field] + change * (row["replication"] == replication) for row in rows]
+        column = table.schema.get_field_index(field)
+        pq.write_table(table.set_column(column, table.schema.field(column), [values]), path)
+        digest = short_hash(path.read_bytes())
+        path.rename(path.with_name(f"{content_hash(path)}-{digest}.parquet"))
+
+
+def test_a_folder_is_identical_with_itself(dess, dess_json, tmp_path):
+    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
+    shutil.copytree("a", "b")
+    before = files_of(tmp_path)
+    assert dess("study", "diff", "a", "b") == (0, "identical: 20 missions\n", "")
+    data = dess_json("study", "diff", "a", "b")
+    assert data["identical"] is True
+    assert (data["missions"], data["differ"], data["changed"], data["alone"]) == (20, 0, [], [])
+    assert files_of(tmp_path) == before
+
+
+def test_the_missions_that_differ_are_named_with_their_commands(dess, dess_json, tmp_path):
+    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
+    shutil.copytree("a", "b")
+    forged(tmp_path / "b", "random", 6, "collection_ratio", -0.125)
+    forged(tmp_path / "b", "random", 2, "reward", 3.0)
+    code, out, err = dess("study", "diff", "a", "b")
+    assert (code, err) == (0, "")
+    assert out.startswith("2 of 20 missions differ\n")
+    assert re.search(r"random +2 of 10 +0.0 \[.*\] +−1.2 \[−4.1, \+1.6\]", out)
+    assert " 1 more without any difference\n" in out
+    assert " A, a: made by the code, weights and libraries that are here\n" in out
+    data = dess_json("study", "diff", "a", "b")
+    assert data["identical"] is False
+    identity = {"policy_a": "random", "policy_b": "random", "point_a": 0, "point_b": 0}
+    assert data["changed"] == [
+        identity | {"replication": 6, "fields": "collection_ratio"},
+        identity | {"replication": 2, "fields": "reward"},
+    ]
+    first = data["most_changed"][0]
+    assert "random, replication 6: collection_ratio\n     A and B, each" in out
+    assert f": {first['command_a']}\n" in out
+    simulated = json.loads(dess(*shlex.split(first["command_a"])[1:], "--json")[1])
+    assert simulated["replication"] == 6
+
+
+def test_missions_that_one_folder_lacks_are_listed(dess, dess_json):
+    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
+    assert dess("study", "run", "trial.toml", "--out", "b", "--missions", 6)[0] == 0
+    code, out, _ = dess("study", "diff", "a", "b")
+    assert code == 0
+    what = "policy greedy at the scenario of study trial, replications 6 to 9"
+    assert out.startswith(f"identical: the 12 missions that both have\n only in A: {what} (4 ")
+    data = dess_json("study", "diff", "a", "b")
+    assert data["identical"] is False
+    assert data["alone"][0] == {"only_in": "A", "what": what, "missions": 4}
+
+
+def test_design_points_and_both_commands_are_shown(dess, tmp_path):
+    """Of two policies that are compared whatever their names, each has its own command."""
+    for policy in ("greedy", "random"):
+        text = (tmp_path / "trial.toml").read_text()
+        design = "\n[design]\nkind = 'grid'\nvalues.quota = [20, 60]\n"
+        (tmp_path / "grid.toml").write_text(text + design)
+        assert dess("study", "run", "grid.toml", "--policy", policy, "--out", policy)[0] == 0
+    code, out, _ = dess("study", "diff", "greedy", "random", "--most", 1)
+    assert code == 0
+    assert re.search(r"\ngreedy quota 20 +10 of 10 ", out)
+    (of_a,) = re.findall(r"     A: dess simulate .*--policy greedy", out)
+    (of_b,) = re.findall(r"     B: dess simulate .*--policy random", out)
+    assert "2 more" not in out
+
+
+def test_folders_that_cannot_be_compared_get_one_line(dess, tmp_path):
+    assert dess("study", "run", "trial.toml", "--out", "a")[0] == 0
+    text = (tmp_path / "trial.toml").read_text()
+    (tmp_path / "trial.toml").write_text(text.replace("seed = 7", "seed = 8"))
+    assert dess("study", "run", "trial.toml", "--out", "b")[0] == 0
+    next((tmp_path / "b" / "uavs").rglob("*.parquet")).unlink()
+    for pair, words in {("a", "b"): "b: incomplete", ("a", "none"): "no such file"}.items():
+        code, out, err = dess("study", "diff", *pair)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
+    assert dess("study", "run", "trial.toml", "--out", "b")[0] == 0
+    code, out, err = dess("study", "diff", "a", "b")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "a and b: their seeds 7 and 8 give different random draws" in err
