@@ -59,3 +59,12 @@ def test_a_table_may_have_two_rows_of_heads() -> None:
     assert table.columns.tolist() == [("", "Policy"), ("Calls", "n")]
     assert table.to_numpy().tolist() == [["a", "3"]]
     assert numbers.headed([]).empty
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0.2, "0 seconds"), (119, "119 seconds"), (120, "2 minutes"), (7200, "2 hours")]
+    + [(86400 * 1234, "1,234 days")],
+)
+def test_a_duration_has_one_unit(seconds: float, text: str) -> None:
+    assert numbers.duration(seconds) == text

@@ -1,7 +1,8 @@
 import pytest
 
 from analysis import run_study
-from analysis.execution.dry_run import LONG_TRIAL, TRIAL, plan_study
+from analysis.execution import dry_run
+from analysis.execution.dry_run import LONG_TRIAL, TRIAL, check_effort, plan_study
 from dess import InputError
 from tests.analysis.small import files_of, grid, small_study
 
@@ -68,3 +69,33 @@ def test_a_plan_refuses_what_a_run_would(tmp_path):
         plan_study(small_study(tmp_path), tmp_path)
     with pytest.raises(InputError, match="workers: 0 is out of range"):
         plan_study(small_study(tmp_path), tmp_path / "out", workers=0)
+
+
+def test_a_long_run_has_to_be_confirmed(tmp_path, monkeypatch):
+    study, out = small_study(tmp_path), tmp_path / "out"
+    check_effort(study, out, clock=Clock(1e9))  # few missions are run without a trial
+    monkeypatch.setattr(dry_run, "FEW", 19)
+    check_effort(study, out, clock=Clock(1.0))
+    before = files_of(tmp_path)
+    line = (
+        r"study trial: 20 missions to simulate \(2 policies, 1 design points\), about 3 hours with"
+    )
+    with pytest.raises(InputError, match=f"{line} 2 at work; allowed: --yes, or less"):
+        check_effort(study, out, workers=2, clock=Clock(3 * 3600 * 2 / 20 * TRIAL))
+    check_effort(study, out, clock=Clock(1e9), yes=True)
+    assert files_of(tmp_path) == before
+    run_study(study, out)
+    check_effort(study, out, clock=Clock(1e9))  # all of it is there
+
+
+def test_very_many_points_are_not_made(tmp_path):
+    study = small_study(
+        tmp_path, design=grid(**dict.fromkeys(("quota", "max_slots"), [*range(1, 401)]))
+    )
+    with pytest.raises(InputError, match="3,200,000 missions .* 160,000 design points"):
+        check_effort(study, tmp_path / "out")
+    four = dict.fromkeys(("quota", "max_slots", "cell_size", "altitude"), [*range(1, 1001)])
+    study = small_study(tmp_path, design=grid(**four))
+    with pytest.raises(InputError, match="20,000,000,000,000 missions .*: 1,048,576 design points"):
+        check_effort(study, tmp_path / "out", yes=True)
+    assert "points" not in study.__dict__

@@ -16,6 +16,7 @@ from analysis.study.design import (
     Saltelli,
     Table,
 )
+from dess import InputError
 from dess.files import parse_toml
 from dess.scenario import load_scenario, validation_line
 from dess.streams import MAX_REPLICATION, MAX_SEED
@@ -76,6 +77,8 @@ def test_every_kind_is_written_in_toml_and_makes_scenarios(kind):
     design = plan(TOML[kind])
     assert design.kind == kind
     assert design.points
+    assert design.count == len(design.points)
+    assert tuple(map(design.point, range(design.count))) == design.points
     for point in design.points:
         load_scenario("paper", **point.values)
         hash(tuple(point.values.values()))  # values group missions
@@ -265,3 +268,12 @@ def test_a_bad_design_gets_one_line(text):
     assert "\n" not in line
     for part in BAD[text]:
         assert part in line
+
+
+def test_a_grid_of_very_many_points_is_counted_without_making_them():
+    values = {field: range(1, 1001) for field in ("quota", "max_slots", "cell_size", "altitude")}
+    design = Grid(values={field: tuple(of_field) for field, of_field in values.items()})
+    assert design.count == 10**12
+    assert [*design.point(10**12 - 2).values.values()] == [1000, 1000, 1000, 999]
+    with pytest.raises(InputError, match="design: 1,000,000,000,000 points; allowed: 1,048,576"):
+        design.points

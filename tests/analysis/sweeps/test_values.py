@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from analysis.study.design import MAX_SIZE
+from analysis.sweeps.values import values_of
+from dess import InputError
+
+# Field, what is given, and the values that this is.
+GIVEN = [
+    ("uavs", 3, (3,)),
+    ("uavs", range(2, 6), (2, 3, 4, 5)),
+    ("uavs", [1, 3], (1, 3)),
+    ("uavs", [[1, 3]], ([1, 3],)),
+    ("uavs", np.array([2, 4]), (2, 4)),
+    ("pads", (1, 2), (1, 2)),
+    ("quota", np.int64(600), (600,)),
+    ("arrival_rate", np.array([0.01, 0.02]), (0.01, 0.02)),
+    ("forbid_swaps", [False, True], (False, True)),
+    ("initial_data", 10, (10,)),
+    ("initial_data", [5, 20], ([5, 20],)),
+    ("initial_data", (5, 20), ([5, 20],)),
+    ("initial_data", np.array([5, 20]), (5, 20)),
+    ("initial_data", [5, 10, 20], (5, 10, 20)),
+    ("initial_data", [[5, 7.5], [7.5, 10]], ([5, 7.5], [7.5, 10])),
+    ("initial_data", [5, [7.5, 10]], (5, [7.5, 10])),
+    ("zone", [26, 2, 4, 4], ([26, 2, 4, 4],)),
+    ("zone", [[26, 2, 4, 4], [0, 0, 2, 2]], ([26, 2, 4, 4], [0, 0, 2, 2])),
+    ("nodes", [[1, 2], [3, 4]], ([[1, 2], [3, 4]],)),
+    ("nodes", [[[1, 2]], [[3, 4]]], ([[1, 2]], [[3, 4]])),
+]
+
+
+@pytest.mark.parametrize(("field", "given", "values"), GIVEN)
+def test_one_value_is_fixed_and_several_are_swept(field, given, values):
+    found = values_of(field, given)
+    assert found == values
+    assert [type(value) for value in found] == [type(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("given", "line"),
+    [
+        ([], "uavs: has no values; allowed: one or more"),
+        (range(5, 2), "uavs: has no values"),
+        (np.array([]), "uavs: has no values"),
+        ([2, 3, 2], "uavs: 2 is listed twice; allowed: distinct values"),
+        ([[1, 2], (1, 2)], r"uavs: \[1, 2\] is listed twice"),
+        (range(MAX_SIZE + 1), f"uavs: 1,048,577 values; allowed: {MAX_SIZE:,} at most"),
+    ],
+)
+def test_values_that_are_none(given, line):
+    with pytest.raises(InputError, match=line):
+        values_of("uavs", given)
