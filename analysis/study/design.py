@@ -26,7 +26,7 @@ NOISE = "replication (noise)"
 MAX_SIZE = 2**20
 
 # Fields that take integers only. What is no field of a scenario is refused when it is loaded.
-_INTEGERS = {
+INTEGERS = {
     name
     for name, field in Scenario.model_fields.items()
     if field.annotation in (int, Integer | None)
@@ -58,7 +58,7 @@ def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...
 def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
     for field, ends in ranges.items():
         if not _is_range(field, ends):
-            numbers = "integers" if field in _INTEGERS else "numbers"
+            numbers = "integers" if field in INTEGERS else "numbers"
             shown = list(ends) if isinstance(ends, tuple) else repr(ends)
             raise ValueError(
                 f"{field}: {shown} is no range; allowed: [low, high], {numbers} with low <= high"
@@ -67,7 +67,7 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
 
 
 def _is_range(field: str, ends: Any) -> bool:
-    kinds = (int,) if field in _INTEGERS else (int, float)
+    kinds = (int,) if field in INTEGERS else (int, float)
     return (
         isinstance(ends, tuple)
         and len(ends) == 2
@@ -182,7 +182,7 @@ class _Sampled(_Design):
     def _point(self, unit: Iterable[float], replication: int = 0) -> DesignPoint:
         """The point at a place in the unit cube."""
         places = zip(self.ranges.items(), unit, strict=True)
-        values = {field: _scaled(u, ends, field in _INTEGERS) for (field, ends), u in places}
+        values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
         return DesignPoint(values, replication)
 
 

@@ -1,6 +1,6 @@
 """A sweep as a study: made from values of fields, kept under a name, and run.
 
-    study = question({"uavs": range(2, 6), "pads": [1, 2, 3], "quota": 600}, "my-sea.toml")
+    study = question({"uavs": [2, 3, 4], "pads": [1, 2, 3], "quota": [600]}, "my-sea.toml")
     results = ask(study, "results")  # in results/sweeps/uavs-pads-0123456789abcdef
 
 The name tells the question, but not the number of missions: more of them top up its folder. What a
@@ -10,7 +10,7 @@ sweep needs and another one has is taken from there. The file of the study lies 
 
 import json
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,6 @@ from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.design import Grid
 from analysis.study.study import Study
-from analysis.sweeps.values import values_of
 from dess import InputError, simulate_batch
 from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
@@ -44,7 +43,7 @@ LITTLE = 0.01  # of the prices: a saving that does not matter
 
 
 def question(
-    fields: Mapping[str, Any],
+    values: Mapping[str, Sequence[Any]],
     scenario: str | Path = "paper",
     policies: Iterable[str] = ("greedy",),
     missions: int = 300,
@@ -56,7 +55,7 @@ def question(
     """The study of a sweep.
 
     Args:
-        fields: Fields of the scenario; one value is fixed, several are swept (``values_of``).
+        values: The values of fields of the scenario; one is fixed, several are swept.
         scenario: A shipped scenario, or a TOML file.
         policies: Teams: ``"P"`` or ``"P,P,..."``.
         missions: Of every policy and setting. With requirements: further ones, that check the
@@ -70,7 +69,6 @@ def question(
     Raises:
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
     """
-    values = {field: values_of(field, given) for field, given in fields.items()}
     fixed = {field: of_field[0] for field, of_field in values.items() if len(of_field) == 1}
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})

@@ -23,6 +23,7 @@ from analysis.questions import settings
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from analysis.sweeps.question import ask, folder_of, question
+from analysis.sweeps.values import values_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,8 @@ def sweep(
             scenario, or it would take long: before anything is written.
         ChunkError: If something could not be computed; after all that could.
     """
-    study = question(fields, scenario, policies, missions, seed, prices, requirements, name)
+    values = {field: values_of(field, given) for field, given in fields.items()}
+    study = question(values, scenario, policies, missions, seed, prices, requirements, name)
     if callable(progress):
         results = ask(study, folder, workers, progress, yes=yes)
     else:

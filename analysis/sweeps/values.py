@@ -33,11 +33,19 @@ def values_of(field: str, given: Any) -> tuple[Any, ...]:
     """
     if _is_value(field, given):
         return (_plain(given),)
-    if len(given) > MAX_SIZE:
-        raise InputError(f"{field}: {len(given):,} values; allowed: {MAX_SIZE:,} at most")
+    return distinct(field, given)
+
+
+def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
+    """Several values of a field, or one, as TOML has them.
+
+    Raises:
+        InputError: If there is none, one is listed twice, or there are too many.
+    """
+    if not 0 < len(given) <= MAX_SIZE:
+        counted = f"{len(given):,}" if len(given) else "no"
+        raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
     values = tuple(_plain(value) for value in given)
-    if not values:
-        raise InputError(f"{field}: has no values; allowed: one or more")
     known = set()
     for value in values:
         text = json.dumps(value, default=str)

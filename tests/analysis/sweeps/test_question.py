@@ -7,6 +7,7 @@ import pytest
 from analysis import load_results, load_study, run_study
 from analysis.execution import dry_run
 from analysis.sweeps.question import ask, file_of, folder_of, question
+from analysis.sweeps.values import values_of
 from dess import InputError
 from tests.analysis.small import files_of, write_scenario
 
@@ -18,12 +19,18 @@ def asking(tmp_path):
     """Asks a sweep of the small scenario into ``results``; the study, results and missions done."""
 
     def run(fields=FIELDS, missions=6, **about):
-        study = question(fields, write_scenario(tmp_path), missions=missions, **about)
+        study = sweep_of(fields, tmp_path, missions=missions, **about)
         rounds, done = [], []
         results = ask(study, tmp_path / "results", 1, done.append, rounds.append)
         return study, results, sum(done) - rounds[0].present
 
     return run
+
+
+def sweep_of(fields, folder, **about):
+    """The study of a sweep of the small scenario."""
+    values = {field: values_of(field, given) for field, given in fields.items()}
+    return question(values, write_scenario(folder), **about)
 
 
 def tables(results):
@@ -192,7 +199,7 @@ def test_what_cannot_be_asked_leaves_nothing(line, asking, tmp_path):
 
 def test_a_million_settings_are_counted_before_they_are_made(asking, tmp_path):
     fields = {"quota": range(1, 1001), "arrival_rate": [k / 1000 for k in range(1000)]}
-    study = question(fields, write_scenario(tmp_path))
+    study = sweep_of(fields, tmp_path)
     before = files_of(tmp_path)
     line = (
         r"300,000,000 missions to simulate \(1 policies, 1,000,000 design points\), "
@@ -207,7 +214,7 @@ def test_a_million_settings_are_counted_before_they_are_made(asking, tmp_path):
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
     monkeypatch.setattr(dry_run, "FEW", 20)
     monkeypatch.setattr(dry_run, "LONG_RUN", 0.0)
-    study = question(FIELDS, write_scenario(tmp_path), missions=6)
+    study = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
         ask(study, tmp_path / "results")
     ask(study, tmp_path / "results", yes=True)

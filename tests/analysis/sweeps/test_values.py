@@ -40,12 +40,12 @@ def test_one_value_is_fixed_and_several_are_swept(field, given, values):
 @pytest.mark.parametrize(
     ("given", "line"),
     [
-        ([], "uavs: has no values; allowed: one or more"),
+        ([], "uavs: has no values; allowed: 1 to 1,048,576"),
         (range(5, 2), "uavs: has no values"),
         (np.array([]), "uavs: has no values"),
         ([2, 3, 2], "uavs: 2 is listed twice; allowed: distinct values"),
         ([[1, 2], (1, 2)], r"uavs: \[1, 2\] is listed twice"),
-        (range(MAX_SIZE + 1), f"uavs: 1,048,577 values; allowed: {MAX_SIZE:,} at most"),
+        (range(MAX_SIZE + 1), "uavs: has 1,048,577 values; allowed"),
     ],
 )
 def test_values_that_are_none(given, line):
