@@ -189,7 +189,7 @@ def _uavs(results: Results, missions: pd.DataFrame, numbered: pd.DataFrame) -> p
     """The UAVs of the numbered missions."""
     manifest, tables = results.store.manifest, [results.uavs]
     for number, policy in enumerate(results.policies):
-        if parts := check_parts(manifest, number, manifest.selected[number]):
+        if parts := check_parts(manifest, number):
             tables.append(results.store.uavs(parts).assign(policy=policy))
     which = missions[["policy", "point", *_KEYS]].merge(numbered, on=_KEYS)
     which = which[["policy", "point", "replication", "mission"]]
