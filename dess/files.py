@@ -34,6 +34,12 @@ class Shipped(NamedTuple):
         files = resources.files(self.package).joinpath(self.folder).iterdir()
         return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
 
+    def folder_of(self, name_or_path: str | Path) -> Path:
+        """The folder that ``load`` reads a file from."""
+        if str(name_or_path) in self.names():
+            return Path(str(resources.files(self.package).joinpath(self.folder)))
+        return Path(name_or_path).parent
+
     def load(self, name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
         """Read a shipped file by its name, or any TOML file by its path.
 

@@ -20,8 +20,7 @@ from pydantic import (
 
 from dess.errors import InputError
 from dess.files import Shipped
-
-Cell = tuple[int, int]
+from dess.sea import Cell, nodes_in
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
@@ -251,14 +250,20 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     """A shipped scenario by name, or one from a TOML file.
 
     Args:
-        name_or_path: One of ``scenario_names()``, or the path of a TOML file.
+        name_or_path: One of ``scenario_names()``, or the path of a TOML file. Its ``nodes`` may be
+            the name of a file beside it, of which ``dess.sea`` makes cells.
         **overrides: Fields to set on top; setting a sampled field fixes it.
 
     Raises:
         InputError: If there is no such scenario, or it is not valid.
     """
-    where, values = _SCENARIOS.load(name_or_path)
-    return _validated(ScenarioSpace, values | overrides, where)
+    where, read = _SCENARIOS.load(name_or_path)
+    values = read | overrides
+    if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
+        without = _validated(ScenarioSpace, values | {"nodes": [[0, 0]]}, where)
+        path = _SCENARIOS.folder_of(name_or_path) / read["nodes"]
+        values["nodes"] = nodes_in(path, without.grid, without.cell_size)
+    return _validated(ScenarioSpace, values, where)
 
 
 def scenario_names() -> list[str]:

@@ -165,6 +165,11 @@ class Study(StrictTable):
         """Replications of every cell before a rule, if there is one, asks for more."""
         return self.rule.first if self.rule else self.missions
 
+    @cached_property
+    def _base(self) -> ScenarioSpace:
+        """The scenario that the design points change."""
+        return load_scenario(self.scenario, **self.set)
+
     @property
     def size(self) -> int:
         """Number of design points, known without making them."""
@@ -197,7 +202,11 @@ class Study(StrictTable):
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
         try:
-            return load_scenario(self.scenario, **self.set, **values)
+            space = load_scenario(self.scenario, **self.set, **values)
+            for field in ("grid", "cell_size"):
+                if field in values and "nodes" not in values and space.nodes != self._base.nodes:
+                    raise InputError(f"{field} moves the nodes of a file; allowed: nodes as cells")
+            return space
         except InputError as error:
             raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
 

@@ -1,4 +1,5 @@
 import pytest
+import tomli_w
 
 from analysis import load_study, study_names
 from analysis.study.study import budget_of
@@ -207,3 +208,24 @@ def test_the_budget_says_what_differs_from_the_shipped_study(tmp_path):
     assert words[1] == "1 of 6 policies, 3 instead of 300 missions"
     assert words[2] == "other policies, another seed"
     assert budget_of(small_study(tmp_path).model_dump(mode="json")) == "as asked"
+
+
+def test_nodes_of_a_file_stay_where_they_are(tmp_path):
+    """They are cells in the manifest, so a design must not move them."""
+    (tmp_path / "buoys.csv").write_text("lon,lat\n8.50,54.25\n8.52,54.26\n")
+    scenario = tmp_path / "sea.toml"
+    scenario.write_text('nodes = "buoys.csv"\ngrid = 12\nzone = [0, 0, 2, 2]\nuavs = 1\n')
+    values = {"name": "sea", "policies": ["greedy"], "scenario": str(scenario)}
+    path = tmp_path / "sea-study.toml"
+
+    def study(**more):
+        path.write_text(tomli_w.dumps(values | {"scenario": "sea.toml"} | more))
+        return load_study(path)
+
+    nodes = ((5, 6), (6, 5))
+    assert [p.scenario.nodes for p in study(design=grid(quota=[1, 2])).points] == [nodes] * 2
+    assert study(set={"grid": 14}).points[0].scenario.nodes == ((6, 7), (7, 6))
+    with pytest.raises(InputError, match="at grid=14: grid moves the nodes of a file; allowed"):
+        study(design=grid(grid=[12, 14]))
+    fixed = grid(grid=[12, 14])
+    assert study(design=fixed, set={"nodes": [[1, 1]]}).points[1].scenario.nodes == ((1, 1),)

@@ -1,0 +1,200 @@
+"""Sensor nodes of an own sea: their cells from a CSV or GeoJSON file.
+
+    nodes = "buoys.csv"  # in the TOML file of a scenario, for a file beside it
+
+A CSV file has a header. Its columns ``x`` and ``y`` are cells, of which (0, 0) is the north-western
+one. Its columns ``lon`` and ``lat``, like the Point features of a GeoJSON file (RFC 7946), are
+degrees of WGS 84; other columns are ignored. They are projected with the local equirectangular
+projection about the centre of their bounding box (J. P. Snyder, Map projections: a working manual,
+U.S. Geological Survey 1987), which becomes the centre of the grid.
+"""
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dess.errors import InputError
+
+Cell = tuple[int, int]
+
+MAX_BYTES = 2**20
+MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
+EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
+
+
+class Place(NamedTuple):
+    """Where a node is.
+
+    Attributes:
+        name: Its place in the file, for messages.
+        x: Longitude [degrees] or column of cells.
+        y: Latitude [degrees] or row of cells.
+    """
+
+    name: str
+    x: float
+    y: float
+
+
+def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
+    """The cells of the nodes that a file holds, in its order.
+
+    Args:
+        path: A file ``.csv``, ``.geojson`` or ``.json``.
+        grid: Cells along one side of the grid.
+        cell_size: Side of a cell [m].
+
+    Raises:
+        InputError: If the file cannot be read, has no nodes, or they are off the grid or share a
+            cell.
+    """
+    readers = {".csv": _of_csv, ".geojson": _of_geojson, ".json": _of_geojson}
+    if path.suffix.lower() not in readers:
+        raise InputError(f"{path}: is of no known kind; allowed: {', '.join(readers)}")
+    is_geographic, places = readers[path.suffix.lower()](path, _text(path))
+    if not 0 < len(places) <= MAX_NODES:
+        raise InputError(f"{path}: has {len(places):,} nodes; allowed: 1..{MAX_NODES}")
+    cells = _projected(places, grid, cell_size) if is_geographic else _integers(path, places)
+    _check_grid(path, places, cells, grid, is_geographic)
+    known: dict[Cell, str] = {}
+    for place, cell in zip(places, cells, strict=True):
+        if cell in known:
+            smaller = f"a cell_size below {cell_size:g} m" if is_geographic else "distinct cells"
+            shared = f"{known[cell]} and {place.name} lie in one cell, {list(cell)}"
+            raise InputError(f"{path}: {shared}; allowed: {smaller}")
+        known[cell] = place.name
+    return tuple(cells)
+
+
+def _text(path: Path) -> str:
+    """The content of a regular file that is not too large."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: cannot be read: it is no regular file; allowed: a file")
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: is too large; allowed: {MAX_BYTES:,} bytes at most")
+        return path.read_text("utf-8-sig")
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be read: {reason}; allowed: a file of nodes") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: cannot be read: it is no text; allowed: UTF-8") from None
+
+
+def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
+    """Whether the nodes are geographic, and where they are."""
+    try:
+        rows = list(csv.reader(io.StringIO(text), strict=True))
+    except csv.Error as error:
+        raise InputError(f"{path}: is no CSV file: {error}; allowed: CSV with commas") from None
+    header = [name.strip() for name in rows[0]] if rows else []
+    found = [pair for pair in (("x", "y"), ("lon", "lat")) if {*pair} <= {*header}]
+    if len(found) != 1:
+        columns = ", ".join(header) or "none"
+        raise InputError(f"{path}: has columns {columns}; allowed: x and y, or lon and lat")
+    pair = [header.index(name) for name in found[0]]
+    places = []
+    for number, row in enumerate(rows[1:], 2):
+        if any(field.strip() for field in row):  # not an empty line
+            values = [row[column].strip() if column < len(row) else "" for column in pair]
+            places.append(_place(path, f"line {number}", found[0], values))
+    is_geographic = found[0] == ("lon", "lat")
+    return is_geographic, [_on_earth(path, p) for p in places] if is_geographic else places
+
+
+def _of_geojson(path: Path, text: str) -> tuple[bool, list[Place]]:
+    """Whether the nodes are geographic, as GeoJSON is, and where they are."""
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        line = " ".join(str(error).split())
+        raise InputError(f"{path}: is no JSON: {line}; allowed: GeoJSON") from None
+    features = data.get("features") if isinstance(data, dict) else None
+    if not isinstance(features, list):
+        raise InputError(f"{path}: has no list of features; allowed: a GeoJSON FeatureCollection")
+    places = []
+    for number, feature in enumerate(features, 1):
+        name = f"feature {number}"
+        geometry = feature.get("geometry") if isinstance(feature, dict) else None
+        kind = geometry.get("type") if isinstance(geometry, dict) else None
+        if not isinstance(geometry, dict) or kind != "Point":
+            raise InputError(f"{path}: {name} is {kind or 'without geometry'}; allowed: Point")
+        at = geometry.get("coordinates")
+        values = at[:2] if isinstance(at, list) else []
+        places.append(_on_earth(path, _place(path, name, ("lon", "lat"), values)))
+    return True, places
+
+
+def _place(path: Path, name: str, columns: Sequence[str], values: Sequence[Any]) -> Place:
+    """A place of the values of two columns, or of two coordinates."""
+    numbers = []
+    for column, value in zip(columns, [*values, None, None], strict=False):
+        try:
+            number = math.nan if isinstance(value, bool) else float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = math.nan
+        if not math.isfinite(number):
+            raise InputError(f"{path}: {name}: {column} is {value!r}; allowed: a number")
+        numbers.append(number)
+    return Place(name, *numbers)
+
+
+def _on_earth(path: Path, place: Place) -> Place:
+    for column, value, most in (("lon", place.x, 180), ("lat", place.y, 90)):
+        if abs(value) > most:
+            line = f"{place.name}: {column} is {value:g}; allowed: -{most}..{most} degrees"
+            raise InputError(f"{path}: {line}")
+    return place
+
+
+def _integers(path: Path, places: Iterable[Place]) -> list[Cell]:
+    """The cells of places that are given as cells."""
+    cells = []
+    for place in places:
+        for column, value in (("x", place.x), ("y", place.y)):
+            if value != int(value):
+                line = f"{place.name}: {column} is {value:g}; allowed: an integer, as of a cell"
+                raise InputError(f"{path}: {line}")
+        cells.append((int(place.x), int(place.y)))
+    return cells
+
+
+def _projected(places: Sequence[Place], grid: int, cell_size: float) -> list[Cell]:
+    """The cells of places on the Earth; y grows south."""
+    longitudes = [place.x for place in places]
+    if max(longitudes) - min(longitudes) > 180:  # on both sides of the 180th meridian
+        longitudes = [x + 360 if x < 0 else x for x in longitudes]
+    latitudes = [place.y for place in places]
+    middle_x, middle_y = ((min(v) + max(v)) / 2 for v in (longitudes, latitudes))
+    east = math.radians(1) * EARTH_RADIUS * math.cos(math.radians(middle_y)) / cell_size
+    south = -math.radians(1) * EARTH_RADIUS / cell_size
+    return [
+        (
+            math.floor(grid / 2 + (x - middle_x) * east),
+            math.floor(grid / 2 + (y - middle_y) * south),
+        )
+        for x, y in zip(longitudes, latitudes, strict=True)
+    ]
+
+
+def _check_grid(
+    path: Path, places: Sequence[Place], cells: Sequence[Cell], grid: int, is_centred: bool
+) -> None:
+    """Refuse cells off the grid, with a grid that they would be on."""
+    for place, cell in zip(places, cells, strict=True):
+        if not all(0 <= coordinate < grid for coordinate in cell):
+            beyond = max(max(-c, c - grid + 1) for at in cells for c in at)
+            needed = grid + 2 * beyond if is_centred else grid + beyond
+            line = f"{place.name} is off the grid of {grid} x {grid} cells, at {list(cell)}"
+            if min(cell) < 0 and not is_centred:
+                allowed = "0 <= x, y"
+            elif needed <= MAX_GRID:
+                allowed = f"grid = {needed} or more"
+                allowed += ", or a larger cell_size" if is_centred else ""
+            else:
+                allowed = "a larger cell_size" if is_centred else f"0 <= x, y < {MAX_GRID}"
+            raise InputError(f"{path}: {line}; allowed: {allowed}")

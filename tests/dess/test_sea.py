@@ -1,0 +1,172 @@
+"""Nodes from files: hand-worked projections, and refusals in one clear line."""
+
+import json
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dess import InputError, load_scenario, sea
+from dess.sea import EARTH_RADIUS, nodes_in
+
+METRES_PER_DEGREE = EARTH_RADIUS * math.pi / 180  # of latitude: 111,195 m
+
+
+def _csv(folder: Path, text: str) -> Path:
+    path = folder / "buoys.csv"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def _geojson(folder: Path, *features: Any) -> Path:
+    path = folder / "buoys.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}), "utf-8")
+    return path
+
+
+def _point(*coordinates: float) -> dict[str, Any]:
+    return {"type": "Feature", "geometry": {"type": "Point", "coordinates": coordinates}}
+
+
+def test_columns_x_and_y_are_cells(tmp_path: Path) -> None:
+    text = "\ufeffname, y ,x\na,3,1\n\nb,0,7\r\n"
+    assert nodes_in(_csv(tmp_path, text), 8, 800.0) == ((1, 3), (7, 0))
+
+
+def test_a_node_is_in_the_middle_of_the_grid(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "lon,lat\n8.5,54.25\n")
+    assert nodes_in(path, 32, 800.0) == ((16, 16),)
+    assert nodes_in(path, 33, 800.0) == ((16, 16),)
+
+
+def test_degrees_are_projected_about_the_centre_of_their_box(tmp_path: Path) -> None:
+    """At 60 degrees north a degree of longitude is half a degree of latitude long: 55,597 m."""
+    places = [(10.0, 60.0), (9.91, 60.0), (10.09, 60.0), (10.0, 60.045), (10.0, 59.955)]
+    # 0.09 x 55,597 m = 5,004 m and 0.045 x 111,195 m = 5,004 m: five cells of 1 km and a bit.
+    expected = ((10, 10), (4, 10), (15, 10), (10, 4), (10, 15))
+    rows = "".join(f"{lon},{lat}\n" for lon, lat in places)
+    assert nodes_in(_csv(tmp_path, f"lon,lat\n{rows}"), 20, 1000.0) == expected
+    features = [_point(*place, 0.5) for place in places]  # with an altitude
+    assert nodes_in(_geojson(tmp_path, *features), 20, 1000.0) == expected
+
+
+def test_the_cell_size_scales(tmp_path: Path) -> None:
+    half = 3.5 * 400 / METRES_PER_DEGREE
+    path = _csv(tmp_path, f"lon,lat\n0,{half}\n0,{-half}\n")
+    assert nodes_in(path, 8, 400.0) == ((4, 0), (4, 7))
+    assert nodes_in(path, 8, 800.0) == ((4, 2), (4, 5))
+
+
+def test_a_sea_may_lie_across_the_180th_meridian(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "lon,lat\n179.99,0\n-179.99,0\n")  # 2,224 m apart
+    assert nodes_in(path, 10, 1000.0) == ((3, 5), (6, 5))
+
+
+def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
+    assert nodes_in(_csv(tmp_path, "x,y\n5,5\n1,1\n3,3\n"), 8, 1.0) == ((5, 5), (1, 1), (3, 3))
+
+
+# --- in a scenario ---
+
+
+def test_a_scenario_names_a_file_beside_it(tmp_path: Path) -> None:
+    _csv(tmp_path, "lon,lat\n8.50,54.25\n8.52,54.26\n")
+    path = tmp_path / "sea.toml"
+    path.write_text('nodes = "buoys.csv"\ngrid = 12\nzone = [0, 0, 2, 2]\n')
+    space = load_scenario(path)
+    # 0.02 degrees are 1,299 m at 54.255 degrees: 0.8 cells to both sides; 0.7 cells north, south.
+    assert space.nodes == ((5, 6), (6, 5))
+    assert load_scenario(path, grid=14).nodes == ((6, 7), (7, 6))
+    assert load_scenario(path, nodes=[[1, 2]]).nodes == ((1, 2),)
+    again = tmp_path / "again.toml"
+    again.write_text(space.to_toml())
+    assert load_scenario(again) == space
+
+
+def test_what_is_wrong_with_the_scenario_is_said_first(tmp_path: Path) -> None:
+    path = tmp_path / "sea.toml"
+    path.write_text('nodes = "nowhere.csv"\ngrid = "large"\n')
+    with pytest.raises(InputError, match=r"sea.toml: grid: .*'large'"):
+        load_scenario(path)
+    with pytest.raises(InputError, match=r"nodes: 'buoys.csv' has the wrong form"):
+        load_scenario("paper", nodes="buoys.csv")
+
+
+# --- refusals ---
+
+TABLES = {
+    "": "has columns none; allowed: x and y, or lon and lat",
+    "lon;lat\n8;54\n": "has columns lon;lat; allowed: x and y",
+    "lat,y\n8,54\n": "has columns lat, y; allowed",
+    "x,y,lon,lat\n1,1,8,54\n": "has columns x, y, lon, lat; allowed",
+    "x,y\n": "has 0 nodes; allowed: 1..1024",
+    "x,y\n1,two\n": "line 2: y is 'two'; allowed: a number",
+    "x,y\n1,1\n\n2\n": "line 4: y is ''; allowed: a number",
+    "x,y\nnan,1\n": "line 2: x is 'nan'; allowed: a number",
+    "x,y\n1.5,1\n": "line 2: x is 1.5; allowed: an integer",
+    "x,y\n1,-1\n": r"line 2 is off the grid of 8 x 8 cells, at \[1, -1\]; allowed: 0 <= x, y$",
+    "x,y\n1,1\n3,11\n": r"line 3 is off .* at \[3, 11\]; allowed: grid = 12 or more$",
+    "x,y\n1,999\n": "allowed: 0 <= x, y < 256",
+    "x,y\n1,1\n2,2\n1,1\n": r"line 2 and line 4 lie in one cell, \[1, 1\]; allowed: distinct",
+    "lon,lat\n181,54\n": "line 2: lon is 181; allowed: -180..180 degrees",
+    "lon,lat\n54,91\n": "line 2: lat is 91; allowed: -90..90 degrees",
+    "lon,lat\n8,54\n8.02,54.02\n8.00001,54.00001\n": "line 2 and line 4 lie.*cell_size below 800 m",
+    # 0.09 degrees are 10,008 m, 12.5 cells: 6.25 to both sides of the middle, at 4.
+    "lon,lat\n0,0\n0,0.09\n": r"line 2 is off .* at \[4, 10\]; allowed: grid = 14 or more, or a l",
+    "lon,lat\n0,0\n0,80\n": "off the grid .*; allowed: a larger cell_size$",
+    'x,y\n"1,1\n': "is no CSV file",
+}
+
+
+@pytest.mark.parametrize("text", TABLES)
+def test_a_table_that_is_refused(text: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"buoys.csv: .*{TABLES[text]}") as error:
+        nodes_in(_csv(tmp_path, text), 8, 800.0)
+    assert "\n" not in str(error.value)
+
+
+def test_the_grid_that_is_named_would_do(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "lon,lat\n0,0\n0,0.09\n0.05,0.02\n")
+    assert len(nodes_in(path, 14, 800.0)) == len(nodes_in(path, 15, 800.0)) == 3
+
+
+FEATURES: dict[str, Any] = {
+    "has no list of features": {"type": "Point", "coordinates": [8, 54]},
+    "feature 1 is LineString; allowed: Point": {
+        "features": [{"geometry": {"type": "LineString", "coordinates": [[8, 54], [9, 54]]}}]
+    },
+    "feature 2 is without geometry": {"features": [_point(8, 54), {"geometry": None}]},
+    "feature 1: lat is None; allowed: a number": {"features": [_point(8)]},
+    "feature 1: lon is True; allowed: a number": {"features": [_point(True, 54)]},
+    "has 0 nodes": {"features": []},
+}
+
+
+@pytest.mark.parametrize("line", FEATURES)
+def test_a_geojson_file_that_is_refused(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "buoys.json"
+    path.write_text(json.dumps(FEATURES[line]))
+    with pytest.raises(InputError, match=f"buoys.json: {line}"):
+        nodes_in(path, 8, 800.0)
+
+
+def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(name: str, line: str) -> None:
+        with pytest.raises(InputError, match=line):
+            nodes_in(tmp_path / name, 8, 800.0)
+
+    refuse("nowhere.csv", "nowhere.csv: cannot be read: No such file")
+    refuse("buoys.xlsx", "buoys.xlsx: is of no known kind; allowed: .csv, .geojson, .json")
+    (tmp_path / "folder.csv").mkdir()
+    refuse("folder.csv", "folder.csv: cannot be read: it is no regular file")
+    os.mkfifo(tmp_path / "pipe.csv")
+    refuse("pipe.csv", "pipe.csv: cannot be read: it is no regular file")
+    (tmp_path / "bytes.csv").write_bytes(b"x,y\n\xff,1\n")
+    refuse("bytes.csv", "bytes.csv: cannot be read: it is no text")
+    (tmp_path / "no.json").write_text("{")
+    refuse("no.json", "no.json: is no JSON")
+    _csv(tmp_path, "x,y\n1,1\n")
+    monkeypatch.setattr(sea, "MAX_BYTES", 7)
+    refuse("buoys.csv", "buoys.csv: is too large; allowed: 7 bytes at most")
