@@ -21,6 +21,7 @@ _HOME = {
     "compare": "stats.paired",
     "compare_learners": "stats.learners",
     "sweep": "sweeps.sweep",
+    "what_if": "sweeps.what_if",
 }
 
 __all__ = [*_HOME]

@@ -37,6 +37,11 @@ class Parameter(NamedTuple):
         return self.name[0].lower() + self.name[1:]
 
     @property
+    def plain(self) -> str:
+        """The name without the symbol of the model, for where no index can be written."""
+        return re.sub(r" C_[SC]$", "", self.name)
+
+    @property
     def label(self) -> str:
         """The name in a figure, with its unit, and indices as TeX has them."""
         return _tex(f"{self.name} [{self.unit}]".removesuffix(" []"))

@@ -5,6 +5,7 @@ space = ScenarioSpace.of(space, quota=200)         # the same with another quota
 scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
 """
 
+from math import inf
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -121,8 +122,7 @@ class _Constants(BaseModel):
     @field_validator("initial_data", mode="before")
     @classmethod
     def _number_to_range(cls, value: Any) -> Any:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        return (value, value) if is_number else _tuples(value)
+        return (value, value) if _is_number(value) else _tuples(value)
 
     @model_validator(mode="after")
     def _fits_the_grid(self) -> Self:
@@ -241,6 +241,29 @@ class ScenarioSpace(_Constants):
         base = scenario.model_dump() if scenario is not None else {}
         return _validated(cls, base | values, "scenario")
 
+    def limits(self, field: str) -> tuple[float, float]:
+        """The least and the largest value that a numeric field may have, infinite without a limit.
+
+        Limits between fields, such as ``charge_start < charge_complete``, are none of these.
+
+        Raises:
+            InputError: If the field does not exist, or holds no numbers.
+        """
+        bounded: dict[str, tuple[float, float]] = {
+            "pads": (1, self.zone_cells),
+            "initial_data": (0, inf),
+            **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
+        }
+        if field in bounded:
+            return bounded[field]
+        if not _is_number(getattr(self, field, None)):
+            numeric = [name for name, value in self if name in bounded or _is_number(value)]
+            raise InputError(f"field: {field!r} is no number; allowed: {', '.join(numeric)}")
+        metadata = ScenarioSpace.model_fields[field].metadata
+        least = [getattr(m, kind) for m in metadata for kind in ("ge", "gt") if hasattr(m, kind)]
+        most = [getattr(m, kind) for m in metadata for kind in ("le", "lt") if hasattr(m, kind)]
+        return max(least, default=-inf), min(most, default=inf)
+
     def scenario_at(self, **parameters: int) -> Scenario:
         """The scenario with the given value for each sampled parameter."""
         return Scenario.of(**(self.model_dump() | parameters))
@@ -314,14 +337,23 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
-def _check_ranges(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
-    """Check the limits of the sampled parameters and the constraints between them (eq. 1)."""
-    limits = {
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _sampled(zone_cells: int) -> dict[str, tuple[int, int, str]]:
+    """The limits of the sampled parameters, and where they come from."""
+    return {
         "uavs": (1, min(zone_cells, 64), "cells of the zone, at most 64"),
         "flying_time": (1, 100, "battery capacity"),
         "charge_start": (10, 100, "eq. 1"),
         "charge_complete": (10, 100, "eq. 1"),
     }
+
+
+def _check_ranges(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
+    """Check the limits of the sampled parameters and the constraints between them (eq. 1)."""
+    limits = _sampled(zone_cells)
     for name, (low, high) in ranges.items():
         least, most, reason = limits[name]
         if not least <= low <= high <= most:

@@ -8,7 +8,6 @@ once. It needs a browser's JavaScript and nothing else; without that, it shows t
 
 import json
 import math
-import re
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -37,19 +36,9 @@ class Slider(NamedTuple):
         return len(self.values) // 2
 
     @property
-    def name(self) -> str:
-        """What the field is called, in full."""
-        return names.parameter(self.field).name
-
-    @property
-    def option(self) -> str:
-        """The name without the symbol of the model, for where an index cannot be written."""
-        return re.sub(r" C_[SC]$", "", self.name)
-
-    @property
-    def unit(self) -> str:
-        """The unit of its values; empty if they have none."""
-        return names.parameter(self.field).unit
+    def parameter(self) -> names.Parameter:
+        """What the field is called, and its unit."""
+        return names.parameter(self.field)
 
     @property
     def texts(self) -> list[str]:
@@ -146,8 +135,8 @@ def _data(grid: Grid) -> dict[str, Any]:
     return {
         "sliders": [
             {
-                "option": slider.option,
-                "unit": slider.unit,
+                "name": slider.parameter.plain,
+                "unit": slider.parameter.unit,
                 "values": slider.texts,
                 "settings": grid.settings(slider.field),
             }

@@ -1,1 +1,1 @@
-"""Sweeps: every combination of values of some fields, asked in one line and kept."""
+"""Questions asked in one line and kept: ``analysis.sweep`` and ``analysis.what_if``."""

@@ -29,21 +29,11 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 # %%
 from IPython.display import display
 
-from analysis import resimulate
-from analysis.figures import what_if as figures
-from analysis.figures.missions import mission_figure
-from analysis.names import METRICS
-from analysis.questions.what_if import answer as what_if_answer
-from analysis.questions.what_if import question as what_if
+from analysis import names, what_if
 from reports.pages import html
 
 # %%
-question = what_if.question(settings, baseline, scenario, policies, missions, seed)
-what_if.check_policy(question, shown or question.policies[0])
-study = what_if.ask(question, results, workers)
-sides = what_if.settings_of(study)
-policy = shown or what_if_answer.best_policy(study, what_if.VARIATION)
-means, answers = what_if_answer.means(study), what_if_answer.answers(study)
+asked = what_if(settings, baseline, scenario, policies, missions, seed, results, workers, shown)
 
 # %% [markdown]
 # ## The question
@@ -55,19 +45,13 @@ means, answers = what_if_answer.means(study), what_if_answer.answers(study)
 # is equal: initial data, arrivals and shadowing.
 
 # %%
-name = study.manifest["study"]["scenario"]
-html.table(what_if.listed(study), f"Scenario {name}, {missions:,} missions of each policy")
+html.table(asked.fields(), f"Scenario {asked.scenario}, {asked.missions:,} missions of each policy")
 
 # %% [markdown]
 # ## The answer
 
 # %%
-html.say(
-    "{conclusions}\n\nThe highest mean: in the baseline {before}; in the variation {after}.",
-    conclusions=what_if_answer.conclusions(answers),
-    before=what_if_answer.best_of_side(study, what_if.BASELINE),
-    after=what_if_answer.best_of_side(study, what_if.VARIATION),
-)
+html.say("{answer}", answer=asked.answer())
 
 # %% [markdown]
 # These are paired differences, each with its 95 % interval; what is inconclusive has 0 in it. A
@@ -77,14 +61,11 @@ html.say(
 # Means of the two sides may have overlapping intervals where their paired difference is clear:
 
 # %%
+caption = f"n = {asked.missions:,} missions per dot, bars are 95 % intervals of the means."
 html.gallery(
     [
-        (
-            figures.means(means, metric, sides),
-            f"{name}, baseline and variation",
-            f"{name}. n = {missions:,} missions per dot, bars are 95 % intervals of the means.",
-        )
-        for metric, name in METRICS.items()
+        (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
+        for metric, name in names.METRICS.items()
     ]
 )
 
@@ -93,15 +74,12 @@ html.gallery(
 # that fails counts 0: pairs of which one failed lie far out.
 
 # %%
-spread = {policy: what_if_answer.differences(study, policy) for policy in study.policies}
-pairs = f"n = {missions:,} pairs per policy"
-caption = (
-    f"{pairs}: {what_if_answer.winners(spread)}. Below: between the quantiles of 5 % and 95 %."
-)
+pairs = f"n = {asked.missions:,} pairs per policy"
+spread = f"{pairs}: {asked.winners()}. Below: between the quantiles of 5 % and 95 %."
 html.gallery(
     [
-        (figures.gains(answers), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
-        (figures.spread(spread), "Distribution of the paired differences", caption),
+        (asked.plot(), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
+        (asked.plot_spread(), "Distribution of the paired differences", spread),
     ]
 )
 
@@ -114,8 +92,8 @@ html.gallery(
 # is filled.
 
 # %%
-for policy in study.policies:
-    display(html.table(what_if_answer.listed(answers, policy), policy))
+for policy in asked.policies:
+    display(html.table(asked.amounts(policy), policy))
 
 # %% [markdown]
 # ### What common random numbers gained
@@ -127,7 +105,7 @@ for policy in study.policies:
 # narrower, and how many of them the pairs are worth.
 
 # %%
-html.table(what_if_answer.pairing(answers), f"Differences of n = {missions:,} pairs")
+html.table(asked.pairing(), f"Differences of n = {asked.missions:,} pairs")
 
 # %% [markdown]
 # ## Two missions to look at
@@ -135,31 +113,17 @@ html.table(what_if_answer.pairing(answers), f"Differences of n = {missions:,} pa
 # They are of the best policy in the variation, unless the parameter `shown` names another. Each is
 # one example (n = 1), simulated in the same realisation of the baseline and of the variation.
 
-
-# %%
-def pictured(point: int, replication: int) -> tuple:
-    """A mission of the policy, simulated again: its drawing, alternative text and caption."""
-    mission = resimulate(study, policy, point, replication)
-    caption = what_if_answer.outcome(study, policy, point, replication)
-    drawing = mission_figure(mission.events, mission.scenario)
-    return drawing, "Map of the mission; battery, residual data and charging", caption
-
-
-def show(replication: int) -> None:
-    """A replication in the baseline and in the variation."""
-    effect = what_if_answer.effect(study, policy, replication)
-    commands = html.commands(what_if_answer.commands(study, policy, replication))
-    drawings = [pictured(point, replication) for point in (what_if.BASELINE, what_if.VARIATION)]
-    display(html.say(effect), html.say("{lines}", lines=commands), html.gallery(drawings))
-
-
 # %% [markdown]
 # ### A typical one
 #
 # Of all differences in collection ratio and communication, that of this replication is the median.
 
 # %%
-show(what_if_answer.typical(study, policy))
+typical = asked.typical()
+html.say("{effect}\n\n{lines}", effect=typical.effect(), lines=html.commands(typical.commands()))
+
+# %%
+html.gallery(typical.drawings())
 
 # %% [markdown]
 # ### A bad one
@@ -168,7 +132,11 @@ show(what_if_answer.typical(study, policy))
 # those alike by collection ratio.
 
 # %%
-show(what_if_answer.worst(study, policy))
+worst = asked.worst()
+html.say("{effect}\n\n{lines}", effect=worst.effect(), lines=html.commands(worst.commands()))
+
+# %%
+html.gallery(worst.drawings())
 
 # %% [markdown]
 # **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
@@ -190,11 +158,22 @@ show(what_if_answer.worst(study, policy))
 # visits every combination.
 
 # %%
-command = html.commands([what_if.command(study)])
-html.say("{command}\n\n```toml\n{study}```", command=command, study=what_if.as_toml(study))
+command = html.commands([asked.command()])
+html.say("{command}\n\n```toml\n{study}```", command=command, study=asked.as_toml())
 
 # %% [markdown]
 # ## Where the figures come from
 
 # %%
-html.provenance([study])
+html.provenance([asked.results])
+
+# %% [markdown] tags=["jupyter"]
+# ## Sliders
+#
+# Move the sliders, choose policies, and press *Simulate*. A side that stays where the scenario has
+# it is not set; a range is drawn from, mission by mission.
+
+# %% tags=["jupyter"]
+from reports.widgets import what_if_panel
+
+what_if_panel(scenario, policies, settings, baseline, results, missions, seed)

@@ -58,7 +58,7 @@ function axes(slider, position) {
         ...slider.values.map((value, n) =>
             drawn("text", {x: `${(n + 0.5) * width}%`, y: "100%", dy: "1.5em", "text-anchor": "middle"}, value)),
         drawn("text", {x: "50%", y: "100%", dy: "3em", "text-anchor": "middle"},
-            slider.unit ? `${slider.option} [${slider.unit}]` : slider.option),
+            slider.unit ? `${slider.name} [${slider.unit}]` : slider.name),
     ];
 }
 
@@ -86,7 +86,7 @@ function drawCurve(positions, policies) {
         ...policies.flatMap((policy, n) => means(positions, along, policy, shift(n), metric)),
     );
     const name = root.querySelector("[name=metric]").selectedOptions[0].text;
-    curve.setAttribute("aria-label", `${name} along ${sliders[along].option}, a line per policy`);
+    curve.setAttribute("aria-label", `${name} along ${sliders[along].name}, a line per policy`);
 }
 
 function options(positions) {

@@ -6,7 +6,7 @@ variation does not set them (common random numbers):
 
     results = ask(question({"uavs": 5}, baseline={"quota": 300}), "results")
 
-``questions.what_if_answer`` has the answer.
+``questions.what_if.answer`` has the answer, and ``analysis.what_if`` does both.
 """
 
 import json
@@ -20,9 +20,11 @@ import tomli_w
 from pydantic import ValidationError
 
 from analysis import numbers
+from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
+from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess import InputError, simulate_batch
@@ -105,13 +107,16 @@ def check_policy(study: Study, policy: str) -> None:
         raise InputError(f"shown: {policy!r} is not asked about; allowed: {allowed}")
 
 
-def ask(study: Study, folder: str | Path, workers: int = 1) -> Results:
-    """Run a question, as far as it has not been, into ``FOLDER/what-if/KEY``.
+def ask(
+    study: Study, folder: str | Path, workers: int = 1, progress: Progress | None = None
+) -> Results:
+    """Run a question into ``FOLDER/what-if/KEY``, as far as no question there has its missions.
 
     Args:
         study: As of ``question``.
         folder: Where results folders are kept.
         workers: Processes. Two or more take seconds to start, and pay for long runs only.
+        progress: As of ``run_study``.
 
     Raises:
         InputError: If a policy cannot act in the scenario, before anything is written; if the
@@ -121,7 +126,9 @@ def ask(study: Study, folder: str | Path, workers: int = 1) -> Results:
     for policy in study.policies:
         for point in study.points:
             simulate_batch(point.scenario, load_team(policy), study.seed, 1)
-    return run_study(study, Path(folder) / NAME / key_of(study), workers)
+    out = Path(folder) / NAME / key_of(study)
+    others = sorted(p.parent for p in out.parent.glob(f"*/{MANIFEST}") if p.parent != out)
+    return run_study(study, out, workers, progress=progress, reuse=others)
 
 
 def fields(results: Results, names: Iterable[str]) -> pd.DataFrame:

@@ -1,0 +1,193 @@
+"""``analysis.what_if``: ask what a variation of a scenario changes, in one line.
+
+asked = what_if({"uavs": 5}, baseline={"uavs": 3})
+asked.answer()             # in words, with intervals
+asked.table()              # the same as a tidy table
+asked.plot()               # as a figure
+asked.typical().drawings()  # a mission in the baseline and in the variation
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.execution.jobs import Progress
+from analysis.figures import what_if as figures
+from analysis.figures.missions import mission_figure
+from analysis.names import PRODUCT
+from analysis.questions.what_if import answer, question
+from analysis.questions.what_if.question import BASELINE, VARIATION
+from analysis.results.resimulate import resimulate
+from analysis.results.tables import Results
+
+
+@dataclass(frozen=True)
+class Example:
+    """A replication of a policy in the baseline and in the variation.
+
+    Attributes:
+        results: Of the question.
+        policy: The policy.
+        replication: The replication.
+    """
+
+    results: Results
+    policy: str
+    replication: int
+
+    def effect(self) -> str:
+        """By how much the variation changes the mission, in a sentence of Markdown."""
+        return answer.effect(self.results, self.policy, self.replication)
+
+    def commands(self) -> list[str]:
+        """The commands that simulate both missions again."""
+        return answer.commands(self.results, self.policy, self.replication)
+
+    def drawings(self) -> list[tuple[Figure, str, str]]:
+        """The two missions, simulated again: a figure, its alternative text and its caption."""
+        return [self._drawing(point) for point in (BASELINE, VARIATION)]
+
+    def _drawing(self, point: int) -> tuple[Figure, str, str]:
+        mission = resimulate(self.results, self.policy, point, self.replication)
+        figure = mission_figure(mission.events, mission.scenario)
+        caption = answer.outcome(self.results, self.policy, point, self.replication)
+        return figure, "Map of the mission; battery, residual data and charging", caption
+
+
+@dataclass(frozen=True, eq=False)
+class WhatIf:
+    """A question that was asked, and its answer.
+
+    Attributes:
+        results: The missions, ``results.missions``, as a tidy table, and all else of the folder.
+        shown: The policy of ``typical`` and ``worst``.
+    """
+
+    results: Results
+    shown: str
+
+    @property
+    def policies(self) -> list[str]:
+        """The policies, each of which is compared with itself."""
+        return self.results.policies
+
+    @property
+    def missions(self) -> int:
+        """The number of missions of every policy, in the baseline and in the variation."""
+        return self.results.manifest["study"]["missions"]
+
+    @property
+    def scenario(self) -> str:
+        """The name of the scenario, or of its file."""
+        return self.results.manifest["study"]["scenario"]
+
+    def fields(self) -> pd.DataFrame:
+        """The fields that the variation changes, that both sides set and that missions draw."""
+        return question.listed(self.results)
+
+    def answer(self) -> str:
+        """Paired differences in collection ratio and communication, and the best, in Markdown."""
+        before, after = (answer.best_of_side(self.results, p) for p in (BASELINE, VARIATION))
+        return (
+            f"{answer.conclusions(self.table())}\n\n"
+            f"The highest mean: in the baseline {before}; in the variation {after}."
+        )
+
+    def _repr_markdown_(self) -> str:
+        return self.answer()
+
+    def table(self) -> pd.DataFrame:
+        """The paired differences: a row per policy and metric, as of ``answer.answers``."""
+        return answer.answers(self.results)
+
+    def amounts(self, policy: str) -> pd.DataFrame:
+        """Means of both sides and their differences for a policy, as a table to print."""
+        return answer.listed(self.table(), policy)
+
+    def pairing(self) -> pd.DataFrame:
+        """What common random numbers gained, as a table to print."""
+        return answer.pairing(self.table())
+
+    def plot(self) -> Figure:
+        """The paired differences of the metrics, with intervals."""
+        return figures.gains(self.table())
+
+    def plot_means(self, metric: str = PRODUCT) -> Figure:
+        """A metric of every policy in the baseline and in the variation, with intervals.
+
+        Args:
+            metric: One of the paper's metrics.
+        """
+        sides = question.settings_of(self.results)
+        return figures.means(answer.means(self.results), metric, sides)
+
+    def plot_spread(self) -> Figure:
+        """The distribution of the paired differences in collection ratio and communication."""
+        return figures.spread(self._differences())
+
+    def winners(self) -> str:
+        """In what shares of the missions the variation is ahead, or behind, in words."""
+        return answer.winners(self._differences())
+
+    def typical(self) -> Example:
+        """The replication whose difference is the median."""
+        replication = answer.typical(self.results, self.shown)
+        return Example(self.results, self.shown, replication)
+
+    def worst(self) -> Example:
+        """The replication that has the worst mission of the variation."""
+        return Example(self.results, self.shown, answer.worst(self.results, self.shown))
+
+    def command(self) -> str:
+        """The command that makes the page of the question."""
+        return question.command(self.results)
+
+    def as_toml(self) -> str:
+        """The question as the file of a study, to add rows to."""
+        return question.as_toml(self.results)
+
+    def _differences(self) -> dict[str, pd.Series]:
+        return {policy: answer.differences(self.results, policy) for policy in self.policies}
+
+
+def what_if(
+    settings: Mapping[str, Any],
+    baseline: Mapping[str, Any] | None = None,
+    scenario: str | Path = "paper",
+    policies: Sequence[str] = ("ddqn", "greedy"),
+    missions: int = 500,
+    seed: int = 0,
+    folder: str | Path = "results",
+    workers: int = 1,
+    shown: str | None = None,
+    progress: Progress | None = None,
+) -> WhatIf:
+    """Simulate a baseline and a variation of it in the same realisations, and compare them.
+
+    The missions are kept in ``FOLDER/what-if``. Asked again, it answers at once; with more missions
+    it simulates only those that are missing.
+
+    Args:
+        settings: Fields of the scenario that the variation sets.
+        baseline: Fields of the scenario that are set in both, where ``settings`` does not.
+        scenario: A shipped scenario, or a TOML file.
+        policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``.
+        missions: Number of missions of each, at least 2.
+        seed: Of the missions.
+        folder: Where results are kept.
+        workers: Processes. Two or more take seconds to start, and pay for long runs only.
+        shown: The policy of ``typical`` and ``worst``; without one, the best in the variation.
+        progress: Called with the number of missions done since its last call.
+
+    Raises:
+        InputError: If a field, a value or a policy is unknown or not allowed, or a policy cannot
+            act in the scenario: before anything is written.
+    """
+    study = question.question(settings, baseline, scenario, policies, missions, seed)
+    question.check_policy(study, shown or study.policies[0])
+    results = question.ask(study, folder, workers, progress)
+    return WhatIf(results, shown or answer.best_policy(results, VARIATION))

@@ -1,0 +1,209 @@
+"""Sliders for Jupyter: a what-if question is set, simulated and answered in a panel.
+
+what_if_panel("paper", ["ddqn", "greedy"], settings={"uavs": 5}, baseline={"uavs": 3})
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import ipywidgets as widgets
+from nbconvert.filters import markdown2html
+
+import policies as registry
+from analysis import names
+from analysis.execution.runner import ChunkError
+from analysis.questions.what_if.question import SIDES
+from analysis.sweeps.what_if import WhatIf, what_if
+from dess import InputError, ScenarioSpace, load_scenario
+from reports.pages import html
+
+# Fields that have sliders, unless others are asked for.
+FIELDS = (
+    *("uavs", "pads", "flying_time", "charge_start", "charge_complete"),
+    *("initial_data", "arrival_rate", "quota"),
+)
+STEPS = 100  # of a slider of numbers that are not whole, at least
+
+Fields = Mapping[str, Any]
+
+
+class WhatIfPanel(widgets.VBox):
+    """A panel that asks a what-if question and shows the answer.
+
+    Attributes:
+        baseline: Field -> its slider in the baseline; one of a range has two handles.
+        variation: The same of the variation; one that stands like that of the baseline follows it.
+        policies: Policy -> its checkbox.
+        missions: The number of missions of each policy, in the baseline and in the variation.
+        button: Simulates.
+        progress: How many of the missions are done.
+        output: The answer, or why there is none, as HTML.
+    """
+
+    def __init__(
+        self,
+        sides: tuple[ScenarioSpace, ScenarioSpace],
+        fields: Sequence[str],
+        chosen: Sequence[str],
+        missions: int,
+        ask: Callable[..., WhatIf],
+    ):
+        """Make the widgets.
+
+        Args:
+            sides: The scenario of the baseline and of the variation.
+            fields: The fields that have sliders.
+            chosen: The policies that are chosen at first.
+            missions: The number of missions at first.
+            ask: As ``analysis.what_if``, with values of fields and keywords.
+        """
+        self._ask = ask
+        self.baseline, self.variation = (
+            {field: _slider(sides, side, field) for field in fields} for side in (0, 1)
+        )
+        for field, slider in self.baseline.items():
+            slider.observe(_following(self.variation[field]), "value")
+        teams = dict.fromkeys([*chosen, *registry.names()])
+        self.policies = {team: _checkbox(team, team in chosen) for team in teams}
+        self.missions = widgets.BoundedIntText(missions, min=2, max=100_000, description="Missions")
+        self.button = widgets.Button(description="Simulate", button_style="primary", icon="play")
+        self.button.on_click(lambda _: self.simulate())
+        self.progress = widgets.IntProgress(layout={"visibility": "hidden"})
+        self.output = widgets.HTML()
+        run = widgets.HBox([self.missions, self.button, self.progress])
+        chooser = widgets.HBox([*self.policies.values()], layout={"flex_flow": "row wrap"})
+        super().__init__([self._table(), chooser, run, self.output])
+
+    def simulate(self) -> None:
+        """Ask what the sliders say, and show the answer."""
+        teams = [team for team, box in self.policies.items() if box.value]
+        self.button.disabled, self.output.value = True, ""
+        self.progress.value, self.progress.max = 0, 2 * len(teams) * self.missions.value
+        self.progress.layout.visibility = "visible"
+        try:
+            before, after = (
+                {field: _plain(slider.value) for field, slider in side.items()}
+                for side in (self.baseline, self.variation)
+            )
+            missions = self.missions.value
+            asked = self._ask(before, after, teams, missions, self._count)
+            self.output.value = _answer(asked)
+        except (InputError, ChunkError) as error:
+            self.output.value = f'<p role="alert">{escape(str(error))}</p>'
+        finally:
+            self.progress.layout.visibility = "hidden"
+            self.button.disabled = False
+
+    def _count(self, missions: int) -> None:
+        self.progress.value += missions
+
+    def _table(self) -> widgets.GridBox:
+        """The sliders, a row per field and a column per side."""
+        cells = [widgets.HTML(f"<b>{text}</b>") for text in ("", *map(str.capitalize, SIDES))]
+        for field, slider in self.baseline.items():
+            name = names.parameter(field)
+            label = f"{name.plain} [{name.unit}]".removesuffix(" []")
+            cells += [widgets.Label(label), slider, self.variation[field]]
+        columns = "minmax(8rem, 18rem) repeat(2, minmax(12rem, 22rem))"
+        return widgets.GridBox(cells, layout={"grid_template_columns": columns})
+
+
+def what_if_panel(
+    scenario: str | Path = "paper",
+    policies: Sequence[str] = ("ddqn", "greedy"),
+    settings: Fields | None = None,
+    baseline: Fields | None = None,
+    folder: str | Path = "results",
+    missions: int = 500,
+    seed: int = 0,
+    fields: Sequence[str] = FIELDS,
+) -> WhatIfPanel:
+    """A panel with sliders for fields of a scenario, in a baseline and in a variation of it.
+
+    What stands where the scenario has it is not set. The missions are kept, as of
+    ``analysis.what_if``.
+
+    Args:
+        scenario: A shipped scenario, or a TOML file.
+        policies: Those that are chosen at first.
+        settings: Fields that the variation sets, where its sliders stand at first. A field without
+            a slider stays so.
+        baseline: The same of the baseline, and of the variation where ``settings`` has no other.
+        folder: Where results are kept.
+        missions: The number of missions at first.
+        seed: Of the missions.
+        fields: The fields that have sliders; each holds a number, or a range of numbers.
+
+    Raises:
+        InputError: If the scenario, a field or a value is not allowed.
+    """
+    fixed, changed = dict(baseline or {}), dict(settings or {})
+    scenario_itself = load_scenario(scenario)
+    sides = (load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed))
+
+    def ask(before: Fields, after: Fields, teams: Sequence[str], number: int, count: Any) -> WhatIf:
+        others = [{f: v for f, v in of.items() if f not in fields} for of in (fixed, changed)]
+        moved = {f: v for f, v in before.items() if v != _plain(_value(scenario_itself, f))}
+        varied = {field: value for field, value in after.items() if value != before[field]}
+        return what_if(
+            {**others[1], **varied}, {**others[0], **moved}, scenario, teams, number, seed, folder,
+            progress=count,
+        )  # fmt: skip
+
+    return WhatIfPanel(sides, fields, policies, missions, ask)
+
+
+def _slider(sides: Sequence[ScenarioSpace], side: int, field: str) -> widgets.Widget:
+    """A slider that stands where a side has a field, as long as that of the other side."""
+    least, most = sides[side].limits(field)
+    ends = [end for space in sides for end in _ends(_value(space, field))]
+    reach = 2 * max(map(abs, ends)) or 1
+    low, high, value = max(least, -reach), min(most, reach), _value(sides[side], field)
+    options = {"value": value, "min": low, "max": high, "continuous_update": False}
+    is_range = isinstance(value, tuple)
+    if all(isinstance(end, int) for end in ends):
+        slider = (widgets.IntRangeSlider if is_range else widgets.IntSlider)(**options)
+    else:
+        digits = max(-math.floor(math.log10((high - low) / STEPS)), 0)
+        options |= {"step": 10.0**-digits, "readout_format": f".{digits}f"}
+        slider = (widgets.FloatRangeSlider if is_range else widgets.FloatSlider)(**options)
+    slider.layout.width = "auto"
+    return slider.add_class(f"dess-{SIDES[side]}-{field}")
+
+
+def _checkbox(team: str, chosen: bool) -> widgets.Checkbox:
+    return widgets.Checkbox(chosen, description=team, indent=False, layout={"width": "9rem"})
+
+
+def _following(slider: widgets.Widget) -> Callable[[Any], None]:
+    """Moves a slider along with another one, as long as both stand alike."""
+
+    def follow(change: Any) -> None:
+        if slider.value == change.old:
+            slider.value = change.new
+
+    return follow
+
+
+def _value(space: ScenarioSpace, field: str) -> Any:
+    """The value of a field; the number of pads where it follows from the zone."""
+    return space.charging_pads if field == "pads" else getattr(space, field)
+
+
+def _ends(value: Any) -> Iterator[float]:
+    yield from value if isinstance(value, tuple) else (value,)
+
+
+def _plain(value: Any) -> Any:
+    """The value of a slider as a scenario has it: a number, or ``[low, high]``."""
+    ends = [round(end, 10) for end in _ends(value)]
+    return ends[0] if len({*ends}) == 1 else ends
+
+
+def _answer(asked: WhatIf) -> str:
+    caption = f"n = {asked.missions:,} pairs per policy, 95 % intervals."
+    figure = html.figure(asked.plot(), "Paired differences of the metrics", caption)
+    return f'<div style="max-width: 44rem">{markdown2html(asked.answer())}{figure.data}</div>'
