@@ -8,15 +8,15 @@ conditions. Every setting is a candidate of a question, with a design point for 
 Missions come in rounds that grow by a quarter. After each,
  1. the requirements of every point are tested as of ``feasibility``: a candidate is feasible once
     all requirements of its points are met, infeasible once one is missed;
- 2. costs are compared in pairs on common replications. Of candidates i and l the true difference of
-    the costs is at most, after the first n missions of both in the j-th look,
+ 2. the feasible candidate i of the least mean cost, the leader of its question, is compared with
+    every other candidate l on common replications. It costs at most
         D_il + t(n - 1, 1 - e) sqrt(S2_il / n) + L_i ln(1 / e) / n,    e = alpha / (2 P j (j + 1))
-    with the mean D_il and the variance S2_il of the differences of missions, Student's quantile t,
-    P ordered pairs over all questions, and L_i the price of all UAVs of i, as one mission may lose
-    them: lost UAVs are so rare that a sample may have none. A candidate is dearer, and out, if that
-    is below 0 for a feasible rival against it;
- 3. a question is settled if no candidate is left, or the feasible one of the least mean cost costs
-    at most the indifference more than any that is left by the bound above, decided or not.
+    more, after n missions and j looks: D_il is the mean and S2_il the variance of the differences,
+    t Student's quantile, P the number of ordered pairs over all questions, and L_i the price of all
+    UAVs of i, as one mission may lose them: losses may be so rare that a sample has none. If that
+    is below 0, l is dearer, and out;
+ 3. a question is settled if no candidate is left, or the leader costs at most the indifference more
+    than any that is left, decided or not.
 A design point gets missions as long as a question needs it, so what is clearly too expensive is not
 decided to the end.
 
@@ -30,20 +30,19 @@ procedures for comparing constrained systems via simulation, Nav. Res. Logist. 5
 whose tests assume normal values and fail where missions seldom fail.
 """
 
-import json
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import stdtrit
 
-from analysis.names import DECISIONS
+from analysis.study.candidates import Answer, questions_about
 from analysis.study.costs import Costs
 from analysis.study.feasibility import MeanTest, Verdict
-from analysis.study.selection import Selection, variances_of_differences
+from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
 
@@ -65,24 +64,6 @@ class Setting(NamedTuple):
     def of(cls, values: Mapping[str, Any], space: ScenarioSpace, costs: Costs) -> Self:
         """The setting of a design point."""
         return cls(values, costs.missions * costs.lost_uav * space.uavs[1])
-
-
-@dataclass(frozen=True)
-class Answer:
-    """The cheapest setting under a condition, or under all of them.
-
-    Attributes:
-        condition: The fields of the condition with their values; None: of all conditions.
-        points: Design points of the selected setting, one, or one for each condition; none, if no
-            setting is known to meet the requirements.
-        left: The points of the settings that may be as good.
-        settled: Whether that is promised: it is not if the missions or the budget ended before.
-    """
-
-    condition: dict[str, Any] | None
-    points: tuple[int, ...]
-    left: tuple[tuple[int, ...], ...]
-    settled: bool
 
 
 @dataclass(frozen=True)
@@ -220,71 +201,6 @@ AnySelection = Annotated[
 ]
 
 
-def grouped(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, list[int]]:
-    """Design points that are alike in what operators decide on, or in all other fields.
-
-    Args:
-        values: The fields that the design sets, by design point.
-        decisions: Whether the points of a group share the decisions, or the conditions.
-
-    Returns:
-        The shared fields as JSON text -> numbers of the points, in the order of the design.
-    """
-    groups = defaultdict(list)
-    for number, fields in enumerate(values):
-        shared = {field: fields[field] for field in fields if (field in DECISIONS) == decisions}
-        groups[json.dumps(shared, sort_keys=True)].append(number)
-    return dict(groups)
-
-
-class _Question:
-    """The cheapest of some candidates.
-
-    Attributes:
-        answer: As far as it is known.
-    """
-
-    def __init__(self, condition: dict[str, Any] | None, candidates: Sequence[Sequence[int]]):
-        self._condition = condition
-        self.candidates = np.array(candidates, int).reshape(len(candidates), -1)
-        self.settled = not candidates
-        self._best: int | None = None
-
-    @property
-    def pairs(self) -> int:
-        """How many ordered pairs of candidates there are."""
-        return len(self.candidates) * (len(self.candidates) - 1)
-
-    @property
-    def needed(self) -> set[int]:
-        """The points that need missions to settle it."""
-        return set() if self.settled else set(self.candidates.ravel().tolist())
-
-    @property
-    def answer(self) -> Answer:
-        """What is known."""
-        left = [tuple(points) for points in self.candidates.tolist()]
-        best = () if self._best is None else left[self._best]
-        return Answer(self._condition, best, tuple(left), self.settled)
-
-    def look(self, search: "_Search", error: float) -> None:
-        """Rule out what is infeasible or dearer, and see whether the question is settled."""
-        verdicts = np.array(search.verdicts)[self.candidates]
-        possible = ~(verdicts == "missed").any(axis=1)
-        self.candidates, feasible = self.candidates[possible], (verdicts == "met").all(axis=1)
-        feasible, self._best = feasible[possible], None
-        if not feasible.any():
-            self.settled = not len(self.candidates)
-            return
-        means, widths = search.costs(self.candidates, error)
-        most = means[:, None] - means + widths  # that the first costs more than the second
-        left = ~(most[feasible] < 0).any(axis=0)
-        self.candidates, feasible = self.candidates[left], feasible[left]
-        means, most = means[left], most[np.ix_(left, left)]
-        self._best = int(np.argmin(np.where(feasible, means, np.inf)))
-        self.settled = bool((most[self._best] <= search.rule.indifference).all())
-
-
 class _Search:
     """The procedure, played as far as the values reach.
 
@@ -305,7 +221,7 @@ class _Search:
         self.rule, self.samples, self.settings = rule, samples, settings
         self.counts = np.full(len(samples), rule.first)
         self.verdicts: list[Verdict] = ["open"] * len(samples)
-        self.questions = _questions([setting.values for setting in settings])
+        self.questions = questions_about([setting.values for setting in settings])
         self.rounds, self.done = 1, False
         self._error = (1 - rule.confidence) / 2
         each = self._error / (len(samples) * len(rule.requirements))
@@ -317,19 +233,24 @@ class _Search:
         self._seen = 0  # missions of the points that are needed
         self._play()
 
-    def costs(self, candidates: np.ndarray, error: float) -> tuple[np.ndarray, np.ndarray]:
-        """(s,) mean costs of candidates, and (s, s) by how much i - l may exceed its estimate."""
+    def _leader(
+        self, error: float, candidates: np.ndarray, feasible: np.ndarray
+    ) -> tuple[int, np.ndarray]:
+        """The feasible candidate of the least mean cost, and what it may cost more than others."""
         n = self._seen
-        values = [
-            np.mean([np.asarray(self.samples[p]["cost"][:n], float) for p in points], axis=0)
-            for points in candidates
-        ]
-        losses = [np.mean([self.settings[p].loss for p in points]) for points in candidates]
-        variances = variances_of_differences(np.array(values))
-        widths = float(stdtrit(n - 1, 1 - error)) * np.sqrt(variances / n)
-        widths += np.array(losses)[:, None] * -np.log(error) / n
-        np.fill_diagonal(widths, 0.0)
-        return np.array([row.mean() for row in values]), widths
+        costs = np.array(
+            [
+                np.mean([np.asarray(self.samples[p]["cost"][:n], float) for p in points], axis=0)
+                for points in candidates
+            ]
+        )
+        leader = int(np.argmin(np.where(feasible, costs.mean(axis=1), np.inf)))
+        excess = costs[leader] - costs
+        loss = np.mean([self.settings[p].loss for p in candidates[leader]])
+        widths = float(stdtrit(n - 1, 1 - error)) * excess.std(axis=1, ddof=1) / np.sqrt(n)
+        widths -= loss * np.log(error) / n
+        widths[leader] = 0.0
+        return leader, excess.mean(axis=1) + widths
 
     def _play(self) -> None:
         needed = [*range(len(self.samples))]
@@ -337,9 +258,10 @@ class _Search:
             stage = int(self.counts.max())
             self._test(needed, stage)
             error = self._error / (self._pairs * self.rounds * (self.rounds + 1))
+            costs = partial(self._leader, error)
             for question in self.questions:
                 if not question.settled:
-                    question.look(self, error)
+                    question.look(self.verdicts, costs, self.rule.indifference)
             needed = sorted(set().union(*(question.needed for question in self.questions)))
             room = self.rule.budget - int(self.counts.sum())
             step = min(max(stage // 4, 1), room // len(needed)) if needed else 0
@@ -366,20 +288,6 @@ def _verdict(tests: Sequence[MeanTest]) -> Verdict:
     if "missed" in verdicts:
         return "missed"
     return "open" if "open" in verdicts else "met"
-
-
-def _questions(values: Sequence[Mapping[str, Any]]) -> list[_Question]:
-    """A question for each condition, and one for all of them, if there are several."""
-    conditions = grouped(values, decisions=False)
-    questions = [
-        _Question(json.loads(text), [[point] for point in points])
-        for text, points in conditions.items()
-    ]
-    if len(conditions) > 1:
-        everywhere = grouped(values, decisions=True).values()
-        fleets = [points for points in everywhere if len(points) == len(conditions)]
-        questions.append(_Question(None, fleets))
-    return questions
 
 
 def _in_words(requirements: Mapping[Share, float], shift: float) -> str:

@@ -179,7 +179,7 @@ def _grown(count: int) -> int:
     return count + max(count // 2, 1)
 
 
-def variances_of_differences(values: np.ndarray) -> np.ndarray:
+def _variances_of_differences(values: np.ndarray) -> np.ndarray:
     """(s, s) sample variances of the differences between the rows of (s, n) values."""
     centred = values - values.mean(axis=1, keepdims=True)
     # Not a matrix product: its last bits would depend on the number of threads.
@@ -261,7 +261,7 @@ class _Race:
             return
         odds = (points - 1) / (1 - self.rule.confidence)
         h2 = ((odds / 2) ** (2 / (first - 1)) - 1) * (first - 1)
-        self.reach = h2 * variances_of_differences(self._missions(0, stage)) / delta**2
+        self.reach = h2 * _variances_of_differences(self._missions(0, stage)) / delta**2
         if self.is_bounded:
             self.reach += 4 * np.log(odds) / (3 * delta)
 
