@@ -16,8 +16,8 @@ import numpy as np
 from analysis.names import DECISIONS
 from analysis.study.feasibility import Verdict
 
-# (s, g) design points of candidates, (s,) whether they are feasible -> the feasible candidate of the
-# least mean cost, and (s,) by how much it may cost more than each candidate: 0 for itself.
+# (s, g) design points of candidates, (s,) whether they are feasible -> the feasible candidate of
+# the least mean cost, and (s,) by how much it may cost more than each candidate: 0 for itself.
 Costing = Callable[[np.ndarray, np.ndarray], tuple[int, np.ndarray]]
 
 
