@@ -40,7 +40,8 @@ def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
 
 def minus(number: str) -> str:
     """A number with a proper minus, and none on zero."""
-    return number.replace("-", "−") if float(number) else number.replace("-", "")
+    is_zero = not float(number.replace(",", ""))
+    return number.replace("-", "") if is_zero else number.replace("-", "−")
 
 
 def margin(share: float) -> str:
@@ -56,6 +57,11 @@ def level(share: float) -> str:
 def p_value(p: float) -> str:
     """A p-value, as ``0.094``, or ``< 0.001``."""
     return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def money(amount: float, currency: str) -> str:
+    """An amount as ``69,000 EUR``; with two decimals below 100."""
+    return f"{minus(f'{amount:,.0f}' if abs(amount) >= 100 else f'{amount:.2f}')} {currency}"
 
 
 def seconds(time: float) -> str:

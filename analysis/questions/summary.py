@@ -15,6 +15,7 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES
+from analysis.questions import costs
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.chunks import parts_of
 from analysis.results.tables import Results
@@ -23,6 +24,7 @@ from analysis.stats.distribution import distribution
 from analysis.stats.intervals import groups, summary
 from analysis.stats.learners import compare_learners
 from analysis.stats.paired import compare
+from analysis.study.cheapest import Cheapest
 from analysis.study.design import Saltelli
 from analysis.study.stopping import Precision
 
@@ -210,8 +212,11 @@ def selections(results: Results) -> pd.DataFrame:
     Returns:
         A row per policy: ``policy``, ``point``, ``setting`` in words, ``missions`` that it took,
         ``left`` (points not ruled out), ``guaranteed``, ``guarantee`` in words. Empty if the study
-        selects nothing.
+        selects nothing. A study that selects the cheapest setting has the rows of
+        ``costs.selections``.
     """
+    if isinstance(results.store.manifest.selection, Cheapest):
+        return costs.selections(results)
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
     words = settings(results)
     choices = [(policy, results.choice(policy)) for policy in results.policies]

@@ -302,8 +302,12 @@ class Manifest(Origin):
     def settings(self) -> list[Setting]:
         """The design points, as a search of the cheapest one takes them; of a study with prices."""
         assert self.costs is not None
-        pairs = zip(self.points, self.scenarios, strict=True)
-        return [Setting.of(point.values, space, self.costs) for point, space in pairs]
+        fields = dict.fromkeys(field for point in self.points for field in point.values)
+        rows = [{**self.scenario, **point.values} for point in self.points]
+        return [
+            Setting.of({field: row[field] for field in fields}, space, self.costs)
+            for row, space in zip(rows, self.scenarios, strict=True)
+        ]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:

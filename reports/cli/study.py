@@ -81,7 +81,9 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show the results of a study: means, comparisons, selections, the worst missions."""
-    from analysis.questions import summary
+    import pandas as pd
+
+    from analysis.questions import costs, summary
     from analysis.results.tables import load_results
     from reports.cli import study_tables
 
@@ -97,6 +99,7 @@ def show(
         "comparisons": summary.comparisons(results),
         "learned_against_heuristic": summary.learned_against_heuristic(results),
         "sensitivities": summary.sensitivities(results),
+        "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
         "selected": summary.selections(results),
         "checks": summary.checks(results),
         "worst": summary.worst(results, policy, worst),

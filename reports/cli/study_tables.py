@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.execution.dry_run import Plan
-from analysis.names import PRODUCT, SHORT_METRICS
+from analysis.names import COST, PRODUCT, SHORT_METRICS, SUCCESS
 from analysis.questions import summary
 from analysis.questions.summary import settings
 from analysis.replication import paper
@@ -45,9 +45,16 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         print(f" accepted: {change.text}")
     printed = paper.PRINTED.get(study["name"], {})
     if study["selection"]:
-        _print_selections(summary.selections(results))
+        selected = summary.selections(results)
+        _print_selections(selected)
         if checks := study["selection"]["check"]:
-            _print_means(summary.checks(results), f"{checks} further missions", printed)
+            means = summary.checks(results)
+            if "condition" in selected:
+                words = [
+                    f"{row.policy} {settings(results)[row.point]}" for row in means.itertuples()
+                ]
+                means = means.assign(policy=words)
+            _print_means(means, f"{checks} further missions", printed)
     elif len(settings(results)) == 1:
         _print_means(summary.means(results), "mean, 95 % interval", printed)
     elif short:
@@ -59,6 +66,7 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
     points = settings(results)
     printers = {
         "sensitivities": _print_sensitivities,
+        "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
         "means": lambda means: _print_by_point(points, means, [*SHORT_METRICS]),
         "distributions": _print_distributions,
         "precisions": lambda precisions: _print_precisions(points, precisions),
@@ -79,11 +87,28 @@ def print_frame(title: str, cells: pd.DataFrame) -> None:
 
 def _print_selections(selected: pd.DataFrame) -> None:
     """The selected point of every policy, and the guarantee of the procedure."""
-    cells = selected.set_index("policy")[["setting", "missions", "left"]]
+    heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
+    cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
     cells["missions"] = cells["missions"].map("{:,}".format)
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         print(f" {guarantee}")
+
+
+def _print_costs(table: pd.DataFrame, currency: str) -> None:
+    """The settings, the cheapest first, with success, and the probability to be on the front."""
+    if len(table) > MANY_POINTS:
+        print(f"the costs of {len(table)} settings are too many to list; --json has them")
+        return
+    cells = table[["condition", "policy"]].set_index(table["fleet"])
+    ends = table[[COST, f"{COST}_low", f"{COST}_high"]].to_numpy(float)
+    cells[f"cost [{currency}]"] = [f"{m:,.0f} [{low:,.0f}, {high:,.0f}]" for m, low, high in ends]
+    shares = table[[SUCCESS, f"{SUCCESS}_low", f"{SUCCESS}_high"]].to_numpy(float)
+    cells["success"] = [numbers.interval(*share) for share in shares]
+    cells["on the front"] = [numbers.percent(share) for share in table["probability"]]
+    if not any(cells["condition"]):
+        cells = cells.drop(columns="condition")
+    print_frame("cost against success", cells)
 
 
 def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
