@@ -38,6 +38,17 @@ def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
     return f"{middle} [{ends[0]}, {ends[1]}]"
 
 
+def quantity(value: float) -> str:
+    """A number with about four digits, as ``1,042`` or ``12.35``."""
+    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    return text.replace("-", "−") if value else "0"
+
+
+def quantities(mean: float, low: float, high: float) -> str:
+    """An estimate and its interval as ``1,042 [1,010, 1,074]``."""
+    return f"{quantity(mean)} [{quantity(low)}, {quantity(high)}]"
+
+
 def minus(number: str) -> str:
     """A number with a proper minus, and none on zero."""
     is_zero = not float(number.replace(",", ""))

@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
-from scipy import stats
 
 from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, SHARES, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
-from analysis.stats.intervals import LEVEL, wilson
+from analysis.stats.intervals import column_intervals
 from analysis.stats.paired import paired
 from analysis.stats.screening import may_be_best
 from dess import InputError
 
+AS_IT_IS = "the scenario"  # a design point in words, where nothing is varied
 MOST_VALUES, BINS = 12, 5  # a field with more numbers than that has its main effect in bins
 
 
@@ -68,8 +68,7 @@ def in_words(results: Results) -> list[str]:
     """Every design point in words, as ``number of UAVs 3, arrival rate 0.02``."""
     rows = points(results).to_dict("records")
     return [
-        ", ".join(f"{parameter(str(f)).within} {value_text(v)}" for f, v in row.items())
-        or "the scenario"
+        ", ".join(f"{parameter(str(f)).within} {value_text(v)}" for f, v in row.items()) or AS_IT_IS
         for row in rows
     ]
 
@@ -99,7 +98,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     for name in (*others, metric):
         wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[["policy", "point"]]))
-        ends = intervals(wide, name)
+        ends = column_intervals(wide, name in SHARES)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     table["tied"] = _tied(wide, metric)  # of the metric that ranks, the last of all
     sign = 1 if metric in LESS_IS_BETTER else -1
@@ -163,6 +162,17 @@ def main_effects(
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
+def at_best(results: Results, table: pd.DataFrame) -> pd.DataFrame:
+    """The missions of every policy at its best design point.
+
+    Args:
+        results: The study.
+        table: Its ``ranked``.
+    """
+    best = table.drop_duplicates("policy")[["policy", "point"]]
+    return results.missions.merge(best, on=["policy", "point"])
+
+
 def by_influence(effects: pd.DataFrame) -> list[str]:
     """The fields by how far the metric moves along their values, the widest first.
 
@@ -210,37 +220,6 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
     return pd.concat([whole[["metric", "policy", "point"]], fields, whole[measured]], axis=1)
 
 
-def intervals(values: pd.DataFrame, metric: str) -> pd.DataFrame:
-    """Means of columns with 95 % intervals, as ``analysis.summary`` has them, for many columns.
-
-    Args:
-        values: (R, K) a row per replication, nan where a column lacks one.
-        metric: What the values are; shares have Wilson's interval, save means of several missions
-            that differ: these have Student's t, like all other metrics.
-
-    Returns:
-        (K, 4): ``mean``, ``low``, ``high``, ``n``, with the index of the columns.
-    """
-    n, mean = values.count(), values.mean()
-    errors = values.sem().fillna(0.0)
-    half = errors * stats.t.isf((1 - LEVEL) / 2, np.maximum(n - 1, 1))
-    table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
-    if metric in SHARES:
-        whole = values.isin((0, 1)) | values.isna()
-        table = _with_wilson(table, (whole.all() | (errors == 0)).to_numpy())
-    return table
-
-
-def _with_wilson(table: pd.DataFrame, rows: np.ndarray) -> pd.DataFrame:
-    """Estimates with Wilson's interval in some rows; each pair of numbers is computed once."""
-    successes = (table["mean"] * table["n"]).round().astype(int)
-    pairs = list(zip(successes[rows], table["n"][rows], strict=True))
-    known = {pair: wilson(*pair) for pair in {*pairs} if pair[1]}
-    ends = np.array([known.get(pair, (np.nan,) * 3) for pair in pairs]).reshape(-1, 3)
-    table.loc[rows, ["low", "high"]] = ends[:, 1:]
-    return table
-
-
 def _averaged(
     results: Results, labels: pd.DataFrame, metric: str, policy: str | None
 ) -> pd.DataFrame:
@@ -260,7 +239,7 @@ def _averaged(
         if not sampled:  # replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
-        table = pd.concat([cells, intervals(wide, metric)], axis=1)
+        table = pd.concat([cells, column_intervals(wide, metric in SHARES)], axis=1)
         table = table.assign(points=sizes, tied=_tied(wide, metric))
         table.insert(0, "policy", name)
         tables.append(table)

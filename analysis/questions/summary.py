@@ -88,8 +88,16 @@ def settings(results: Results) -> list[str]:
     ]
 
 
-def worst(results: Results, policy: str, missions: int = 5) -> pd.DataFrame:
+def worst(
+    results: Results, policy: str, missions: int = 5, point: int | None = None
+) -> pd.DataFrame:
     """The missions of a policy with the lowest collection ratio and communication.
+
+    Args:
+        results: The study.
+        policy: The policy.
+        missions: How many.
+        point: The design point; all, if not given.
 
     Returns:
         A row per mission, the worst first, of those alike first the one with the lower collection
@@ -97,6 +105,8 @@ def worst(results: Results, policy: str, missions: int = 5) -> pd.DataFrame:
         it again.
     """
     policy_missions = results.missions[results.missions["policy"] == policy]
+    if point is not None:
+        policy_missions = policy_missions[policy_missions["point"] == point]
     ordered = policy_missions.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)
     table = ordered.loc[: missions - 1, ["policy", "point", "replication", *SHARES, *MEANS]]
     keys = zip(table["point"], table["replication"], strict=True)

@@ -83,6 +83,33 @@ def summary(
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
+def column_intervals(
+    values: pd.DataFrame, share: bool = False, level: float = LEVEL
+) -> pd.DataFrame:
+    """Means of columns with their intervals, as of ``summary``, for many columns at once.
+
+    Args:
+        values: (R, K) a row per replication, a column per group; nan where a group lacks one.
+        share: Whether the values are outcomes 0 or 1, or means of such. Outcomes, and means that
+            are all the same, have Wilson's interval, other means Student's t.
+        level: Confidence level.
+
+    Returns:
+        (K, 4): ``mean``, ``low``, ``high``, ``n``, with the columns as index; nan without values.
+    """
+    n, mean, errors = values.count(), values.mean(), values.sem().fillna(0.0)
+    half = errors * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
+    table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
+    if share:
+        outcomes = (values.isin((0, 1)) | values.isna()).all() | (errors == 0)
+        rows = (outcomes & (n > 0)).to_numpy()
+        successes = (mean * n)[rows].round().astype(int)
+        pairs = [*zip(successes, n[rows], strict=True)]
+        known = {pair: wilson(*pair, level)[1:] for pair in {*pairs}}  # each takes its time
+        table.loc[rows, ["low", "high"]] = np.array([known[p] for p in pairs]).reshape(-1, 2)
+    return table
+
+
 def check_columns(missions: pd.DataFrame, needed: Sequence[str]) -> None:
     """Raise ``InputError`` if a needed column is missing."""
     for name in needed:

@@ -1,6 +1,9 @@
 """``dess report`` and ``dess verify``: pages and checks of them; ``dess timing``: of decisions."""
 
 import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,9 +12,10 @@ import typer
 
 from dess import InputError
 from reports.cli import console
-from reports.cli.settings import PARAMETER, RESULTS, JsonOption, setting
+from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
 
 if TYPE_CHECKING:
+    from reports.pages.kernels import Progress
     from reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set
@@ -22,14 +26,16 @@ app = typer.Typer()
 @app.command()
 def report(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Reports; all by default.")
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME|DIR]...",
+            help="Reports, and results folders of any studies; all reports by default.",
+        ),
     ] = None,
     results: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
     ] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = Path(
-        "build/reports"
-    ),
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = PAGES,
     settings: Annotated[
         list[str] | None,
         typer.Option(
@@ -49,18 +55,36 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Run the notebooks on the results and render them to HTML, with an index."""
+    """Render pages of results, and an index: reports on the paper, pages of any studies.
+
+    A results folder that is called like a report is named with a path separator: ./learning.
+    """
     values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:
             raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
         values["settings"] = dict(setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
-    from reports.pages.render import ReportError, render
+    from reports.pages.notebook import NAMES
+    from reports.pages.render import render, render_study
+
+    folders = [n for n in names or [] if os.sep in n or (n not in NAMES and Path(n).is_dir())]
+    reports = [name for name in names or [] if name not in folders]
+    with rendering() as progress:
+        if reports or not folders:
+            print(render(reports, results, out, progress=progress, parameters=values))
+        for folder in folders:
+            print(render_study(folder, out, progress=progress, parameters=values))
+
+
+@contextmanager
+def rendering() -> "Iterator[Progress]":
+    """A bar for the progress of pages; a notebook that fails is one line and exit code 1."""
+    from reports.pages.render import ReportError
 
     try:
         with console.compile_notice(), console.counted_bar("step") as progress:
-            print(render(names or [], results, out, progress=progress, parameters=values))
+            yield progress
     except ReportError as error:
         raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
 

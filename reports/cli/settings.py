@@ -15,7 +15,7 @@ from dess import InputError
 if TYPE_CHECKING:
     from dess import ScenarioSpace
 
-RESULTS = Path("results")
+RESULTS, PAGES = Path("results"), Path("build/reports")
 FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
 PARAMETER = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
 

@@ -8,8 +8,9 @@ import typer
 
 from dess import InputError
 from reports.cli import console, diff
+from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
-from reports.cli.settings import RESULTS, JsonOption, WorkersOption
+from reports.cli.settings import PAGES, RESULTS, JsonOption, WorkersOption
 
 app = typer.Typer(help="Studies: policies x design points x replications.")
 app.add_typer(diff.app)
@@ -40,6 +41,9 @@ def run(
         bool,
         typer.Option("--accept-code", help="Keep missions simulated by other code, and note it."),
     ] = False,
+    page: Annotated[
+        bool, typer.Option("--report", help=f"Render the page of the study into {PAGES} as well.")
+    ] = False,
     yes: YesOption = False,
 ) -> None:
     """Run a study into a results folder; run again to resume or to top up."""
@@ -66,6 +70,11 @@ def run(
     )
     study_tables.print_summary(results, out, short=True)
     print(f"more: dess study show {out}")
+    if page:
+        from reports.pages.render import render_study
+
+        with rendering() as progress:
+            print(render_study(out, PAGES, progress))
 
 
 @app.command("show")

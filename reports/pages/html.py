@@ -26,6 +26,14 @@ from analysis.study.study import budget_of
 SHORT = 12  # characters of a hash that are shown
 STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that hold evidence
 
+# A figure, its alternative text and its caption; its data, if it has links to them.
+Drawing = tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
+
+DIGITS = "%.6g"  # of numbers in files with data
+# What LaTeX has no letter for.
+_IN_LATEX = str.maketrans(
+    {"−": "$-$", "–": "--", "▲": r"$\triangle$", "▼": r"$\nabla$", "≈": r"$\approx$", "±": r"$\pm$"}
+)
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
@@ -113,27 +121,39 @@ def _weights(evidence: Evidence) -> Iterator[str]:
             yield f"{name} {digest[:SHORT]}"
 
 
-def table(frame: pd.DataFrame, caption: str = "", wrap: bool = False) -> HTML:
+def table(
+    frame: pd.DataFrame, caption: str = "", wrap: bool = False, data: pd.DataFrame | None = None
+) -> HTML:
     """A table without its index, under its caption; a wide one scrolls.
 
     Args:
         frame: The table.
         caption: The text above it.
         wrap: Whether long cells take several lines.
+        data: Its numbers, all of them: then links below save these as CSV, and what is shown as
+            LaTeX.
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
     above = f'<p class="caption">{escape(caption)}</p>' if caption else ""
-    return HTML(f'{above}<div class="scroll">{html}</div>')
+    below = "" if data is None else _downloads(caption, data, frame)
+    return HTML(f'{above}<div class="scroll">{html}</div>{below}')
 
 
-def figure(drawing: Figure, alt: str, caption: str) -> HTML:
-    """A figure with its alternative text and its caption."""
-    return HTML(_figure(drawing, alt, caption))
+def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> HTML:
+    """A figure with its alternative text and its caption.
+
+    Args:
+        drawing: The figure.
+        alt: What it shows, for those who do not see it.
+        caption: The text below it.
+        data: What is drawn: then links in the caption save it as CSV and as LaTeX.
+    """
+    return HTML(_figure(drawing, alt, caption, data))
 
 
-def gallery(drawings: list[tuple[Figure, str, str]]) -> HTML:
-    """Figures with alternative texts and captions, side by side as far as there is room."""
+def gallery(drawings: Sequence[Drawing]) -> HTML:
+    """Figures with the arguments of ``figure``, side by side as far as there is room."""
     return HTML(f'<div class="gallery">{"".join(_figure(*parts) for parts in drawings)}</div>')
 
 
@@ -147,9 +167,31 @@ def svg(drawing: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _figure(drawing: Figure, alt: str, caption: str) -> str:
+def _figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> str:
     source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
     width, height = drawing.get_size_inches()
     shape = ' class="tall"' if height > 1.5 * width else ""
     image = f'<img{shape} alt="{escape(alt)}" src="{source}">'
-    return f"<figure>{image}<figcaption>{escape(caption)}</figcaption></figure>"
+    below = "" if data is None else _downloads(alt, data, data)
+    return f"<figure>{image}<figcaption>{escape(caption)}{below}</figcaption></figure>"
+
+
+def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
+    """Links that save data as CSV, and a table as LaTeX; they hold the files."""
+    name = re.sub(r"[^a-z0-9]+", "-", title.lower())[:60].strip("-")
+    files = {
+        "CSV": ("csv", "text/csv", data.to_csv(index=False, float_format=DIGITS.__mod__)),
+        "LaTeX": ("tex", "application/x-tex", latex(shown)),
+    }
+    links = [
+        f'<a download="{name}.{suffix}" aria-label="{escape(f"{title}: {kind}")}" '
+        f'href="data:{media};charset=utf-8;base64,{b64encode(text.encode()).decode()}">{kind}</a>'
+        for kind, (suffix, media, text) in files.items()
+    ]
+    return f'<span class="data">Data: {" ".join(links)}</span>'
+
+
+def latex(frame: pd.DataFrame) -> str:
+    """A table in LaTeX, for the package booktabs."""
+    text = frame.to_latex(index=False, escape=True, float_format=DIGITS.__mod__, na_rep="")
+    return re.sub(r"\bC\\_([SC])\b", r"$C_\1$", text).translate(_IN_LATEX)

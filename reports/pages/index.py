@@ -12,6 +12,7 @@ from analysis.results.evidence import Evidence
 from dess import InputError
 from reports.pages import html
 from reports.pages.notebook import NAMES, SCORECARD, Report
+from reports.pages.study.sections import PREFIX
 from reports.pages.template import fill
 from reports.pages.verify import is_sealed
 
@@ -19,6 +20,8 @@ log = logging.getLogger(__name__)
 
 INDEX = "index.html"
 _IMAGE = re.compile(r"<img [^>]+>")
+_TITLE, _LEAD = re.compile("<h1>(.*?)</h1>", re.S), re.compile('<p class="lead">(.*?)</p>', re.S)
+_OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
 _SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
 
 
@@ -37,15 +40,18 @@ def index_of(pages: Mapping[str, str], reports: Sequence[Report]) -> str:
 
     Args:
         pages: The HTML of pages, by file name.
-        reports: The reports in the order of their cards; those without a page are left out.
+        reports: The reports in the order of their cards; those without a page are left out. Pages
+            of studies come after them, by name.
     """
     shown = [report for report in reports if report.page in pages]
     cards = [
-        Card(r.page, r.title, r.description, _thumbnail(pages[r.page]))
+        Card(r.page, r.title, r.description, _thumbnail(pages[r.page], -1))
         for r in shown
         if r.name != SCORECARD
     ]
-    contents = [pages[report.page] for report in shown]
+    studies = [name for name in sorted(pages) if _OF_STUDY.fullmatch(name)]
+    cards += [_card_of_study(name, pages[name]) for name in studies]
+    contents = [pages[name] for name in (*(report.page for report in shown), *studies)]
     files = dict.fromkeys(text for page in contents for text in html.embedded(html.FILES, page))
     origins = html.carrying(_evidence(contents), files)
     scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
@@ -61,7 +67,9 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
         but: File names that are left out without a warning.
     """
     pages = {}
-    for path in (out / f"{name}.html" for name in NAMES if f"{name}.html" not in but):
+    studies = sorted(path.name for path in out.glob("*.html") if _OF_STUDY.fullmatch(path.name))
+    names = (*(f"{name}.html" for name in NAMES), *studies)
+    for path in (out / name for name in names if name not in but):
         try:
             content = path.read_bytes().decode()
             if not is_sealed(content):
@@ -85,7 +93,13 @@ def _evidence(pages: Iterable[str]) -> list[Evidence]:
     ]
 
 
-def _thumbnail(content: str) -> Markup:
-    """The last image of a page, which shows the most."""
+def _card_of_study(name: str, content: str) -> Card:
+    """The card of a page of a study: its title, its description and its first drawing."""
+    title, description = (Markup("".join(part.findall(content)[:1])) for part in (_TITLE, _LEAD))
+    return Card(name, title, description, _thumbnail(content, 0))
+
+
+def _thumbnail(content: str, number: int) -> Markup:
+    """An image of a page: of a report the last, which shows the most; none without any."""
     images = _IMAGE.findall(content)
-    return Markup(images[-1] if images else "")
+    return Markup(images[number] if images else "")

@@ -11,6 +11,7 @@ and neither run for the page nor shown on it:
 
 import os
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,7 @@ class Report:
         title: Its heading.
         description: The paragraph below the heading.
         studies: Names of the results folders that it reads.
-        source: The text of its file.
+        original: All that is in its file.
         notebook: The cells of the page, with values for parameters.
         begun: Id of the cell that was begun last.
         done: Number of cells that have been run.
@@ -62,7 +63,7 @@ class Report:
     title: str
     description: str
     studies: list[str]
-    source: str
+    original: NotebookNode
     notebook: NotebookNode
     begun: str = ""
     done: int = 0
@@ -101,7 +102,7 @@ class Report:
         def write(path: str) -> str:
             return Path(os.path.relpath(path, out)).as_posix()
 
-        notebook = _parsed(self.source)
+        notebook = deepcopy(self.original)
         moved = {name: with_paths(value, write) for name, value in values.items()}
         _set(notebook, {**moved, "results": write(str(results))})
         notebook.metadata = {"kernelspec": _KERNEL}
@@ -121,13 +122,25 @@ def read(name: str, folder: Path = SHIPPED) -> Report:
     """
     if name not in (names := names_in(folder)):
         raise InputError(f"report: {name!r} is unknown; allowed: {', '.join(names)}")
-    source = _file(folder, name).read_text("utf-8")
-    notebook = _parsed(source)
-    title, description = notebook.cells[0].source.removeprefix("# ").split("\n\n", 1)
+    return report_of(name, parsed(name, folder))
+
+
+def parsed(name: str, folder: Path = SHIPPED) -> NotebookNode:
+    """The notebook of a report, all of it."""
+    notebook = jupytext.reads(_file(folder, name).read_text("utf-8"), fmt="py:percent")
+    for number, cell in enumerate(notebook.cells):
+        cell.id = f"cell-{number}"
+    return notebook
+
+
+def report_of(name: str, original: NotebookNode) -> Report:
+    """The report of a notebook, which begins with its heading."""
+    title, description = original.cells[0].source.removeprefix("# ").split("\n\n", 1)
+    notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
     drop(notebook, IN_JUPYTER)
-    studies = notebook.metadata["dess"]["studies"]
-    return Report(name, title, " ".join(description.split()), studies, source, notebook)
+    studies = original.metadata["dess"]["studies"]
+    return Report(name, title, " ".join(description.split()), studies, original, notebook)
 
 
 def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
@@ -148,26 +161,20 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
 
 def drop(notebook: NotebookNode, tag: str) -> None:
     """Remove the cells of a notebook that have a tag."""
-    notebook.cells = [cell for cell in notebook.cells if tag not in _tags(cell)]
+    notebook.cells = [cell for cell in notebook.cells if tag not in tags_of(cell)]
 
 
 def _file(folder: Path, name: str) -> Path:
     return folder / f"{name.replace('-', '_')}.py"
 
 
-def _parsed(source: str) -> NotebookNode:
-    notebook = jupytext.reads(source, fmt="py:percent")
-    for number, cell in enumerate(notebook.cells):
-        cell.id = f"cell-{number}"
-    return notebook
-
-
-def _tags(cell: NotebookNode) -> list[str]:
+def tags_of(cell: NotebookNode) -> list[str]:
+    """The tags of a cell."""
     return cell.metadata.get("tags", [])
 
 
 def _parameters_cell(notebook: NotebookNode) -> NotebookNode:
-    return next(cell for cell in notebook.cells if PARAMETERS in _tags(cell))
+    return next(cell for cell in notebook.cells if PARAMETERS in tags_of(cell))
 
 
 def _set(notebook: NotebookNode, values: Mapping[str, Any]) -> None:

@@ -6,7 +6,7 @@ Same results, same bytes: pages hold no time and no path of this machine.
 import logging
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,6 +28,7 @@ from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read
 from reports.pages.parameters import with_paths
+from reports.pages.study.sections import report_of
 from reports.pages.template import fill
 
 log = logging.getLogger(__name__)
@@ -78,6 +79,49 @@ def render(
         _check_results(results / study)
     for report in reports:
         report.set({"results": ".", **values})
+    _write(reports, results, out, progress, values, notebooks)
+    return out / INDEX
+
+
+def render_study(
+    folder: str | Path,
+    out: str | Path,
+    progress: Progress | None = None,
+    parameters: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write the page of a results folder of any study, its notebook and the index.
+
+    Args:
+        folder: The results folder.
+        out: The folder to write to.
+        progress: Called after every cell.
+        parameters: Values for the parameters of the notebook, beside ``results``.
+
+    Returns:
+        The path of the page, ``study-NAME.html``.
+
+    Raises:
+        InputError: If the folder holds no complete results, a parameter is unknown or refused, or
+            ``out`` cannot be written. Nothing is written then.
+        ReportError: If the notebook fails, as of ``render``.
+    """
+    folder, out, values = Path(folder), Path(out), parameters or {}
+    report = report_of(folder)
+    check_parameters([report], values)
+    report.set({"results": ".", **values})
+    _write([report], folder, out, progress, values, SHIPPED)
+    return out / report.page
+
+
+def _write(
+    reports: Sequence[Report],
+    results: Path,
+    out: Path,
+    progress: Progress | None,
+    values: Mapping[str, Any],
+    notebooks: Path,
+) -> None:
+    """Run reports in the folder of their results, and write the pages and the index."""
     needed = [out] + [results for report in reports if "results" in report.parameters]
     with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
         missions.make([report.name for report in reports], results, values, progress)
@@ -97,7 +141,6 @@ def render(
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
-    return out / INDEX
 
 
 @contextmanager

@@ -1,0 +1,161 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: []
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # A study
+#
+# The name and the description of the study take the place of these lines.
+
+# %% tags=["parameters"]
+results = "../../results/charge-limits"  # the results folder of the study
+metric = None  # what ranks the settings; None for that of the selection, or the product
+baseline = 0  # the number of the design point that all others are compared with
+
+# %%
+from pathlib import Path
+
+import numpy as np
+from IPython.display import display
+
+from analysis import distribution, load_results, names
+from analysis.questions import settings, summary
+from reports.pages import html
+from reports.pages.study import drawings, tables, words
+
+# %%
+study = load_results(Path(results))
+by = words.metric_of(study, metric)
+metrics, called = words.metrics_of(by), names.metric_name(by).lower()
+
+# %% [markdown]
+# ## What was simulated
+
+# %%
+html.say("{simulated}", simulated=words.simulated(study))
+
+# %% [markdown]
+# Every policy meets the same replications at every design point, which have the same realisation
+# of all random draws. So missions are compared one by one, and what they share drops out.
+
+# %% tags=["if-ranked"]
+ranked = settings.ranked(study, by)
+best = ranked.iloc[0]
+html.say("## The best\n\n{answer}", answer=words.answer(study, ranked, by))
+
+# %% tags=["if-settings"]
+tables.ranked(study, ranked, by)
+
+# %% [markdown] tags=["if-settings"]
+# A *setting* is a policy at a design point. It *may be the best* if no other setting is
+# significantly better: the true best is among these with a probability of 95 % (subset selection
+# by paired t tests with Bonferroni's correction, Nelson and others 2001). The mean of the first
+# rank is a little too high, since chance helped to rank it first.
+
+# %% tags=["if-settings"]
+tables.best_of_policies(study, by)
+
+# %% tags=["if-one-setting"]
+display(html.gallery(drawings.means(study, metrics)), tables.means(study))
+
+# %% [markdown] tags=["if-selection"]
+# ## The selection
+#
+# A rule of the study decided how many missions each setting was worth, until one was selected for
+# every policy. Settings with few missions were ruled out early.
+
+# %% tags=["if-selection"]
+display(
+    tables.selected(study),
+    html.say("{guarantees}", guarantees=words.guarantees(study)),
+    tables.checked(study),
+)
+
+# %% [markdown] tags=["if-selection"]
+# The missions of the check had no part in the selection, so its means are not too high.
+
+# %% [markdown] tags=["if-precision"]
+# ## The precision
+#
+# The study simulated missions until its estimates were as precise as wanted, or its budget ended.
+
+# %% tags=["if-precision"]
+tables.precisions(study)
+
+# %% [markdown] tags=["if-fields"]
+# ## What the fields do
+
+# %% tags=["if-one-field"]
+html.gallery(drawings.curves(study, metrics))
+
+# %% tags=["if-two-fields"]
+html.gallery(drawings.heat_maps(study, metrics))
+
+# %% tags=["if-many-fields"]
+html.gallery(drawings.small_multiples(study, by))
+
+# %% tags=["if-one-at-a-time"]
+html.gallery(drawings.one_at_a_time(study))
+
+# %% tags=["if-sampled"]
+html.gallery(drawings.scatter(study, metrics))
+
+# %% tags=["if-sensitivity"]
+display(html.gallery(drawings.sensitivity(study, by)), tables.sensitivity(study))
+
+# %% [markdown] tags=["if-sensitivity"]
+# A Sobol index is the share of a metric's variance that a field accounts for: *alone*, or *with
+# all interactions*. The replication is a field too: what it accounts for, no setting removes.
+
+# %% tags=["if-effects"]
+display(html.gallery(drawings.main_effects(study, metrics)), tables.main_effects(study, by))
+
+# %% tags=["if-settings"]
+html.say(
+    "## Compared with a baseline\n\nThe baseline is design point {point}: {words}. Every policy is "
+    "compared with itself there. The parameter `baseline` names another point.",
+    point=baseline,
+    words=settings.in_words(study)[baseline],
+)
+
+# %% tags=["if-settings"]
+tables.against(study, baseline, by)
+
+# %% [markdown] tags=["if-policies"]
+# ## Policy against policy
+#
+# Over all design points, replication by replication.
+
+# %% tags=["if-policies"]
+tables.comparisons(study)
+
+# %% tags=["if-learned"]
+tables.learners(study)
+
+# %% [markdown]
+# ## Single missions
+
+# %% tags=["if-ranked"]
+missions = settings.at_best(study, ranked)
+spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
+display(
+    html.say("Every policy at its best setting by {metric}:", metric=called),
+    html.gallery(drawings.distribution(missions, by)),
+    tables.spread(spread, by),
+    tables.worst(study, summary.worst(study, best["policy"], point=best["point"])),
+)
+
+# %% tags=["if-sensitivity"]
+tables.worst(study, summary.worst(study, summary.best_policy(study.missions)))
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+html.provenance([study])

@@ -1,0 +1,1 @@
+"""The page of any study: its sections, its sentences and tables, its drawings."""

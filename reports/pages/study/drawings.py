@@ -1,0 +1,206 @@
+"""Drawings of a study for ``html.gallery``, each with its caption and its data.
+
+html.gallery(drawings.curves(study, metrics))
+"""
+
+from collections.abc import Iterable, Sequence
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.figures import parameters, policies
+from analysis.figures import settings as figures
+from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
+from analysis.questions import main_effects as one_by_one
+from analysis.questions import settings, summary
+from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
+from reports.pages.html import Drawing
+
+FRAMED = (
+    "The star marks the cell with the best mean of this policy. Orange frames: cells that are not "
+    "significantly worse than any other, so each may be the best."
+)
+
+
+def means(results: Results, metrics: Iterable[str]) -> list[Drawing]:
+    """Every metric of every policy at the only design point."""
+    table = summary.means(results)
+    return [
+        (
+            policies.performance(table, metric),
+            f"{metric_name(metric)} of every policy",
+            f"n = {numbers.span(_of(table, metric)['n'])} missions per policy; bars are "
+            f"{_LEVEL} intervals.",
+            _of(table, metric),
+        )
+        for metric in metrics
+        if metric in METRICS
+    ]
+
+
+def curves(results: Results, metrics: Iterable[str]) -> list[Drawing]:
+    """Every metric against the only field that the design varies: a curve per policy."""
+    (field,) = settings.varied(results)
+    drawings: list[Drawing] = []
+    for metric in metrics:
+        data = settings.averaged(results, [field], metric)
+        caption = f"n = {_counted(data)} missions per point; bars are {_LEVEL} intervals."
+        title = f"{metric_name(metric)} against the {parameter(field).within}"
+        drawings.append((figures.plot(results, field, metric=metric), title, caption, data))
+    return drawings
+
+
+def heat_maps(results: Results, metrics: Iterable[str]) -> list[Drawing]:
+    """Every metric of every policy over the two fields that the design varies."""
+    y, x = sorted(settings.varied(results), key=lambda f: len(settings.varied(results)[f]))
+    drawings: list[Drawing] = []
+    for policy in results.policies:
+        for metric in metrics:
+            data = settings.averaged(results, [x, y], metric, policy)
+            caption = f"Means of {policy}, {_unit(metric)}n = {_counted(data)} missions per cell. "
+            title = f"{metric_name(metric)} of {policy} over {parameter(x).within} and "
+            drawing = figures.heat_map(results, x, y, metric, policy)
+            drawings.append((drawing, title + parameter(y).within, caption + FRAMED, data))
+    return drawings
+
+
+def small_multiples(results: Results, metric: str = PRODUCT) -> list[Drawing]:
+    """A metric of every policy over the three fields that move it most: a panel per value."""
+    fields = settings.by_influence(settings.main_effects(results, metric))
+    x, y, facet = fields[:3]
+    values = settings.varied(results)[facet]
+    drawings: list[Drawing] = []
+    for policy in results.policies:
+        data = settings.averaged(results, [facet, x, y], metric, policy)
+        caption = (
+            f"Means of {policy}, {_unit(metric)}n = {_counted(data)} replications per cell. One "
+            f"panel for each value of the {parameter(facet).within}{_left_out(values)}. "
+            f"{_averaged(fields[3:])}{FRAMED}"
+        )
+        title = f"{metric_name(metric)} of {policy} over {_listed(fields[:3])}"
+        drawing = figures.heat_map(results, x, y, metric, policy, facet)
+        drawings.append((drawing, title, caption, data))
+    return drawings
+
+
+def main_effects(results: Results, metrics: Iterable[str]) -> list[Drawing]:
+    """Every metric against every varied field, averaged over the other fields."""
+    is_sample = (results.manifest["study"]["design"] or {}).get("kind") == "saltelli"
+    drawings: list[Drawing] = []
+    for metric in metrics:
+        data = settings.main_effects(results, metric)
+        caption = (
+            "One panel for each field, the one that moves the metric most first. A dot is the mean "
+            f"over {_MEANT[is_sample]}; n = {_counted(data)}; bars are {_LEVEL} intervals."
+        )
+        drawings.append(
+            (
+                figures.main_effects(results, metric),
+                f"{metric_name(metric)} against each field, averaged over the others",
+                caption,
+                data.drop(columns="tied"),
+            )
+        )
+    return drawings
+
+
+def scatter(results: Results, metrics: Iterable[str]) -> list[Drawing]:
+    """Every metric at every design point, against every varied field."""
+    drawings: list[Drawing] = []
+    for metric in metrics:
+        data = settings.ranked(results, metric)
+        caption = (
+            f"One panel for each field. A dot is the mean of a policy at a design point, over "
+            f"n = {_counted(data)} missions. All fields vary at once, so dots above each other "
+            "differ in the other fields."
+        )
+        title = f"{metric_name(metric)} at every design point"
+        drawings.append((figures.scatter(results, metric), title, caption, data))
+    return drawings
+
+
+def one_at_a_time(results: Results) -> list[Drawing]:
+    """The three metrics against every field, all other fields as the scenario has them."""
+    table = one_by_one.effects(results)
+    changes = one_by_one.changes_by_field(results, table)
+    return [
+        (
+            parameters.effect(table, field, pairs, results.policies),
+            f"The metrics against the {parameter(field).within}",
+            f"n = {_counted(table[table['field'] == field])} missions per point; bars are {_LEVEL} "
+            "intervals. The lowest panel has the change from the first value on, mission by "
+            "mission, on an axis of its own.",
+            table[table["field"] == field],
+        )
+        for field, pairs in changes.items()
+    ]
+
+
+def sensitivity(results: Results, metric: str = PRODUCT) -> list[Drawing]:
+    """Sobol indices of every parameter for every policy."""
+    table = summary.sensitivities(results)
+    rows = table[table["metric"] == metric].dropna()
+    return [
+        (
+            parameters.sensitivity(part, str(policy)),
+            f"Sobol indices of {metric_name(metric).lower()} for {policy}",
+            f"{policy}: n = {part['n'].min():,} missions; lines are {_LEVEL} intervals by "
+            "bootstrap. Below the dotted line: noise, which no setting removes.",
+            part,
+        )
+        for policy, part in rows.groupby("policy", sort=False)
+    ]
+
+
+def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> list[Drawing]:
+    """How a metric spreads over missions of each policy."""
+    counts = missions.groupby("policy", sort=False).size()
+    columns = ["policy", "point", "replication", metric]
+    return [
+        (
+            figures.distribution(missions, metric),
+            f"Distribution of {metric_name(metric).lower()} over the missions",
+            f"The height of a curve is the share of the missions (n = {numbers.span(counts)} per "
+            "policy) with at most the value below it. A step at 0 are missions that failed.",
+            missions[columns].sort_values(columns[:3], kind="stable"),
+        )
+    ]
+
+
+_LEVEL = numbers.level(LEVEL)
+# What a main effect is the mean over, by whether the design is a sample of single missions.
+_MEANT = {
+    False: "all design points with the value, so over the other fields as the design has them, "
+    "replication by replication",
+    True: "the missions with the value, whatever the other fields are",
+}
+
+
+def _of(table: pd.DataFrame, metric: str) -> pd.DataFrame:
+    return table[table["metric"] == metric]
+
+
+def _counted(table: pd.DataFrame) -> str:
+    return numbers.span(table["n"])
+
+
+def _unit(metric: str) -> str:
+    return "in percent, " if metric in METRICS else ""
+
+
+def _listed(fields: Sequence[str]) -> str:
+    return numbers.words([parameter(field).within for field in fields])
+
+
+def _left_out(values: Sequence[object]) -> str:
+    """Which values have a panel, if not all have."""
+    panels = figures.shown(values)
+    if len(panels) == len(values):
+        return ""
+    shown = ", ".join(map(value_text, panels))
+    return f" ({len(panels)} of {len(values)} values: {shown}; the others are in the data)"
+
+
+def _averaged(fields: Sequence[str]) -> str:
+    return f"Cells are averaged over {_listed(fields)}. " if fields else ""

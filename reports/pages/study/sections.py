@@ -1,0 +1,92 @@
+"""Which sections the page of a study has.
+
+The notebook ``study.py`` has sections for every kind of study. A cell tagged ``if-...`` is kept
+where the study has what the tag names, with all its tags; ``TAGS`` says what they mean:
+
+    report_of(Path("results/fleets"))
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from analysis import numbers
+from analysis.names import parameter
+from analysis.questions import summary
+from analysis.questions.settings import varied
+from analysis.results.tables import Results, load_results
+from reports.pages import notebook
+from reports.pages.notebook import SHIPPED, Report, tags_of
+
+NOTEBOOK, PREFIX = "study", "study-"  # the notebook; names of pages
+
+
+def report_of(folder: Path, notebooks: Path = SHIPPED) -> Report:
+    """The report of a results folder, with the sections and the title of its study.
+
+    Raises:
+        InputError: If the folder holds no results, or they are incomplete or damaged.
+    """
+    results = load_results(folder)
+    study, original = results.manifest["study"], notebook.parsed(NOTEBOOK, notebooks)
+    kept = {tag: has(results) for tag, has in TAGS.items()}
+    original.cells = [
+        cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
+    ]
+    fields = numbers.words([parameter(field).within for field in varied(results)])
+    against = f", by {fields}" if fields else ""
+    description = study["description"] or f"{numbers.words(results.policies)}{against}."
+    original.cells[0].source = f"# Study {study['name']}\n\n{description}"
+    return notebook.report_of(f"{PREFIX}{study['name']}", original)
+
+
+def _kind(results: Results) -> str:
+    """The kind of the design; a design that varies one field at most is a grid."""
+    design = results.manifest["study"]["design"] or {}
+    kind = str(design.get("kind", "grid"))
+    return kind if kind in ("saltelli", "latin-hypercube") or len(varied(results)) > 1 else "grid"
+
+
+def _has_settings(results: Results) -> bool:
+    return len(results.store.manifest.points) > 1 and _kind(results) != "saltelli"
+
+
+def _is_scan(results: Results, fields: Callable[[int], bool]) -> bool:
+    """Whether the design has combinations of values, of a number of fields."""
+    count, kind = len(varied(results)), _kind(results)
+    return fields(count) and (kind == "grid" or (kind == "table" and count <= 2))
+
+
+def _has(section: str) -> Callable[[Results], bool]:
+    return lambda results: results.manifest["study"][section] is not None
+
+
+# Tag -> whether a study has the cells with this tag.
+TAGS: dict[str, Callable[[Results], bool]] = {
+    # Several design points whose missions share their replications: settings to rank.
+    "if-settings": _has_settings,
+    # Settings, one or several, with missions enough to rank them.
+    "if-ranked": lambda results: _kind(results) != "saltelli",
+    # A single design point: the policies are compared in it.
+    "if-one-setting": lambda results: len(results.store.manifest.points) == 1,
+    # Fields with several values; such that others are averaged over.
+    "if-fields": lambda results: bool(varied(results)),
+    "if-effects": lambda results: len(varied(results)) > 1 and _kind(results) != "one-at-a-time",
+    # Combinations of values of one field, of two, of three and more.
+    "if-one-field": lambda results: _is_scan(results, lambda count: count == 1),
+    "if-two-fields": lambda results: _is_scan(results, lambda count: count == 2),
+    "if-many-fields": lambda results: _is_scan(results, lambda count: count > 2),
+    "if-one-at-a-time": lambda results: _kind(results) == "one-at-a-time",
+    # Design points spread over the space of parameters.
+    "if-sampled": lambda results: (
+        _kind(results) == "latin-hypercube"
+        or (_kind(results) == "table" and len(varied(results)) > 2)
+    ),
+    "if-sensitivity": lambda results: _kind(results) == "saltelli",
+    # Several policies with the same missions; some of them learned, some not.
+    "if-policies": lambda results: not summary.comparisons(results).empty,
+    "if-learned": lambda results: not summary.learned_against_heuristic(results).empty,
+    # Tables of the study.
+    "if-selection": _has("selection"),
+    "if-precision": _has("precision"),
+    "if-costs": _has("costs"),
+}

@@ -1,0 +1,218 @@
+"""Tables of the page of a study, each with its caption and its data, in their order on the page.
+
+tables.ranked(study, settings.ranked(study, metric), metric)
+"""
+
+import pandas as pd
+from IPython.display import HTML
+
+from analysis import numbers
+from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
+from analysis.questions import sensitivity as indices
+from analysis.questions import settings, summary
+from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
+from reports.pages import html
+from reports.pages.study.words import MOST_ROWS, metrics_of, written
+
+_LEVEL = numbers.level(LEVEL)
+
+
+def ranked(results: Results, rows: pd.DataFrame, metric: str) -> HTML:
+    """The best settings.
+
+    Args:
+        results: The study.
+        rows: Its ``settings.ranked``.
+        metric: The metric that ranks them.
+    """
+    caption = (
+        f"The first {min(len(rows), MOST_ROWS)} of {len(rows):,} settings by "
+        f"{metric_name(metric).lower()}: means with {_LEVEL} intervals"
+    )
+    top = rows.head(MOST_ROWS)
+    shown = _settings(results, top, metric)
+    shown.insert(0, "Rank", top["rank"])
+    shown.insert(1, "May be the best", top["tied"].map({True: "yes", False: "no"}))
+    return html.table(shown, caption, data=rows)
+
+
+def best_of_policies(results: Results, metric: str) -> HTML:
+    """The best setting of every policy, and how many of its settings may be as good."""
+    own = [settings.ranked(results, metric, policy) for policy in results.policies]
+    best = pd.concat([rows.head(1) for rows in own], ignore_index=True)
+    shown = _settings(results, best, metric)
+    shown["May be its best"] = [f"{rows['tied'].sum():,} of {len(rows):,} settings" for rows in own]
+    caption = f"The best setting of every policy by {metric_name(metric).lower()}"
+    return html.table(shown, caption, data=best.drop(columns=["rank", "tied"]))
+
+
+def main_effects(results: Results, metric: str) -> HTML:
+    """By how much every field moves a metric."""
+    effects = settings.main_effects(results, metric)
+    write = numbers.percent if metric in METRICS else numbers.quantity
+    rows = []
+    for (field, policy), part in effects.groupby(["field", "policy"], sort=False):
+        low, high = part.loc[part["mean"].idxmin()], part.loc[part["mean"].idxmax()]
+        ends = [f"{write(row['mean'])} at {row['value']}" for row in (low, high)]
+        span = write(high["mean"] - low["mean"]).replace(" %", " points")
+        rows.append((parameter(str(field)).name, policy, *ends, span))
+    columns = ["Field", "Policy", "Lowest mean", "Highest mean", "Apart"]
+    caption = f"How far each field moves {metric_name(metric).lower()}, the other fields averaged"
+    data = effects.drop(columns="tied")
+    return html.table(pd.DataFrame(rows, columns=columns), caption, data=data)
+
+
+def sensitivity(results: Results) -> HTML:
+    """Sobol indices."""
+    data = summary.sensitivities(results)
+    caption = f"Sobol indices as shares of the variance, with {_LEVEL} intervals"
+    return html.table(indices.index_table(data), caption, data=data)
+
+
+def selected(results: Results) -> HTML:
+    """What was selected for every policy."""
+    data = summary.selections(results)
+    words = settings.in_words(results)
+    columns = {
+        "Policy": data["policy"],
+        "Selected setting": [words[point] for point in data["point"]],
+        "Missions of the selection": data["missions"].map("{:,}".format),
+        "Settings not ruled out": data["left"],
+    }
+    caption = "The setting that was selected for every policy"
+    return html.table(pd.DataFrame(columns), caption, data=data)
+
+
+def checked(results: Results) -> HTML:
+    """The check of what was selected."""
+    caption = f"The check of the selected settings: means with {_LEVEL} intervals"
+    return _means(summary.checks(results), caption)
+
+
+def means(results: Results) -> HTML:
+    """The means of every policy at the only design point."""
+    return _means(summary.means(results), f"Means with {_LEVEL} intervals")
+
+
+def precisions(results: Results) -> HTML:
+    """The precisions that a study was to reach."""
+    data = summary.precisions(results)
+    top = data.head(MOST_ROWS)
+    columns = {
+        "Policy": top["policy"],
+        "Point": top["point"],
+        "Metric": top["metric"].map(metric_name),
+        "Missions": top["missions"].map("{:,}".format),
+        "Mean": top["mean"].map(numbers.quantity),
+        "Half-width": top["half_width"].map("{:.2g}".format),
+        "Target": top["target"].map("{:.2g}".format),
+        "Reached": top["met"].map({True: "yes", False: "no: the budget ended"}),
+    }
+    caption = f"Half-widths of {_LEVEL} intervals, and their targets"
+    return html.table(pd.DataFrame(columns), caption, data=data)
+
+
+def against(results: Results, baseline: int, metric: str) -> HTML:
+    """Every design point against a baseline."""
+    data = settings.against(results, baseline, metrics_of(metric))
+    rows = data[data["metric"] == metric]
+    order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
+    top = rows.loc[order[:MOST_ROWS]].sort_values("difference", ascending=False, kind="stable")
+    write = numbers.points if metric in METRICS else numbers.quantities
+    columns = {"Policy": top["policy"], "Point": top["point"]} | _fields(results, top)
+    columns["Difference"] = [write(*row) for row in top[["difference", "low", "high"]].to_numpy()]
+    columns["p (Holm)"] = top["p_adjusted"].map(numbers.p_value)
+    columns["Pairs"] = top["n"].map("{:,}".format)
+    unit = " in percentage points" if metric in METRICS else ""
+    caption = (
+        f"{metric_name(metric)}: difference to the baseline{unit}, mission by mission, with "
+        f"{_LEVEL} intervals; {len(top):,} of {len(rows):,}, those that differ most"
+    )
+    return html.table(pd.DataFrame(columns), caption, data=data)
+
+
+def comparisons(results: Results) -> HTML:
+    """Every policy against the best one."""
+    data = summary.comparisons(results)
+    return _compared(data, "policy", f"Differences to {data['baseline'].iloc[0]}")
+
+
+def learners(results: Results) -> HTML:
+    """Every learner against the best heuristic."""
+    data = summary.learned_against_heuristic(results)
+    caption = f"Learned policies: differences to {data['baseline'].iloc[0]}, the best heuristic"
+    return _compared(data, "learner", caption)
+
+
+def worst(results: Results, rows: pd.DataFrame) -> HTML:
+    """Missions that went worst.
+
+    Args:
+        results: The study.
+        rows: Of ``summary.worst``.
+    """
+    columns = {
+        "Replication": rows["replication"],
+        "Success": rows["success"].map({1: "yes", 0: "no"}),
+        "Collection ratio": rows["collection_ratio"].map(numbers.percent),
+        "Reward": rows["reward"].map(numbers.quantity),
+        "Command that simulates it again": rows["command"],
+    }
+    policy, point = rows["policy"].iloc[0], {*rows["point"]}
+    where = f", {settings.in_words(results)[point.pop()]}" if len(point) == 1 else ""
+    caption = f"The worst missions of {policy}{where}"
+    return html.table(pd.DataFrame(columns), caption, wrap=True, data=rows)
+
+
+def spread(distributions: pd.DataFrame, metric: str) -> HTML:
+    """How a metric spreads over missions.
+
+    Args:
+        distributions: Rows of ``analysis.distribution``.
+        metric: The metric.
+    """
+    heads = [
+        f"{numbers.level(row.share)} quantile"
+        if row.view == "quantile"
+        else f"Mean of the worst {numbers.level(row.share)}"
+        for row in distributions.itertuples()
+    ]
+    rows = distributions.assign(head=heads).rename(columns={"value": "mean"})
+    shown = numbers.wide(rows, "policy", "head", written(metric)).reset_index(names="Policy")
+    caption = f"Quantiles of {metric_name(metric).lower()} over missions, with {_LEVEL} intervals"
+    return html.table(shown, caption, data=distributions)
+
+
+def _settings(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Rows of ``settings.ranked`` as text."""
+    columns = {"Policy": rows["policy"], "Point": rows["point"]} | _fields(results, rows)
+    for name in metrics_of(metric):
+        ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy()
+        columns[metric_name(name)] = pd.Series([written(name)(*row) for row in ends], rows.index)
+    return pd.DataFrame(columns | {"Missions": rows["n"].map("{:,}".format)})
+
+
+def _fields(results: Results, rows: pd.DataFrame) -> dict[str, pd.Series]:
+    """The columns of the varied fields, as text, under their names."""
+    return {parameter(f).name: rows[f].map(value_text) for f in settings.varied(results)}
+
+
+def _means(rows: pd.DataFrame, caption: str) -> HTML:
+    """Rows of ``analysis.summary`` by policy: a column per metric."""
+    of_metrics = rows[rows["metric"].isin(METRICS)]
+    shown = numbers.wide(of_metrics, ["policy", "n"]).reset_index()
+    shown["n"] = shown["n"].map("{:,}".format)
+    shown = shown.rename(columns={"policy": "Policy", "n": "Missions", **METRICS})
+    return html.table(shown, caption, data=rows)
+
+
+def _compared(rows: pd.DataFrame, of: str, caption: str) -> HTML:
+    """Rows of ``analysis.compare``: differences in every metric."""
+    estimates = rows.rename(columns={"difference": "mean"})
+    shown = numbers.wide(estimates, of, write=numbers.points).rename(columns=METRICS)
+    p = rows[rows["metric"] == PRODUCT].set_index(of)["p_adjusted"]
+    shown["p of the product"] = p.map(numbers.p_value)
+    units = f"[percentage points], with {_LEVEL} intervals; p corrected for the number of"
+    caption = f"{caption} {units} comparisons and the choice of the best by these data"
+    return html.table(shown.reset_index(names=of.capitalize()), caption, data=rows)

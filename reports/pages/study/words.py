@@ -1,0 +1,102 @@
+"""Sentences of the page of a study, in Markdown: what was simulated, and what is the best."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
+from analysis.questions import settings, summary
+from analysis.results.tables import Results
+
+MOST_ROWS = 25  # of a table on the page; its data have all
+_MOST_VALUES = 12  # of a field in a list
+
+
+def metric_of(results: Results, metric: str | None = None) -> str:
+    """The metric that ranks the settings: the one given, that of the selection, or the product."""
+    selection = results.manifest["study"]["selection"] or {}
+    return metric or selection.get("metric", PRODUCT)
+
+
+def metrics_of(metric: str) -> list[str]:
+    """The metrics that the page shows: the one that ranks, and those of the paper."""
+    return [*dict.fromkeys((metric, *METRICS))]
+
+
+def written(metric: str) -> Callable[[float, float, float], str]:
+    """How an estimate of a metric and its interval are written."""
+    return numbers.interval if metric in METRICS else numbers.quantities
+
+
+def simulated(results: Results) -> str:
+    """What was simulated: scenario, policies, design and missions, as a list."""
+    manifest = results.store.manifest
+    study, points = manifest.study, len(manifest.points)
+    fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study["set"].items()]
+    missions = numbers.span(n for of_policy in manifest.missions for n in of_policy)
+    each = f" per policy{' and design point' * (points > 1)}"
+    lines = [
+        f"- **Scenario:** `{study['scenario']}`{', with ' * bool(fixed)}{numbers.words(fixed)}.",
+        f"- **Policies:** {numbers.words([f'`{policy}`' for policy in results.policies])}.",
+        *_design(results),
+        f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
+    ]
+    return "\n".join(lines)
+
+
+def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
+    """The best setting, and how many settings may be as good.
+
+    Args:
+        results: The study.
+        ranked: ``settings.ranked`` by the metric.
+        metric: The metric.
+    """
+    best, others, tied = ranked.iloc[0], len(ranked) - 1, int(ranked["tied"].sum()) - 1
+    value = written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
+    where = settings.in_words(results)[best["point"]]
+    what = "setting" if settings.varied(results) else "policy"
+    name = f"`{best['policy']}`" + f" with {where}" * (where != settings.AS_IT_IS)
+    if others == 1:
+        rest = f" The other {what} {'may be as good' if tied else 'is significantly worse'}."
+    elif not tied:
+        rest = f" All {others:,} others are significantly worse." if others else ""
+    else:
+        rest = (
+            f" Of the {others:,} others, {tied:,} may be as good; the rest are significantly worse."
+        )
+    return f"**The best {what} is {name}: {metric_name(metric).lower()} {value}.**{rest}"
+
+
+def guarantees(results: Results) -> str:
+    """What is known of the selections, as a list."""
+    rows = summary.selections(results).itertuples()
+    return "\n".join(f"- {row.policy}: {row.guarantee}" for row in rows)
+
+
+def _design(results: Results) -> Iterator[str]:
+    """The fields that the design varies, as items of the list."""
+    points = len(results.store.manifest.points)
+    kind = (results.manifest["study"]["design"] or {}).get("kind", "grid")
+    if fields := settings.varied(results):
+        yield f"- **Design:** `{kind}`, {points:,} design points. It varies:"
+    for field, values in fields.items():
+        unit = parameter(field).unit
+        yield f"    - {parameter(field).within}{f' [{unit}]' * bool(unit)}: {_values(values)}"
+
+
+def _values(values: Sequence[Any]) -> str:
+    """The values of a field, or their ends if they are many."""
+    texts = [value_text(value) for value in values]
+    if len(texts) <= _MOST_VALUES:
+        return ", ".join(texts)
+    return f"{len(texts):,} values, {texts[0]} to {texts[-1]}"
+
+
+def _set(value: Any) -> str:
+    """A value of the study's table ``set``; many cells are counted."""
+    if isinstance(value, list | tuple) and any(isinstance(item, list | tuple) for item in value):
+        return f"of {len(value)} cells"
+    return value_text(value)
