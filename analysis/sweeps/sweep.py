@@ -19,7 +19,7 @@ from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round
 from analysis.figures import settings as figures
 from analysis.names import PRODUCT
-from analysis.questions import settings
+from analysis.questions import costs, settings
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from analysis.sweeps.question import ask, folder_of, question
@@ -44,18 +44,42 @@ class Sweep:
         """The settings, a policy with values of the swept fields each, the best first.
 
         Args:
-            metric: Ranks them.
+            metric: Ranks them; ``cost`` is one, if there are prices.
 
         Returns:
-            Columns ``rank``, ``policy``, the swept fields, every metric with the ends of its 95 %
-            interval (``success``, ``success_low``, ``success_high``), the number of missions ``n``,
-            and ``tied``: not significantly worse than the best.
+            Columns ``rank``, ``policy``, ``point``, ``n`` missions, the swept fields, every metric
+            with the ends of its 95 % interval (``success``, ``success_low``, ``success_high``), and
+            ``tied``: whether the setting may be as good as the best. With prices also the ``cost``
+            with its interval, and with requirements the ``verdict`` (``met``, ``missed`` or
+            ``open``), and whether the setting is ``selected`` as the cheapest of its policy under
+            its condition.
         """
-        return settings.ranked(self.results, metric)
+        table = settings.ranked(self.results, metric)
+        if self.study.costs is None:
+            return table
+        priced = costs.judged(self.results) if self.study.selection else costs.priced(self.results)
+        key = ["policy", "point"]
+        more = [name for name in priced if name in key or name not in table]
+        return table.merge(priced[more], on=key, how="left")
 
-    def best(self, metric: str = PRODUCT) -> pd.Series:
-        """The best setting: the first row of the table."""
-        return self.table(metric).iloc[0]
+    def best(self, metric: str = PRODUCT) -> pd.DataFrame:
+        """The best setting of every policy, the best policy first.
+
+        With requirements: the cheapest settings that meet them, one for each policy under each
+        condition (swept fields that no operator decides on, such as the arrival rate); none, where
+        no setting is known to meet them.
+        """
+        table = self.table(metric)
+        if self.study.selection:
+            return table[table["selected"]].sort_values("point", kind="stable", ignore_index=True)
+        return table.drop_duplicates("policy", ignore_index=True)
+
+    def answers(self) -> list[str]:
+        """With requirements: the cheapest fleets that meet them, and why no cheaper one does."""
+        if not self.study.selection:
+            return []
+        lines = costs.answers(self.results, costs.judged(self.results))
+        return [line.replace("**", "") for line in lines]
 
     def plot(self, x: str, hue: str | None = None, metric: str = PRODUCT) -> Figure:
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.

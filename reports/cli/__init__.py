@@ -10,7 +10,7 @@ import typer
 from typer.exceptions import TyperException
 
 from dess import InputError
-from reports.cli import console, evaluate, lists, report, simulate, study, train
+from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
 
 INTERRUPTED = 130  # what typer returns after Ctrl-C
 
@@ -20,7 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for group in (simulate, evaluate, train, report, lists):
+for group in (simulate, evaluate, train, sweep, report, lists):
     app.add_typer(group.app)
 app.add_typer(study.app, name="study")
 

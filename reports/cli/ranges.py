@@ -1,0 +1,116 @@
+"""The values of a field on the command line of ``dess sweep``.
+
+values_of("uavs=2..5")  # ("uavs", (2, 3, 4, 5))
+values_of("arrival_rate=0.01..0.05:5")  # ("arrival_rate", (0.01, 0.02, 0.03, 0.04, 0.05))
+values_of("pads=1,2,4")  # ("pads", (1, 2, 4))
+values_of("initial_data=[5, 10],[10, 20]")  # ("initial_data", ([5, 10], [10, 20]))
+"""
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from dess import InputError
+from reports.cli.settings import setting
+
+ALLOWED = (
+    "a field of the scenario and its values: 2..5, 0.01..0.05:5 (five values), or 1,2,4 in TOML "
+    "syntax"
+)
+_RANGE = re.compile(r"(?P<low>[^\[\]'\",]*?)\.\.(?P<high>[^\[\]'\",:]*)(:(?P<count>.*))?")
+
+
+def all_values(texts: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+    """The values of all fields.
+
+    Raises:
+        InputError: If a text has another form, or a field is set twice.
+    """
+    return _once("--set", map(values_of, texts))
+
+
+def all_settings(texts: Iterable[str], option: str, allowed: str) -> dict[str, Any]:
+    """The keys and values of an option such as ``--price uav=20000``.
+
+    Raises:
+        InputError: If a text has another form, or a key is set twice.
+    """
+    return _once(option, (setting(text, option, allowed) for text in texts))
+
+
+def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
+    """A field and its values: one is fixed, several are swept.
+
+    Raises:
+        InputError: If the text has another form, or a range is none.
+    """
+    from analysis.sweeps.values import distinct
+    from dess import ScenarioSpace
+
+    field, equals, values = text.partition("=")
+    field = field.strip()
+    if equals and field not in ScenarioSpace.model_fields:
+        allowed = ", ".join(sorted(ScenarioSpace.model_fields))
+        raise InputError(f"--set: {field}: unknown key; allowed: {allowed}")
+    if found := _RANGE.fullmatch(values.strip()):
+        return field, distinct(field, _range(field, text, **found.groupdict()))
+    try:
+        listed = setting(f"{field}=[{values}]" if equals else text)[1]
+    except InputError:
+        raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
+    return field, distinct(field, listed)
+
+
+def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:
+    """The values of ``low..high`` or ``low..high:count``."""
+    from analysis.study.design import INTEGERS
+
+    first, last = _number(text, low), _number(text, high)
+    if first > last:
+        raise _refused(text, "is the wrong way round", f"{field}={high.strip()}..{low.strip()}")
+    if count is not None:
+        return _spaced(text, first, last, count, field in INTEGERS)
+    if field not in INTEGERS:
+        raise _refused(text, "has no number of values", f"{text}:5, for five of them")
+    if first % 1 or last % 1:
+        raise _refused(text, "has an end that is no integer", f"integers, as {field} has")
+    return range(int(first), int(last) + 1)
+
+
+def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bool) -> list[Any]:
+    """Evenly spaced numbers, both ends included."""
+    from analysis.study.design import MAX_SIZE
+
+    number = int(count) if count.strip().isdecimal() else 0
+    if not 2 <= number <= MAX_SIZE:
+        raise _refused(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
+    values = [first + (last - first) * place / (number - 1) for place in range(number)]
+    if is_integer:
+        if any(value % 1 for value in values):
+            raise _refused(text, f"has {number} values that are no integers", "another number")
+        return [int(value) for value in values]
+    return [float(value) for value in values]
+
+
+def _number(text: str, end: str) -> Decimal:
+    try:
+        number = Decimal(end.strip())
+        if abs(number) <= Decimal("1e300"):
+            return number
+    except InvalidOperation:
+        pass
+    raise _refused(text, f"has an end {end.strip()!r} that is no number", ALLOWED)
+
+
+def _refused(text: str, problem: str, allowed: str) -> InputError:
+    return InputError(f"--set: {text!r} {problem}; allowed: {allowed}")
+
+
+def _once(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise InputError(f"{option}: {key} is given twice; allowed: once")
+        found[key] = value
+    return found

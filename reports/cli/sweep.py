@@ -1,0 +1,159 @@
+"""``dess sweep``: every combination of values of some fields, from one line to a page."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from reports.cli import console
+from reports.cli.ranges import all_settings, all_values
+from reports.cli.running import YesOption, complete
+from reports.cli.settings import (
+    RESULTS,
+    JsonOption,
+    ScenarioOption,
+    SeedOption,
+    WorkersOption,
+)
+
+if TYPE_CHECKING:
+    from analysis.sweeps.sweep import Sweep
+
+SHOWN = 20  # rows of the table
+PRICE = "a price and its amount, e.g. uav=20000"
+SHARE = "a metric and its least mean, e.g. success=0.99"
+
+app = typer.Typer()
+
+
+@app.command()
+def sweep(
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUES",
+            help="The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. One value is "
+            "fixed, several are swept; repeatable.",
+        ),
+    ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(metavar="P,P,...", help="Policies to compare; repeatable.  [default: greedy]"),
+    ] = None,
+    missions: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            help="Missions per policy and setting; with --require, those that check the selected "
+            "settings.",
+        ),
+    ] = 300,
+    scenario: ScenarioOption = "paper",
+    seed: SeedOption = 0,
+    workers: WorkersOption = 1,
+    price: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KEY=AMOUNT",
+            help="A price: uav, pad, charge, hour or lost_uav; also currency, missions (that the "
+            "fleet is to fly) and slot_seconds; repeatable.",
+        ),
+    ] = None,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="METRIC=SHARE",
+            help="Look for the cheapest setting whose mean of a metric (success, ratio, product) "
+            "is at least this; repeatable.",
+        ),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="Name of the sweep.  [default: its fields and a hash]")
+    ] = None,
+    results: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder of the results, in sweeps/NAME.")
+    ] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the page.")] = Path(
+        "build/reports"
+    ),
+    yes: YesOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Simulate every combination of values, write a page, and print the ranked settings."""
+    from analysis.sweeps import question
+    from analysis.sweeps.sweep import Sweep
+
+    study = question.question(
+        all_values(settings or []),
+        scenario,
+        [name for text in policy or ["greedy"] for name in text.split(",")],
+        missions,
+        seed,
+        all_settings(map(_with_quotes, price or []), "--price", PRICE),
+        all_settings(require or [], "--require", SHARE),
+        name,
+    )
+    folder, file = question.folder_of(study, results), question.file_of(study, results)
+    found = complete(
+        study.name,
+        lambda progress, announce: question.ask(study, results, workers, progress, announce, yes),
+        f"dess study run {file} --out {folder}",
+    )
+    answer = Sweep(study, folder, found)
+    page = _page(folder, out)
+    if as_json:
+        _print_json(answer, page, file)
+    else:
+        _print(answer, page, file)
+
+
+def _page(folder: Path, out: Path) -> Path:
+    """Render the page of the sweep."""
+    from reports.pages.render import ReportError, render_study
+
+    try:
+        with console.counted_bar("step") as progress:
+            return render_study(folder, out, progress=progress)
+    except ReportError as error:
+        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
+
+
+def _print(answer: "Sweep", page: Path, file: Path) -> None:
+    """Print the first settings of the ranking, the cheapest ones, and where all of it is."""
+    from analysis import numbers
+    from analysis.names import COST, SHORT_METRICS, value_text
+    from analysis.questions.settings import varied
+
+    table, fields = answer.table(), [*varied(answer.results)]
+    heads = ["rank", "", "policy", *fields, *SHORT_METRICS.values(), *([COST] * (COST in table))]
+    rows = []
+    for row in table.head(SHOWN).to_dict("records"):
+        ends = [[row[m], row[f"{m}_low"], row[f"{m}_high"]] for m in SHORT_METRICS]
+        cost = [f"{row[COST]:,.0f}"] if COST in row else []
+        mark = "≈" if row["tied"] else ""
+        values = [value_text(row[field]) for field in fields]
+        metrics = [numbers.interval(*estimate) for estimate in ends]
+        rows.append([f"{row['rank']}", mark, row["policy"], *values, *metrics, *cost])
+    console.print_table(heads, rows)
+    more = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
+    print(f"{len(table):,} settings{more}; ≈: the product may be as good as that of the first")
+    for line in answer.answers():
+        print(line)
+    print(f"page: {page}", f"study: {file}", sep="\n")
+
+
+def _print_json(answer: "Sweep", page: Path, file: Path) -> None:
+    """Print all settings and where all of it is, as JSON."""
+    places = {"results": str(answer.path), "study_file": str(file), "page": str(page)}
+    answers, rows = answer.answers(), json.loads(answer.table().to_json(orient="records"))
+    about = {"study": answer.study.name, **places, "answers": answers, "table": rows}
+    print(json.dumps(about, indent=2))
+
+
+def _with_quotes(text: str) -> str:
+    """The name of a currency in TOML syntax."""
+    key, _, value = text.partition("=")
+    quoted = key.strip() != "currency" or value.strip().startswith(("'", '"'))
+    return text if quoted else f"{key}={json.dumps(value)}"
