@@ -102,7 +102,7 @@ def check_effort(
     accept_code: bool = False,
     reuse: Sequence[Path] = (),
     yes: bool = False,
-) -> None:
+) -> int:
     """Refuse a run of more than an hour or of very many design points, before these are made.
 
     Args:
@@ -114,13 +114,14 @@ def check_effort(
         reuse: As of ``run_study``.
         yes: Whether it may take as long as it takes.
 
+    Returns:
+        How many missions are missing; by a rule, at least that many.
+
     Raises:
         InputError: If it would take long, with the number of missions and the estimated time; if
             the folder holds something else, or there is no worker.
     """
     check_workers(workers)
-    if yes and study.size <= MAX_SIZE:
-        return
     teams = range(len(study.policies))
     if study.size > MANY_POINTS:
         missing = [study.size * study.first for _ in teams]
@@ -131,8 +132,8 @@ def check_effort(
             for source in sources(reuse, store.manifest):
                 store.count(source)
             missing = [_missing(study, store, team)[0] for team in teams]
-    if sum(missing) <= FEW:
-        return
+    if sum(missing) <= FEW or (yes and study.size <= MAX_SIZE):
+        return sum(missing)
     times = [missing[t] * _seconds_per_mission(study, t, clock) for t in teams if missing[t]]
     seconds = sum(times) / workers
     if study.size > MANY_POINTS or seconds > LONG_RUN:
@@ -143,6 +144,7 @@ def check_effort(
             f"({len(study.policies)} policies, {study.size:,} design points), about "
             f"{numbers.duration(seconds)} with {workers} at work; allowed: {confirmed}"
         )
+    return sum(missing)
 
 
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:

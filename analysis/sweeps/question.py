@@ -125,8 +125,8 @@ def ask(
     out = folder_of(study, folder)
     others = [path.parent for path in out.parent.glob(f"*/{MANIFEST}") if path.parent != out]
     _check_name(study, out)
-    check_effort(study, out, workers, reuse=sorted(others), yes=yes)
-    check_policies(study)
+    if check_effort(study, out, workers, reuse=sorted(others), yes=yes):
+        check_policies(study)
     write(study, folder)
     return run_study(study, out, workers, None, progress, announce, reuse=sorted(others))
 
