@@ -49,8 +49,8 @@ def test_a_file_is_read_back(tmp_path: Path) -> None:
     assert _load_text(space.to_toml(), tmp_path) == space
 
 
-def test_the_shipped_scenarios_are_the_papers() -> None:
-    assert scenario_names() == ["fig1", "fig4", "paper"]
+def test_the_shipped_scenarios_are_the_papers_and_a_bay() -> None:
+    assert scenario_names() == ["bay", "fig1", "fig4", "paper"]
     paper, fig4 = load_scenario("paper"), load_scenario("fig4")
     assert paper == ScenarioSpace.of()  # Section VI-A and Table II are the defaults
     assert (paper.uavs, paper.initial_data, paper.flying_time) == ((1, 3), (5.0, 20.0), (70, 80))
@@ -172,7 +172,7 @@ def test_bad_files_are_named(tmp_path: Path, content: bytes, complaint: str) -> 
 
 def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match="no such scenario; allowed: fig1, fig4, paper, or a TOML file"
+        InputError, match="no such scenario; allowed: bay, fig1, fig4, paper, or a TOML file"
     ):
         load_scenario("papper")
     with pytest.raises(InputError, match="cannot be read"):

@@ -170,3 +170,9 @@ def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     _csv(tmp_path, "x,y\n1,1\n")
     monkeypatch.setattr(sea, "MAX_BYTES", 7)
     refuse("buoys.csv", "buoys.csv: is too large; allowed: 7 bytes at most")
+
+
+def test_the_shipped_bay_has_its_nodes_beside_it() -> None:
+    bay = load_scenario("bay")
+    assert (len(bay.nodes), bay.grid, bay.quota) == (36, 40, 600)
+    assert bay.nodes[0] == (2, 2)  # B01, in the north-west

@@ -38,7 +38,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is not above n_step 60"),
     ({"replay": 4, "n_step": 3}, "replay: 4 is not above n_step 3 + 1"),
-    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: fig1, fig4, paper"),
+    ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: bay, fig1, fig4, paper"),
 ]
 
 

@@ -10,7 +10,7 @@ from tests.analysis.small import environment
 def test_names_are_listed(dess):
     for command, names in {
         "policies": ["random", "nearest", "greedy", "tour", *trained_names()],
-        "scenarios": ["fig1", "fig4", "paper"],
+        "scenarios": ["bay", "fig1", "fig4", "paper"],
         "studies": [
             *("charge-limits", "comparison", "explorer", "fig1", "fig4", "fig5", "precise"),
             *("screening", "sensitivity", "sweet-spot", "table4", "verification"),
