@@ -1,0 +1,208 @@
+"""A study as a research object: an RO-Crate that holds what it takes to judge and to repeat it.
+
+A zip with the results folder, its page, the study and its scenario as TOML files, and
+``ro-crate-metadata.json``, which says what each of them is, which code made it, and under which
+licence it may be used (RO-Crate 1.1, https://www.researchobject.org/ro-crate/specification/1.1/).
+In the unpacked folder ``dess study run study.toml --out results`` finds that all is there.
+"""
+
+from collections.abc import Mapping
+from datetime import date
+from importlib import metadata
+from io import StringIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import tomli_w
+from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
+from rocrate.model import ContextEntity, Dataset, File
+from rocrate.rocrate import ROCrate
+
+from analysis import numbers
+from analysis.results.store import MANIFEST
+from analysis.results.tables import Results
+from dess import InputError
+
+RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
+RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
+_SPDX, _PYPI = "https://spdx.org/licenses/", "https://pypi.org/project/"
+_PARQUET = "application/vnd.apache.parquet"
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip can have
+_TABLES = {
+    "missions": "A row per mission: its record.",
+    "uavs": "A row per UAV of every mission: its record.",
+    "events": "The event logs that the study keeps.",
+}
+
+
+def write_crate(results: Results, page: Path, path: Path, published: date, licence: str) -> None:
+    """Write a study as a zipped RO-Crate; equal arguments give equal bytes.
+
+    Args:
+        results: Of the study.
+        page: Its page.
+        path: Of the zip.
+        published: The date of the publication.
+        licence: Of the results, an identifier of SPDX (https://spdx.org/licenses).
+
+    Raises:
+        InputError: If there is no such licence, or a file of the results is damaged.
+    """
+    for damaged in results.store.damaged:
+        raise InputError(f"{damaged}: is not what was written; allowed: results without damage")
+    crate, study = ROCrate(version="1.1", gen_preview=True), results.manifest["study"]
+    root, software = crate.root_dataset, _software(crate, results)
+    root["name"], root["description"] = f"Study {study['name']}", _description(results)
+    root["datePublished"] = published.isoformat()
+    root["license"] = _licence(crate, licence_of(licence))
+    tables, documents = _tables(crate, results), _documents(crate, results)
+    html = _file(crate, page, page.name, "The page of the study, for a browser.", "text/html")
+    root["mentions"] = [
+        _action(crate, "run", RUN, software, documents, tables),
+        _action(crate, "report", REPORT, software, tables, html),
+    ]
+    with TemporaryDirectory() as folder:
+        crate.write(folder)
+        _zip(Path(folder), path)
+
+
+def licence_of(text: str) -> str:
+    """The identifier of a licence as SPDX writes it.
+
+    Raises:
+        InputError: If there is no such licence.
+    """
+    try:
+        licence = str(canonicalize_license_expression(text))
+    except InvalidLicenseExpression:
+        licence = ""
+    if not licence.replace("-", "").replace(".", "").isalnum() or "LicenseRef" in licence:
+        raise InputError(
+            f"--license: {text!r} is unknown; allowed: an identifier of {_SPDX[:-1]}, such as "
+            "MIT, CC-BY-4.0 or CC0-1.0"
+        )
+    return licence
+
+
+def study_files(manifest: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What the TOML files of a study and of its scenario hold.
+
+    Args:
+        manifest: Of the results, as plain data.
+
+    Returns:
+        The study, whose scenario is the file ``scenario.toml`` beside it, and that scenario.
+    """
+    study, scenario = _without_none(manifest["study"]), _without_none(manifest["scenario"])
+    if study.keys() & {"precision", "selection"}:
+        del study["missions"]  # which the rule decides
+    return study | {"scenario": SCENARIO}, scenario
+
+
+def _without_none(value: Any) -> Any:
+    """Data without the fields that are None, which TOML has not."""
+    if isinstance(value, Mapping):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value
+
+
+def _description(results: Results) -> str:
+    manifest, study = results.store.manifest, results.manifest["study"]
+    made = f"{len(results.missions):,} missions of {numbers.words(results.policies)}"
+    points = f"{len(manifest.points):,} design point{'s' if len(manifest.points) > 1 else ''}"
+    simulated = f"{made} at {points}, simulated by dess {manifest.version}."
+    return " ".join(filter(None, [_sentence(study["description"]), simulated]))
+
+
+def _sentence(text: str) -> str:
+    return f"{text}." if text and text[-1] not in ".?!" else text
+
+
+def _licence(crate: ROCrate, identifier: str) -> ContextEntity:
+    """The licence of the results."""
+    about = {"name": identifier, "description": f"{identifier} of the SPDX License List"}
+    return crate.add_jsonld({"@id": f"{_SPDX}{identifier}", "@type": "CreativeWork", **about})
+
+
+def _software(crate: ROCrate, results: Results) -> ContextEntity:
+    """The version of dess that made the results, and the libraries that it used."""
+    manifest, about = results.store.manifest, metadata.metadata("dess")
+    authors = {"@id": "#authors", "@type": "Organization", "name": about["Author"]}
+    dess: dict[str, Any] = {
+        "@id": "#dess",
+        "@type": "SoftwareApplication",
+        "name": "dess",
+        "description": about["Summary"],
+        "version": manifest.version,
+        "author": crate.add_jsonld(authors),
+        "license": f"{_SPDX}{about['License-Expression']}",
+        "softwareRequirements": [_library(crate, *pair) for pair in manifest.libraries.items()],
+    }
+    if manifest.commit:
+        commit = {"name": "Commit of the source", "propertyID": "git", "value": manifest.commit}
+        dess["identifier"] = crate.add_jsonld(
+            {"@id": "#commit", "@type": "PropertyValue", **commit}
+        )
+    return crate.add_jsonld(dess)
+
+
+def _library(crate: ROCrate, name: str, version: str) -> ContextEntity:
+    url = "https://www.python.org/" if name == "python" else f"{_PYPI}{name}/"
+    about = {"name": name, "version": version, "url": url}
+    return crate.add_jsonld({"@id": f"#{name}", "@type": "SoftwareApplication", **about})
+
+
+def _tables(crate: ROCrate, results: Results) -> Dataset:
+    """The results folder, without what a run may leave beside the results."""
+    folder = results.store.folder
+    about = {"name": "Results", "description": "A results folder, as dess study show reads it."}
+    tables = crate.add_dataset(dest_path=f"{RESULTS}/", properties=about)
+    manifest = "What the results are about, and what they were made with."
+    parts = [_file(crate, folder / MANIFEST, f"{RESULTS}/{MANIFEST}", manifest, "application/json")]
+    for name, description in _TABLES.items():
+        about = {"name": name, "description": description, "encodingFormat": _PARQUET}
+        parts.append(crate.add_dataset(folder / name, f"{RESULTS}/{name}/", properties=about))
+    tables["hasPart"] = parts
+    return tables
+
+
+def _documents(crate: ROCrate, results: Results) -> list[File]:
+    """The study and its scenario as TOML files, and the licence of dess."""
+    study, scenario = map(tomli_w.dumps, study_files(results.manifest))
+    licence = metadata.distribution("dess").read_text("licenses/LICENSE") or ""
+    _file(crate, StringIO(licence), "LICENSE", "The licence of dess.", "text/plain")
+    return [
+        _file(crate, StringIO(study), STUDY, "The study.", "application/toml"),
+        _file(crate, StringIO(scenario), SCENARIO, "Its scenario.", "application/toml"),
+    ]
+
+
+def _file(crate: ROCrate, source: Path | StringIO, path: str, description: str, kind: str) -> File:
+    about = {"name": Path(path).name, "description": description, "encodingFormat": kind}
+    return crate.add_file(source, path, properties=about, record_size=True)
+
+
+def _action(
+    crate: ROCrate,
+    name: str,
+    command: str,
+    software: ContextEntity,
+    used: list[File] | Dataset,
+    made: File | Dataset,
+) -> ContextEntity:
+    """A command that has made a part of the crate, for the unpacked crate."""
+    about = {"name": command, "description": f"In the unpacked folder: {command}"}
+    return crate.add_action(software, f"#{name}", used, made, about)
+
+
+def _zip(folder: Path, path: Path) -> None:
+    """Zip a folder; the bytes depend on nothing but its files."""
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for part in sorted(folder.rglob("*")):
+            name = part.relative_to(folder).as_posix()
+            entry = ZipInfo(f"{name}/" if part.is_dir() else name, _EPOCH)
+            entry.compress_type = ZIP_DEFLATED
+            entry.external_attr = (0o40755 if part.is_dir() else 0o100644) << 16  # permissions
+            archive.writestr(entry, b"" if part.is_dir() else part.read_bytes())

@@ -1,0 +1,180 @@
+"""A study is exported as an RO-Crate that validators accept, and that has all of it."""
+
+import json
+from datetime import date
+from importlib.resources import files
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+import requests
+from rocrate_validator import services
+from rocrate_validator.utils.http import HttpRequester
+
+from analysis import load_results, load_study, run_study
+from analysis.results.manifest import Manifest
+from analysis.results.tables import Results
+from dess import InputError
+from reports.crate import licence_of, write_crate
+from tests.analysis.small import files_of, grid, small_study
+
+DAY = date(2026, 3, 14)
+STUDIES = {
+    "plain": {"logged": 1, "description": "Does it last?"},
+    "grid": {"design": grid(quota=[20, 60], pads=[1, 2]), "policies": ["greedy,random", "tour"]},
+    "hypercube": {
+        "design": {"kind": "latin-hypercube", "size": 3, "seed": 1, "ranges": {"quota": [20, 60]}}
+    },
+    "precision": {"precision": {"budget": 90, "targets": {"success": {"absolute": 0.3}}}},
+    "selection": {
+        "selection": {"procedure": "kn", "first": 8, "indifference": 0.1, "budget": 900},
+        "design": {"kind": "table", "rows": [{"quota": 20}, {"quota": 60, "uavs": [1, 2]}]},
+    },
+    "costs": {"costs": {"uav": 3, "currency": "EUR"}, "set": {"arrival_rate": 0.01}},
+}
+
+
+def results_of(folder: Path, name: str = "plain") -> Results:
+    run_study(small_study(folder, **STUDIES[name]), folder / "out")
+    return load_results(folder / "out")
+
+
+def exported(folder: Path, results: Results, name: str = "crate.zip", licence="CC-BY-4.0") -> Path:
+    """A crate of the results, with a page."""
+    page = folder / "study-trial.html"
+    page.write_text("<!doctype html><title>trial</title>", "utf-8")
+    write_crate(results, page, folder / name, DAY, licence)
+    return folder / name
+
+
+def graph_of(crate: Path) -> dict[str, dict]:
+    """The entities of a crate by their identifiers."""
+    with ZipFile(crate) as archive:
+        metadata = json.loads(archive.read("ro-crate-metadata.json"))
+    return {entity["@id"]: entity for entity in metadata["@graph"]}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_what_is_unpacked_is_the_study(name, tmp_path):
+    """The results load as they were, and the TOML files are the study that made them."""
+    results = results_of(tmp_path, name)
+    crate = exported(tmp_path, results)
+    with ZipFile(crate) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    there = load_results(tmp_path / "unpacked" / "results")
+    for table in ("missions", "uavs", "checks"):
+        assert getattr(there, table).equals(getattr(results, table))
+    assert there.manifest == results.manifest
+    assert len(there.store.logged) == len(results.store.logged)
+    again = Manifest.of(load_study(tmp_path / "unpacked" / "study.toml"))
+    made = results.store.manifest
+    assert again.scenario == made.scenario
+    assert again.points == made.points
+    assert again.cells == made.cells
+    assert again.study | {"scenario": ""} == made.study | {"scenario": ""}
+
+
+def test_the_study_is_simulated_again_from_what_is_unpacked(tmp_path):
+    """Or found to be there: nothing is missing, and no file changes but the scenario's name."""
+    crate = exported(tmp_path, results_of(tmp_path))
+    with ZipFile(crate) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    before = files_of(tmp_path / "unpacked" / "results")
+    run_study(load_study(tmp_path / "unpacked" / "study.toml"), tmp_path / "unpacked" / "results")
+    after = files_of(tmp_path / "unpacked" / "results")
+    del before["manifest.json"], after["manifest.json"]
+    assert after == before
+
+
+def test_what_a_run_leaves_beside_its_results_is_left_out(tmp_path):
+    results = results_of(tmp_path)
+    (tmp_path / "out" / ".lock").touch()
+    (tmp_path / "out" / "failures" / "x.json").write_text("{}")
+    with ZipFile(exported(tmp_path, results)) as archive:
+        names = archive.namelist()
+    assert not [name for name in names if "lock" in name or "failures" in name]
+    assert {name.split("/")[0] for name in names} == {
+        *("LICENSE", "results", "ro-crate-metadata.json", "ro-crate-preview.html"),
+        *("scenario.toml", "study-trial.html", "study.toml"),
+    }
+
+
+def test_equal_exports_are_equal_bytes(tmp_path):
+    results = results_of(tmp_path)
+    one, two = (exported(tmp_path, results, name) for name in ("one.zip", "two.zip"))
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_the_metadata_say_what_it_is_and_what_made_it(tmp_path):
+    results = results_of(tmp_path)
+    graph = graph_of(exported(tmp_path, results))
+    root, manifest = graph["./"], results.store.manifest
+    assert root["name"] == "Study trial"
+    assert root["datePublished"] == "2026-03-14"
+    assert root["license"] == {"@id": "https://spdx.org/licenses/CC-BY-4.0"}
+    words = "20 missions of greedy and random at 1 design point, simulated by dess"
+    assert root["description"] == f"Does it last? {words} {manifest.version}."
+    assert graph["#dess"]["version"] == manifest.version
+    assert graph["#numpy"]["version"] == manifest.libraries["numpy"]
+    assert len(graph["#dess"]["softwareRequirements"]) == len(manifest.libraries)
+    assert graph["#commit"]["value"] == manifest.commit
+    assert graph["#run"]["name"] == "dess study run study.toml --out results"
+    assert graph["#run"]["result"] == {"@id": "results/"}
+    assert graph["#report"]["result"] == {"@id": "study-trial.html"}
+
+
+# What a crate should tell as well, and only who publishes it knows.
+OF_THE_PUBLISHER = {
+    "The Root Data Entity SHOULD have a link to a Contextual Entity representing the `author` of "
+    "the RO-Crate",
+    "The `publisher` property of a `Root Data Entity` SHOULD be an `Organization`",
+    "The organization SHOULD have a URL.",
+}
+
+
+@pytest.mark.filterwarnings("ignore:ConjunctiveGraph is deprecated")
+@pytest.mark.parametrize("name", ["plain", "grid"])
+@pytest.mark.parametrize(
+    "severity, known", [("REQUIRED", set()), ("RECOMMENDED", OF_THE_PUBLISHER)]
+)
+def test_a_validator_accepts_it(name, severity, known, tmp_path, monkeypatch):
+    """The validator reads the context that the library rocrate has, not that of the network."""
+
+    def context(self, url, **options):
+        assert url == "https://w3id.org/ro/crate/1.1/context"
+        response = requests.Response()
+        response.status_code, response.url = 200, url
+        response.headers["Content-Type"] = "application/ld+json"
+        response._content = files("rocrate").joinpath("data/ro-crate.jsonld").read_bytes()
+        return response
+
+    monkeypatch.setattr(HttpRequester, "get", context, raising=False)
+    crate = exported(tmp_path, results_of(tmp_path, name))
+    settings = services.ValidationSettings(
+        rocrate_uri=str(crate),
+        profile_identifier="ro-crate-1.1",
+        requirement_severity=services.Severity[severity],
+    )
+    issues = services.validate(settings).get_issues()
+    known = OF_THE_PUBLISHER if severity == "RECOMMENDED" else set()
+    assert {issue.message for issue in issues} == known
+
+
+@pytest.mark.parametrize("licence", ["mit", "CC0-1.0", "cc-by-sa-4.0"])
+def test_licences_are_those_of_spdx(licence):
+    assert licence_of(licence).lower() == licence.lower()
+
+
+@pytest.mark.parametrize("licence", ["", "none", "MIT OR Apache-2.0", "LicenseRef-mine", "<b>"])
+def test_other_licences_are_refused(licence):
+    with pytest.raises(InputError, match="is unknown; allowed: an identifier of https://spdx.org"):
+        licence_of(licence)
+
+
+def test_damaged_results_are_not_exported(tmp_path):
+    results = results_of(tmp_path)
+    log = next((tmp_path / "out" / "events").rglob("*.parquet"))
+    log.write_bytes(log.read_bytes()[:-1])
+    with pytest.raises(InputError, match="is not what was written"):
+        exported(tmp_path, load_results(tmp_path / "out"))
+    assert results.store.damaged == []
