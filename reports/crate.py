@@ -21,9 +21,13 @@ from rocrate.model import ContextEntity, Dataset, File
 from rocrate.rocrate import ROCrate
 
 from analysis import numbers
+from analysis.results.evidence import Evidence
 from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from dess import InputError
+from reports.pages.html import STUDY as EVIDENCE
+from reports.pages.html import embedded
+from reports.pages.verify import is_sealed
 
 RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
@@ -66,6 +70,22 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     with TemporaryDirectory() as folder:
         crate.write(folder)
         _zip(Path(folder), path)
+
+
+def check_page(page: Path, results: Results) -> None:
+    """Refuse a file that is not the page of the results, as ``dess report`` wrote it.
+
+    Raises:
+        InputError: If it is none, shows other results, or has been altered.
+    """
+    allowed = f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
+    try:
+        html = page.read_bytes().decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{page}: cannot be read: {error}; {allowed}") from None
+    keys = [Evidence.parse(text, str(page), allowed).key for text in embedded(EVIDENCE, html)]
+    if keys != [results.store.manifest.key] or not is_sealed(html):
+        raise InputError(f"{page}: does not show the results of this study; {allowed}")
 
 
 def licence_of(text: str) -> str:
