@@ -78,7 +78,9 @@ def check_page(page: Path, results: Results) -> None:
     Raises:
         InputError: If it is none, shows other results, or has been altered.
     """
-    allowed = f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
+    allowed = (
+        f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
+    )
     try:
         html = page.read_bytes().decode()
     except (OSError, UnicodeDecodeError) as error:

@@ -1,12 +1,15 @@
-"""``dess study``: run a study into a results folder, and show its results."""
+"""``dess study``: run a study into a results folder, show its results, bundle them."""
 
 import json
+from datetime import date
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
 
 from dess import InputError
+from dess.files import replacing
 from reports.cli import console, diff
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
@@ -123,3 +126,31 @@ def show(
         return
     study_tables.print_summary(results, folder, short=False)
     study_tables.print_details(results, tables)
+
+
+@app.command("export")
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A results folder.")],
+    crate: Annotated[Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write.")],
+    page: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Its page.  [default: it is rendered for the crate]"),
+    ] = None,
+    licence: Annotated[
+        str, typer.Option("--license", metavar="ID", help="Of the results, as SPDX names it.")
+    ] = "MIT",
+) -> None:
+    """Bundle results, page, study and scenario as a research object (RO-Crate)."""
+    from analysis.results.tables import load_results
+    from reports.crate import check_page, licence_of, write_crate
+    from reports.pages.render import render_study
+
+    results, licence = load_results(folder), licence_of(licence)
+    if page:
+        check_page(page, results)
+    with replacing(crate) as temporary, TemporaryDirectory() as pages:
+        if page is None:
+            with rendering() as progress:
+                page = render_study(folder, pages, progress)
+        write_crate(results, page, temporary, date.today(), licence)
+    print(f"{crate}: {len(results.missions):,} missions with {page.name}, licence {licence}")

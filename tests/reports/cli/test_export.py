@@ -1,0 +1,57 @@
+"""``dess study export``: a results folder with its page as one file."""
+
+from zipfile import ZipFile
+
+import pytest
+
+from tests.analysis.small import files_of
+
+
+@pytest.fixture
+def run(dess):
+    """The command, after a study has been run."""
+    assert dess("study", "run", "trial.toml", "--out", "out")[0] == 0
+    return dess
+
+
+def test_results_and_page_are_bundled(run, tmp_path):
+    """The page is that of dess report, and may be given."""
+    code, out, err = run("study", "export", "out", "--crate", "a.zip", "--license", "cc0-1.0")
+    assert (code, out) == (0, "a.zip: 20 missions with study-trial.html, licence CC0-1.0\n")
+    with ZipFile("a.zip") as archive:
+        archive.extractall("unpacked")
+    assert run("study", "diff", "out", "unpacked/results")[1] == "identical: 20 missions\n"
+    page = tmp_path / "unpacked" / "study-trial.html"
+    assert run("verify", page)[0] == 0
+    arguments = ("--crate", "b.zip", "--license", "CC0-1.0", "--page", page)
+    assert run("study", "export", "out", *arguments) == (0, out.replace("a.zip", "b.zip"), "")
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+    for old, new in {"</html>": "<br></html>", "dess-study": "dess-studies"}.items():
+        (tmp_path / "other.html").write_text(page.read_text("utf-8").replace(old, new), "utf-8")
+        refused(run, tmp_path, "out --crate c.zip --page other.html", "does not show the results")
+
+
+# Arguments, and what the line on stderr must name.
+BAD = {
+    "out": "Missing option '--crate'",
+    "out --crate out": "out: is a folder",
+    "out --crate none/a.zip": "none/a.zip: cannot be written",
+    "out --crate a.zip --license mine": "--license: 'mine' is unknown; allowed: an identifier of",
+    "out --crate a.zip --page none.html": "none.html: cannot be read",
+    "out --crate a.zip --page small.toml": "small.toml: does not show the results of this study",
+    "none --crate a.zip": "none/manifest.json: no such file",
+    "small.toml --crate a.zip": "small.toml/manifest.json: no such file",
+}
+
+
+@pytest.mark.parametrize("arguments", BAD)
+def test_what_cannot_be_exported_gets_one_line_and_leaves_nothing(arguments, run, tmp_path):
+    refused(run, tmp_path, arguments, BAD[arguments])
+
+
+def refused(run, folder, arguments, words):
+    before = files_of(folder)
+    code, out, err = run("study", "export", *arguments.split())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+    assert files_of(folder) == before
