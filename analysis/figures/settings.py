@@ -30,7 +30,7 @@ from analysis.names import (
 from analysis.questions import settings
 from analysis.results.tables import Results
 
-MOST_PANELS = 9  # values of a third field that have a panel of their own
+MOST_PANELS = 12  # values of a third field that have a panel of their own
 MOST_TICKS = 12
 MARK = "#d55e00"  # of the best cell, and those that are not significantly worse
 COLUMNS = 3  # of panels
@@ -290,7 +290,7 @@ def _name_ticks(axis: XAxis | YAxis, values: Sequence[Any], most: int, first: fl
     names = [value_text(values[place]) for place in places]
     axis.set_ticks([place + first for place in places], names)
     spec = axis.axes.get_subplotspec()
-    if isinstance(axis, XAxis) and spec and sum(map(len, names)) > 55 / spec.get_gridspec().ncols:
+    if isinstance(axis, XAxis) and spec and sum(map(len, names)) > 44 / spec.get_gridspec().ncols:
         axis.set_tick_params(rotation=30)
 
 

@@ -40,7 +40,7 @@ metrics, called = words.metrics_of(by), names.metric_name(by).lower()
 # %%
 html.say("{simulated}", simulated=words.simulated(study))
 
-# %% [markdown]
+# %% [markdown] tags=["if-ranked"]
 # Every policy meets the same replications at every design point, which have the same realisation
 # of all random draws. So missions are compared one by one, and what they share drops out.
 
@@ -68,7 +68,8 @@ display(html.gallery(drawings.means(study, metrics)), tables.means(study))
 # ## The selection
 #
 # A rule of the study decided how many missions each setting was worth, until one was selected for
-# every policy. Settings with few missions were ruled out early.
+# every policy. Settings with few missions were ruled out early. Its promise is the one below; what
+# *may be the best* above is judged by the replications that two settings have in common.
 
 # %% tags=["if-selection"]
 display(
@@ -148,11 +149,17 @@ display(
     html.say("Every policy at its best setting by {metric}:", metric=called),
     html.gallery(drawings.distribution(missions, by)),
     tables.spread(spread, by),
-    tables.worst(study, summary.worst(study, best["policy"], point=best["point"])),
 )
+worst = summary.worst(study, best["policy"], point=best["point"])
 
 # %% tags=["if-sensitivity"]
-tables.worst(study, summary.worst(study, summary.best_policy(study.missions)))
+worst = summary.worst(study, summary.best_policy(study.missions))
+
+# %%
+display(
+    tables.worst(study, worst),
+    html.say("These simulate them again:\n\n{lines}", lines=html.commands(worst["command"])),
+)
 
 # %% [markdown]
 # ## Where the figures come from

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from analysis import numbers
-from analysis.names import parameter
 from analysis.questions import summary
 from analysis.questions.settings import varied
 from analysis.results.tables import Results, load_results
@@ -32,9 +31,9 @@ def report_of(folder: Path, notebooks: Path = SHIPPED) -> Report:
     original.cells = [
         cell for cell in original.cells if all(kept.get(tag, True) for tag in tags_of(cell))
     ]
-    fields = numbers.words([parameter(field).within for field in varied(results)])
-    against = f", by {fields}" if fields else ""
-    description = study["description"] or f"{numbers.words(results.policies)}{against}."
+    points = len(results.store.manifest.points)
+    where = f"{points:,} design points" if points > 1 else f"the scenario {study['scenario']}"
+    description = study["description"] or f"{numbers.words(results.policies)} at {where}."
     original.cells[0].source = f"# Study {study['name']}\n\n{description}"
     return notebook.report_of(f"{PREFIX}{study['name']}", original)
 

@@ -146,7 +146,7 @@ def learners(results: Results) -> HTML:
 
 
 def worst(results: Results, rows: pd.DataFrame) -> HTML:
-    """Missions that went worst.
+    """Missions that went worst; ``html.commands`` has the commands that simulate them again.
 
     Args:
         results: The study.
@@ -157,12 +157,11 @@ def worst(results: Results, rows: pd.DataFrame) -> HTML:
         "Success": rows["success"].map({1: "yes", 0: "no"}),
         "Collection ratio": rows["collection_ratio"].map(numbers.percent),
         "Reward": rows["reward"].map(numbers.quantity),
-        "Command that simulates it again": rows["command"],
     }
     policy, point = rows["policy"].iloc[0], {*rows["point"]}
     where = f", {settings.in_words(results)[point.pop()]}" if len(point) == 1 else ""
     caption = f"The worst missions of {policy}{where}"
-    return html.table(pd.DataFrame(columns), caption, wrap=True, data=rows)
+    return html.table(pd.DataFrame(columns), caption, data=rows)
 
 
 def spread(distributions: pd.DataFrame, metric: str) -> HTML:
