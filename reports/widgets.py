@@ -107,7 +107,7 @@ class WhatIfPanel(widgets.VBox):
             name = names.parameter(field)
             label = f"{name.plain} [{name.unit}]".removesuffix(" []")
             cells += [widgets.Label(label), slider, self.variation[field]]
-        columns = "minmax(8rem, 18rem) repeat(2, minmax(12rem, 22rem))"
+        columns = "max-content repeat(2, minmax(12rem, 22rem))"
         return widgets.GridBox(cells, layout={"grid_template_columns": columns})
 
 
