@@ -4,14 +4,18 @@ import re
 from pathlib import Path
 from typing import Any
 
+import nbformat
 import pandas as pd
 import pytest
+from nbclient import NotebookClient
 from scipy import stats
 
 from analysis import load_results, numbers
+from analysis import what_if as ask
 from analysis.names import METRICS
 from analysis.questions.what_if import answer as what_if_answer
 from analysis.questions.what_if import question as what_if
+from reports.pages.notebook import read
 from tests.analysis.small import write_scenario
 from tests.reports.small import said_by
 
@@ -75,3 +79,23 @@ def test_the_missions_shown_can_be_simulated_again(text: str, results: Any) -> N
     for choose in (what_if_answer.typical, what_if_answer.worst):
         for point in (what_if.BASELINE, what_if.VARIATION):
             assert results.command(policy, point, choose(results, policy)) in text
+
+
+def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
+    """In Jupyter, from top to bottom, with sliders in the end."""
+    values = {"scenario": str(write_scenario(tmp_path)), **ASKED}
+    text = read(NAME).for_jupyter(tmp_path / "results", tmp_path, values)
+    notebook = nbformat.reads(text, as_version=4)
+    cell = next(cell for cell in notebook.cells if cell.cell_type == "code")
+    assert "settings = {'uavs': 5, 'pads': 2}  # fields of the scenario" in cell.source
+    assert "scenario = 'small.toml'" in cell.source
+    cell.source = cell.source.replace("{'uavs': 5, 'pads': 2}", "{'quota': 30}")
+    NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    given = {name: value for name, value in ASKED.items() if name != "settings"}
+    asked = ask(
+        {"quota": 30}, scenario=tmp_path / "small.toml", folder=tmp_path / "results", **given
+    )
+    outputs = [o for c in notebook.cells if c.cell_type == "code" for o in c.outputs]
+    shown = [output.data for output in outputs if output.output_type == "execute_result"]
+    assert asked.answer() in [data.get("text/markdown") for data in shown]
+    assert "application/vnd.jupyter.widget-view+json" in shown[-1]
