@@ -94,6 +94,12 @@ class Grid:
         """The rows of ``means`` of the design point ``start``."""
         return self.means[self.means["point"] == self.start]
 
+    def table(self) -> pd.DataFrame:
+        """The means of all settings: the fields, then the columns of ``analysis.summary``."""
+        return self.means.join(points(self.results), on="point")[
+            [*self._places, "policy", "metric", "mean", "low", "high", "n"]
+        ]
+
     def settings(self, field: str) -> list[str]:
         """How ``--set`` has the values of a field: ``initial_data=[5, 7.5]``."""
         first = self._places.reset_index().groupby(field)["index"].first()

@@ -68,6 +68,10 @@ html.gallery(
     ]
 )
 
+# %%
+table = numbers.wide(start, "policy").rename(columns=names.METRICS).reset_index(names="Policy")
+html.table(table, "The same in numbers. CSV: all settings of the grid", data=grid.table())
+
 # %% [markdown]
 # ## Where the figures come from
 

@@ -150,6 +150,17 @@ def test_the_grid_starts_in_the_middle(results: Results) -> None:
     assert results.store.manifest.points[Grid(results).start].values == values
 
 
+def test_the_table_has_every_setting(results: Results) -> None:
+    table = Grid(results).table()
+    assert len(table) == 12 * len(POLICIES) * len(METRICS)
+    row = table[(table["uavs"] == 3) & (table["charge_complete"] == 40)]
+    row = row[(row["initial_data"] == "1–2") & (row["policy"] == "random")].set_index("metric")
+    for metric in METRICS:
+        exact = estimate(results, (2, 0, 0), "random", metric)
+        shown = row.loc[metric, ["mean", "low", "high"]].to_numpy(float)
+        assert 100 * shown == pytest.approx(exact)
+
+
 def test_the_same_results_give_the_same_bytes(results: Results) -> None:
     assert explorer(results).data == explorer(results).data
 
