@@ -8,8 +8,10 @@ import typer
 
 from reports.cli import console
 from reports.cli.ranges import all_settings, all_values
+from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import (
+    PAGES,
     RESULTS,
     JsonOption,
     ScenarioOption,
@@ -75,15 +77,14 @@ def sweep(
     results: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder of the results, in sweeps/NAME.")
     ] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the page.")] = Path(
-        "build/reports"
-    ),
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the page.")] = PAGES,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate every combination of values, write a page, and print the ranked settings."""
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
+    from reports.pages.render import render_study
 
     study = question.question(
         all_values(settings or []),
@@ -102,22 +103,12 @@ def sweep(
         f"dess study run {file} --out {folder}",
     )
     answer = Sweep(study, folder, found)
-    page = _page(folder, out)
+    with rendering() as steps:
+        page = render_study(folder, out, steps)
     if as_json:
         _print_json(answer, page, file)
     else:
         _print(answer, page, file)
-
-
-def _page(folder: Path, out: Path) -> Path:
-    """Render the page of the sweep."""
-    from reports.pages.render import ReportError, render_study
-
-    try:
-        with console.counted_bar("step") as progress:
-            return render_study(folder, out, progress=progress)
-    except ReportError as error:
-        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
 
 
 def _print(answer: "Sweep", page: Path, file: Path) -> None:
@@ -126,12 +117,12 @@ def _print(answer: "Sweep", page: Path, file: Path) -> None:
     from analysis.names import COST, SHORT_METRICS, value_text
     from analysis.questions.settings import varied
 
-    table, fields = answer.table(), [*varied(answer.results)]
-    heads = ["rank", "", "policy", *fields, *SHORT_METRICS.values(), *([COST] * (COST in table))]
+    table, fields, prices = answer.table(), [*varied(answer.results)], answer.study.costs
+    heads = ["rank", "", "policy", *fields, *SHORT_METRICS.values(), *([COST] if prices else [])]
     rows = []
     for row in table.head(SHOWN).to_dict("records"):
         ends = [[row[m], row[f"{m}_low"], row[f"{m}_high"]] for m in SHORT_METRICS]
-        cost = [f"{row[COST]:,.0f}"] if COST in row else []
+        cost = [numbers.money(row[COST], prices.currency)] if prices else []
         mark = "≈" if row["tied"] else ""
         values = [value_text(row[field]) for field in fields]
         metrics = [numbers.interval(*estimate) for estimate in ends]

@@ -1,0 +1,65 @@
+"""Values of fields on the command line."""
+
+import pytest
+
+from dess import InputError
+from reports.cli.ranges import values_of
+
+VALUES = {
+    "uavs=2..5": (2, 3, 4, 5),
+    "uavs = 2 .. 5": (2, 3, 4, 5),
+    "uavs=3..3": (3,),
+    "uavs=3": (3,),
+    "uavs=[1,3]": ([1, 3],),
+    "uavs=1,3": (1, 3),
+    "quota=100..600:6": (100, 200, 300, 400, 500, 600),
+    "arrival_rate=0.01..0.05:5": (0.01, 0.02, 0.03, 0.04, 0.05),
+    "arrival_rate=1e-3..1e-2:2": (0.001, 0.01),
+    "reward_data=-1..1:3": (-1.0, 0.0, 1.0),
+    "initial_data=[5, 20]": ([5, 20],),
+    "initial_data=5, 20": (5, 20),
+    "initial_data=[5, 10],[10, 20]": ([5, 10], [10, 20]),
+    "forbid_swaps=false,true": (False, True),
+}
+
+
+@pytest.mark.parametrize("text", VALUES)
+def test_values(text):
+    field, values = values_of(text)
+    assert field == text.split("=")[0].strip()
+    assert values == VALUES[text]
+    assert [type(value) for value in values] == [type(value) for value in VALUES[text]]
+
+
+REFUSED = {
+    "uavs": "'uavs' is not KEY=VALUES; allowed: a field",
+    "uavs=": "uavs: has no values",
+    "uavs=2,,3": "'uavs=2,,3' is not KEY=VALUES",
+    "uavs=two": "'uavs=two' is not KEY=VALUES",
+    "uavs=1]\nquota=[2": "is not KEY=VALUES",
+    "uavs=2,3,2": "uavs: 2 is listed twice",
+    "uavz=2..3": "uavz: unknown key; allowed: altitude",
+    "uavs=5..2": "'uavs=5..2' is the wrong way round; allowed: uavs=2..5",
+    "arrival_rate=0.5..0.1:3": "is the wrong way round",
+    "uavs=a..3": "has an end 'a' that is no number",
+    "uavs=..3": "has an end '' that is no number",
+    "uavs=2..": "has an end '' that is no number",
+    "uavs=nan..3": "has an end 'nan' that is no number",
+    "uavs=1..1e999999": "has an end '1e999999' that is no number",
+    "uavs=1.5..3": "has an end that is no integer; allowed: integers, as uavs has",
+    "arrival_rate=0.01..0.05": "has no number of values; allowed: arrival_rate=0.01..0.05:5",
+    "uavs=2..5:1": "has no number of values; allowed: 2 to",
+    "uavs=2..5:x": "has no number of values; allowed: 2 to",
+    "uavs=2..5:-3": "has no number of values; allowed: 2 to",
+    "arrival_rate=0..1:1000000000": "has no number of values; allowed: 2 to 1,048,576",
+    "quota=2..5:3": "has 3 values that are no integers",
+    "quota=1..99999999999": "quota: has 99,999,999,999 values; allowed: 1 to 1,048,576",
+    "arrival_rate=1..1:2": "arrival_rate: 1.0 is listed twice",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_is_no_value(text):
+    with pytest.raises(InputError) as error:
+        values_of(text)
+    assert REFUSED[text] in str(error.value)

@@ -1,0 +1,128 @@
+"""``dess sweep``: from a line to a page."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from analysis import load_results
+from analysis.execution import runner
+from reports.pages import render
+from tests.analysis.small import files_of
+
+ASKED = ["sweep", "--scenario", "small.toml", "--missions", 6, "--policy", "greedy,random"]
+FIELDS = ["--set", "uavs=1..2", "--set", "quota=20,40"]
+
+
+@pytest.fixture
+def unrendered(monkeypatch):
+    """No page is made, which takes seconds."""
+    monkeypatch.setattr(render, "render_study", lambda folder, out, steps: Path(out, "page.html"))
+
+
+def test_a_line_leads_to_a_page(dess, tmp_path):
+    prices = ["--price", "uav=20000", "--price", "currency=USD"]
+    code, out, err = dess(*ASKED, *FIELDS, *prices)
+    assert code == 0
+    assert "48 missions" in err
+    name = re.search(r"sweeps/(uavs-quota-[0-9a-f]{16})\.toml", out)[1]
+    assert len(load_results(tmp_path / "results" / "sweeps" / name).missions) == 48
+    assert re.search(r"rank +policy +uavs +quota +success +collection ratio +product +cost", out)
+    assert re.search(r"1 +≈ +(greedy|random) +[12] +(20|40) +.* [24]0,000 USD", out)
+    assert "8 settings" in out
+    page = re.search(r"page: (.*)", out)[1]
+    assert page == f"build/reports/study-{name}.html"
+    assert "greedy" in (tmp_path / page).read_text("utf-8")
+    file = re.search(r"study: (.*)", out)[1]
+    before = files_of(tmp_path / "results")
+    code, _, err = dess("study", "run", file, "--out", f"results/sweeps/{name}")
+    assert code == 0
+    assert "48 missions, 48 of them present" in err
+    assert files_of(tmp_path / "results") == before
+
+
+def test_only_what_is_new_is_simulated(dess, unrendered):
+    assert dess(*ASKED, *FIELDS)[0] == 0
+    assert "48 missions, 48 of them present" in dess(*ASKED, *FIELDS)[2]
+    assert "72 missions, 48 of them present" in dess(*ASKED, "--set", "uavs=1..3", *FIELDS[2:])[2]
+    assert "24 missions, 24 of them present" in dess(*ASKED, "--set", "uavs=3", *FIELDS[2:])[2]
+
+
+def test_the_cheapest_fleet_is_named(dess, unrendered):
+    asked = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--set", "quota=20,40"]
+    asked += ["--price", "uav=20000", "--require", "ratio=0.1", "--missions", 5]
+    code, out, _ = dess(*asked)
+    assert code == 0
+    assert re.search(r"quota 20, greedy: the cheapest setting .* is 1 UAV for 20,000 EUR", out)
+    assert "All conditions together, greedy: the cheapest fleet is 1 UAV" in out
+    data = json.loads(dess(*asked, "--json")[1])
+    assert [row["selected"] for row in data["table"] if row["uavs"] == 1] == [True, True]
+    assert len(data["answers"]) == 3
+    assert Path(data["study_file"]).exists()
+
+
+def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkeypatch):
+    monkeypatch.setitem(runner.CHUNK, "batch", 4)
+    simulate, calls = runner.Here.run, []
+
+    def interrupted(self, jobs, progress):
+        for done in simulate(self, jobs, progress):
+            if len(calls) == 3:
+                raise KeyboardInterrupt
+            calls.append(done)
+            yield done
+
+    with monkeypatch.context() as patch:
+        patch.setattr(runner.Here, "run", interrupted)
+        code, out, err = dess(*ASKED, *FIELDS)
+    assert (code, out) == (1, "")
+    command = re.search(r"interrupted: run (dess study run .*) to complete it", err)[1]
+    code, _, err = dess(*shlex.split(command)[1:])
+    assert code == 0
+    assert "48 missions, 12 of them present" in err  # three chunks of four
+
+
+BAD = {
+    "--set uavs=5..2": "is the wrong way round",
+    "--set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
+    "--set uavs=2,7": "uavs: 7 is not within 1..6",
+    "--set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "policy ddqn: has learned grid 32, not 8",
+    "--policy gredy": "'gredy' is unknown",
+    "--missions 0": "--missions",
+    "--price uav=-1": "costs.uav: Input should be greater than or equal to 0, not -1",
+    "--price uav": "--price: 'uav' is not KEY=VALUE; allowed: a price",
+    "--price hour=3": "slot_seconds: is missing",
+    "--price uav=1 --price uav=2": "--price: uav is given twice",
+    "--require success=0.9": "requirements: need prices",
+    "--price uav=1 --require speed=0.9": "requirements: 'speed' is unknown; allowed: success",
+    "--price uav=1 --require success=2": "requirements.success: 2 is out of range",
+    "--name a/b": "name: String should match pattern",
+    "--results small.toml": "cannot be written: Not a directory",
+    "--set quota=1..1000 --set arrival_rate=0..1:1000": "600,000,000 missions to simulate "
+    "(2 policies, 1,000,000 design points), about",
+}
+
+
+@pytest.mark.parametrize("arguments", BAD)
+def test_bad_input_gets_one_line_and_leaves_nothing(arguments, dess, tmp_path):
+    given = ["--scenario", "small.toml", "--missions", "300", "--policy", "greedy,random"]
+    before = files_of(tmp_path)
+    code, out, err = dess("sweep", *given, *arguments.split(" "))
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1].startswith("dess: error: ")
+    assert BAD[arguments] in err.splitlines()[-1]
+    assert files_of(tmp_path) == before
+
+
+def test_a_study_of_very_many_points_has_to_be_confirmed(dess, tmp_path):
+    four = ("quota", "max_slots", "cell_size", "altitude")
+    values = "".join(f"values.{field} = {[*range(1, 1001)]}\n" for field in four)
+    text = (tmp_path / "trial.toml").read_text()
+    (tmp_path / "huge.toml").write_text(f"{text}\n[design]\nkind = 'grid'\n{values}")
+    for more in ([], ["--yes"], ["--dry-run"]):
+        code, out, err = dess("study", "run", "huge.toml", *more)
+        assert (code, out) == (2, "")
+        assert "1,000,000,000,000" in err.splitlines()[-1]
+        assert "allowed: 1,048,576" in err.splitlines()[-1]
