@@ -56,7 +56,7 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     """
     for damaged in results.store.damaged:
         raise InputError(f"{damaged}: is not what was written; allowed: results without damage")
-    crate, study = ROCrate(version="1.1", gen_preview=True), results.manifest["study"]
+    crate, study = ROCrate(version="1.1"), results.manifest["study"]
     root, software = crate.root_dataset, _software(crate, results)
     root["name"], root["description"] = f"Study {study['name']}", _description(results)
     root["datePublished"] = published.isoformat()

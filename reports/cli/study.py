@@ -1,22 +1,24 @@
-"""``dess study``: run a study into a results folder, show its results, bundle them."""
+"""``dess study``: run a study into a results folder; show, compare and bundle results."""
 
 import json
 from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dess import InputError
 from dess.files import replacing
-from reports.cli import console, diff
+from reports.cli import console
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import PAGES, RESULTS, JsonOption, WorkersOption
 
+if TYPE_CHECKING:
+    from analysis.questions.diff import Diff
+
 app = typer.Typer(help="Studies: policies x design points x replications.")
-app.add_typer(diff.app)
 
 
 @app.command("run")
@@ -126,6 +128,48 @@ def show(
         return
     study_tables.print_summary(results, folder, short=False)
     study_tables.print_details(results, tables)
+
+
+@app.command("diff")
+def diff(
+    a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another results folder.")],
+    most: Annotated[int, typer.Option(min=0, help="How many of the most changed missions.")] = 5,
+    as_json: JsonOption = False,
+) -> None:
+    """Compare two results folders mission by mission, on the same random draws."""
+    from analysis.questions import diff
+    from analysis.results.tables import load_results
+    from reports.cli import study_tables
+
+    found = diff.diff(load_results(a), load_results(b))
+    if as_json:
+        print(json.dumps(_document(found, most), indent=2))
+    else:
+        study_tables.print_diff(found, most)
+
+
+def _document(found: "Diff", most: int) -> dict:
+    """All that is found, as plain data."""
+    from analysis.questions import diff
+
+    identity = ["policy_a", "policy_b", "point_a", "point_b", "replication", "fields"]
+    tables = {
+        "alone": found.alone,
+        "policies": diff.effects(found),
+        "points": diff.effects(found, ["policy_a", "point_a"]),
+        "changed": found.changed[identity],
+        "most_changed": diff.most_changed(found, most)[[*identity, "command_a", "command_b"]],
+    }
+    return {
+        "a": str(found.a.store.folder),
+        "b": str(found.b.store.folder),
+        "identical": found.identical,
+        "missions": len(found.missions),
+        "differ": len(found.changed),
+        "origins": diff.origins(found),
+        **{name: json.loads(table.to_json(orient="records")) for name, table in tables.items()},
+    }
 
 
 @app.command("export")

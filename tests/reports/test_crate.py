@@ -94,7 +94,7 @@ def test_what_a_run_leaves_beside_its_results_is_left_out(tmp_path):
         names = archive.namelist()
     assert not [name for name in names if "lock" in name or "failures" in name]
     assert {name.split("/")[0] for name in names} == {
-        *("LICENSE", "results", "ro-crate-metadata.json", "ro-crate-preview.html"),
+        *("LICENSE", "results", "ro-crate-metadata.json"),
         *("scenario.toml", "study-trial.html", "study.toml"),
     }
 
