@@ -178,7 +178,7 @@ def _figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None =
 
 def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
     """Links that save data as CSV, and a table as LaTeX; they hold the files."""
-    name = re.sub(r"[^a-z0-9]+", "-", title.lower())[:60].strip("-")
+    name = re.sub(r"[^a-z0-9]+", "-", title.partition(":")[0].lower())[:80].strip("-")
     files = {
         "CSV": ("csv", "text/csv", data.to_csv(index=False, float_format=DIGITS.__mod__)),
         "LaTeX": ("tex", "application/x-tex", latex(shown)),

@@ -14,7 +14,7 @@ from analysis import load_study, run_study
 from analysis.execution import decision_time as timing
 from analysis.verification import cross_check
 from reports.pages import html
-from reports.pages.notebook import read
+from reports.pages.notebook import Report, read
 from reports.player import library
 from tests.analysis.small import write_timing
 
@@ -102,12 +102,14 @@ def words(html: str) -> str:
     return unescape(re.sub(r"\s+", " ", bare)).replace("**", "")
 
 
-def shown_by(name: str, cells: int | None = None, **parameters: Any) -> str:
+def shown_by(source: str | Report, cells: int | None = None, **parameters: Any) -> str:
     """What the first cells of a notebook show, or all; run here, and nothing drawn.
+
+    The notebook is a report, or that of a name.
 
     A kernel of its own and the drawings take most of the time that a page takes.
     """
-    report, shown, scope = read(name), [], {}
+    report, shown, scope = read(source) if isinstance(source, str) else source, [], {}
     report.set(parameters)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(IPython.display, "display", lambda *pieces: shown.extend(pieces))
@@ -115,12 +117,12 @@ def shown_by(name: str, cells: int | None = None, **parameters: Any) -> str:
         for cell in report.cells[:cells]:
             tree = ast.parse(cell.source)
             last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-            exec(compile(tree, name, "exec"), scope)
+            exec(compile(tree, report.name, "exec"), scope)
             if last:
-                shown.append(eval(compile(ast.Expression(last.value), name, "eval"), scope))
+                shown.append(eval(compile(ast.Expression(last.value), report.name, "eval"), scope))
     return "\n".join(piece.data for piece in shown if piece is not None)
 
 
-def said_by(name: str, cells: int | None = None, **parameters: Any) -> str:
+def said_by(source: str | Report, cells: int | None = None, **parameters: Any) -> str:
     """The words of what a notebook shows."""
-    return words(shown_by(name, cells, **parameters))
+    return words(shown_by(source, cells, **parameters))

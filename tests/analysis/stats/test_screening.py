@@ -32,11 +32,11 @@ def by_hand(values, level=0.95):
 def test_it_is_the_paired_t_test_of_every_two_settings():
     generator = np.random.default_rng(3)
     shared = generator.normal(size=(25, 1))
-    values = shared + 0.4 * generator.normal(size=(25, 30)) + np.linspace(0, 1, 30)
+    values = shared + 0.4 * generator.normal(size=(25, 12)) + np.linspace(0, 1, 12)
     values[20:, ::3] = np.nan  # replications that some settings lack
     values[:, 7] = values[:, 6] + 0.25  # all differences alike
     expected = by_hand(values)
-    assert 1 < expected.sum() < 20
+    assert 1 < expected.sum() < 10
     assert may_be_best(values).tolist() == expected.tolist()
 
 

@@ -1,0 +1,190 @@
+"""A results folder of any study has a page, with the data of its figures and tables."""
+
+import csv
+import io
+import json
+import re
+from base64 import b64decode
+from html.parser import HTMLParser
+from pathlib import Path
+
+import nbformat
+import pandas as pd
+import pytest
+from nbclient import NotebookClient
+
+from analysis import load_results, run_study
+from analysis.questions import settings
+from dess import InputError
+from reports.pages import html
+from reports.pages.html import STUDY, embedded
+from reports.pages.render import html_of, render_study
+from reports.pages.verify import verify_page
+from tests.analysis.small import files_of, grid, small_study
+from tests.reports.small import Links, words_of
+
+
+class Downloads(HTMLParser):
+    """The files that a page holds, by name: the label of the link, the type and the text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.files = {}
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        of_tag = dict(attrs)
+        if "download" in of_tag:
+            kind, text = of_tag["href"].removeprefix("data:").split(";charset=utf-8;base64,")
+            assert of_tag["download"] not in self.files
+            label = of_tag["aria-label"]
+            self.files[of_tag["download"]] = (label, kind, b64decode(text).decode())
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of a grid of two fields."""
+    home = tmp_path_factory.mktemp("study")
+    study = small_study(home, design=grid(uavs=[1, 2, 3], pads=[1, 2]), missions=12,
+                        description="How many UAVs & pads?")  # fmt: skip
+    run_study(study, home / "fleets")
+    return home / "fleets"
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("pages") / "deep"
+
+
+@pytest.fixture(scope="module")
+def page(folder, out):
+    """The page, rendered once."""
+    assert render_study(folder, out) == out / "study-trial.html"
+    return (out / "study-trial.html").read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def downloads(page):
+    return Downloads(page).files
+
+
+def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
+    assert {*files_of(out)} == {"study-trial.html", "study-trial.ipynb", "index.html"}
+    index = (out / "index.html").read_text("utf-8")
+    assert '<a class="card" href="study-trial.html">' in index
+    for text in (page, index):
+        assert "Study trial" in text and "How many UAVs &amp; pads?" in text
+        assert len(embedded(STUDY, text)) == 1
+    assert index.count("<img ") == 1
+
+
+def test_it_states_the_answer_first(page, folder):
+    best = settings.ranked(load_results(folder)).iloc[0]
+    text = words_of(page)
+    assert (
+        f"The best setting is {best['policy']} with number of UAVs {best['uavs']}, "
+        f"number of charging pads {best['pads']}"
+    ) in text
+    assert text.index("What was simulated") < text.index("The best setting is")
+    for heading in ("What the fields do", "Compared with a baseline", "Policy against policy"):
+        assert heading in text
+    for heading in ("The selection", "The precision", "Sobol"):
+        assert heading not in text
+
+
+def test_every_figure_and_table_has_its_data(page, downloads, folder):
+    tables = page.split("Where the figures come from")[0].count("<table")
+    assert len(downloads) == 2 * (page.count("<img ") + tables)
+    assert {kind for _, kind, _ in downloads.values()} == {"text/csv", "application/x-tex"}
+    results = load_results(folder)
+    (ranked,) = [text for name, (_, _, text) in downloads.items() if name.startswith("the-first-12")
+                 and name.endswith(".csv")]  # fmt: skip
+    expected = settings.ranked(results)
+    found = pd.read_csv(io.StringIO(ranked))
+    assert [*found] == [*expected] and len(found) == len(expected)
+    assert found["reward"].tolist() == pytest.approx(expected["reward"].tolist(), rel=1e-5)
+    for name, (label, _, text) in downloads.items():
+        assert label.endswith((": CSV", ": LaTeX"))
+        if name.endswith(".csv"):
+            rows = [*csv.reader(io.StringIO(text))]
+            assert len(rows) > 1 and len({*map(len, rows)}) == 1
+        else:
+            assert r"\toprule" in text and text.isascii()
+
+
+def test_it_requests_nothing_and_fits_a_phone(page, out, visit):
+    opened = visit(out / "study-trial.html", 390)
+    assert opened.page.evaluate("document.documentElement.scrollWidth") <= 390
+    assert opened.requests == [(out / "study-trial.html").as_uri()]
+    assert opened.complaints == []
+    with opened.page.expect_download() as started:
+        link = opened.page.get_by_label(re.compile("^The first 12 of 12 settings.*: CSV$"))
+        link.focus()
+        opened.page.keyboard.press("Enter")
+    assert Path(started.value.path()).read_text("utf-8").startswith("rank,policy,point,")
+    assert "index.html" in Links(page).found
+
+
+def test_it_is_verified(page, out):
+    page_check, records = verify_page(out / "study-trial.html", missions=5, seed=1)
+    assert (records.what, records.compared) == ("trial", 5)
+    assert page_check.differing == records.differing == []
+
+
+@pytest.mark.slow
+def test_the_same_results_give_the_same_bytes_and_the_notebook_shows_them(
+    page, folder, out, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("PYTHONHASHSEED", "5")
+    render_study(folder, tmp_path / "a" / "b")
+    again = files_of(tmp_path / "a" / "b")
+    assert again["study-trial.html"].decode() == page
+    assert again["index.html"] == files_of(out)["index.html"]
+    notebook = nbformat.read(out / "study-trial.ipynb", as_version=4)
+    assert notebook.cells.pop(0).source == "# Study trial\n\nHow many UAVs & pads?"
+    NotebookClient(notebook, resources={"metadata": {"path": str(out)}}).execute()
+    assert html_of(notebook) in page
+
+
+# --- what is refused ---
+
+
+@pytest.mark.parametrize("name", ["speed", "results"])
+def test_an_unknown_parameter_is_refused(folder, tmp_path, name):
+    with pytest.raises(InputError, match=f"parameter: '{name}' is unknown to study-trial; allowed"):
+        render_study(folder, tmp_path / "out", parameters={name: 1})
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_holds_no_complete_results_is_refused(tmp_path, folder):
+    with pytest.raises(InputError, match="none/manifest.json: no such file; allowed: a res"):
+        render_study(tmp_path / "none", tmp_path / "out")
+    manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
+    (tmp_path / "half").mkdir()
+    (tmp_path / "half" / "manifest.json").write_text(json.dumps(manifest | {"complete": False}))
+    with pytest.raises(InputError, match="half"):
+        render_study(tmp_path / "half", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+# --- files with data ---
+
+
+def test_latex_has_what_the_table_has_and_no_letter_that_it_lacks():
+    frame = pd.DataFrame({"C_S [%]": ["5–7", "−1 & ▲"], "a_b": [1 / 3, float("nan")]})
+    assert html.latex(frame).split("\n")[2:6] == [
+        r"$C_S$ [\%] & a\_b \\",
+        r"\midrule",
+        r"5--7 & 0.333333 \\",
+        r"$-$1 \& $\triangle$ &  \\",
+    ]
+
+
+def test_links_are_named_after_what_they_hold():
+    frame, data = pd.DataFrame({"a": [1]}), pd.DataFrame({"b": [2]})
+    files = Downloads(html.table(frame, 'Means of "x" & <y>: all', data=data).data).files
+    assert {*files} == {"means-of-x-y.csv", "means-of-x-y.tex"}
+    label = 'Means of "x" & <y>: all: CSV'
+    assert files["means-of-x-y.csv"] == (label, "text/csv", "b\n2\n")
+    assert "\na " in files["means-of-x-y.tex"][2]
+    assert not Downloads(html.table(frame, "Means").data).files

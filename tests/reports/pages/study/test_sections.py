@@ -1,0 +1,113 @@
+"""The page of a study has the sections that its design, its rules and its policies ask for."""
+
+import re
+from html import unescape
+
+import pytest
+
+from analysis import run_study
+from reports.pages.notebook import SHIPPED
+from reports.pages.study.sections import TAGS, report_of
+from tests.analysis.small import grid, small_study
+from tests.reports.small import shown_by
+
+PRECISION = {"first": 5, "look_ahead": 2, "budget": 12,
+             "targets": {"collection_ratio": {"absolute": 0.05}}}  # fmt: skip
+SELECTION = {"procedure": "kn-bounded", "first": 5, "indifference": 0.05, "budget": 60, "check": 9}
+SAMPLED = {"kind": "latin-hypercube", "size": 14, "ranges": {"uavs": [1, 3], "quota": [20, 60]}}
+# What is changed in the small study, what the page says, and what it does not.
+STUDIES = {
+    "a single point": (
+        {},
+        ["The best policy is", "The other policy", "Means with 95 % intervals", "Single missions"],
+        ["What the fields do", "baseline", "Sobol", "The selection"],
+    ),
+    "a field": (
+        {"design": grid(uavs=[1, 2])},
+        ["What the fields do", "n = 10 missions per point; bars", "Compared with a baseline"],
+        ["Orange frames", "One panel for each"],
+    ),
+    "a list": (
+        {"design": grid(initial_data=[[5, 7.5], 10]), "set": {"nodes": [[1, 1], [2, 2]]}},
+        ["initial data per node [data units]: 5–7.5, 10", "sensor nodes of 2 cells"],
+        [],
+    ),
+    "two fields": (
+        {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
+        ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
+        ["Policy against policy", "replications per cell"],
+    ),
+    "four fields": (
+        {"design": grid(uavs=[1, 2], pads=[1, 2], quota=[20, 60], charge_start=[10, 15])},
+        ["n = 10 replications per cell. One panel for each", "Cells are averaged over"],
+        ["Sobol"],
+    ),
+    "one at a time": (
+        {"design": {"kind": "one-at-a-time", "values": {"uavs": [1, 2], "quota": [20, 60]}}},
+        ["The lowest panel has the change"],
+        ["Orange frames", "One panel for each field"],
+    ),
+    "a sample": (
+        {"design": SAMPLED},
+        ["One panel for each field. A dot is the mean of a policy"],
+        ["Orange frames"],
+    ),
+    "sensitivity": (
+        {"design": {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "quota": [20, 60]}},
+         "missions": 1},
+        ["A Sobol index is the share", "A dot is the mean over the missions with the value"],
+        ["The best setting", "Compared with a baseline", "Every policy meets the same"],
+    ),
+    "a selection": (
+        {"design": grid(uavs=[1, 3]), "selection": SELECTION},
+        ["The selection", "The setting that was selected", "The check of the selected settings"],
+        ["Policy against policy"],
+    ),
+    "a precision": (
+        {"precision": PRECISION, "policies": ["greedy"]},
+        ["The precision", "Half-widths of 95 % intervals", "The best policy is greedy"],
+        ["Policy against policy", "All others"],
+    ),
+}  # fmt: skip
+
+
+def page_of(folder, **parameters):
+    """The texts of the page and of its drawings, without rendering it."""
+    report = report_of(folder)
+    texts = [cell.source for cell in report.notebook.cells if cell.cell_type == "markdown"]
+    shown = re.sub("<script.*?</script>", "", shown_by(report, results=str(folder), **parameters))
+    bare = re.sub(r"[`*]|<[^>]*>", "", " ".join([*texts, shown]))
+    return " ".join(unescape(bare).split())
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_the_page_says_what_the_study_can_answer(name, tmp_path):
+    changes, said, unsaid = STUDIES[name]
+    run_study(small_study(tmp_path, **changes), tmp_path / "out")
+    text = page_of(tmp_path / "out")
+    for part in said:
+        assert part in text, part
+    for part in unsaid:
+        assert part not in text, part
+    assert "dess simulate --scenario paper" in text  # the worst missions
+
+
+def test_tags_of_the_notebook_are_those_that_have_a_meaning():
+    used = {*re.findall(r'"(if-[a-z-]+)"', (SHIPPED / "study.py").read_text("utf-8"))}
+    assert used <= {*TAGS}
+    assert {*TAGS} - used <= {"if-costs"}
+
+
+def test_parameters_choose_the_metric_and_the_baseline(tmp_path):
+    study = small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy"])
+    run_study(study, tmp_path / "out")
+    text = page_of(tmp_path / "out", metric="reward", baseline=1)
+    assert "The baseline is design point 1: number of UAVs 2." in text
+    assert re.search(r"The best setting is greedy with number of UAVs \d: reward −?[\d,.]+ ", text)
+
+
+def test_the_title_is_that_of_the_study(tmp_path):
+    run_study(small_study(tmp_path, name="fleets", missions=2), tmp_path / "out")
+    report = report_of(tmp_path / "out")
+    assert (report.name, report.title) == ("study-fleets", "Study fleets")
+    assert report.description == "greedy and random at the scenario small.toml."
