@@ -254,11 +254,11 @@ class ScenarioSpace(_Constants):
             "initial_data": (0, inf),
             **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
         }
+        numeric = [name for name, value in self if name in bounded or _is_number(value)]
+        if field not in numeric:
+            raise InputError(f"field: {field!r} is no number; allowed: {', '.join(numeric)}")
         if field in bounded:
             return bounded[field]
-        if not _is_number(getattr(self, field, None)):
-            numeric = [name for name, value in self if name in bounded or _is_number(value)]
-            raise InputError(f"field: {field!r} is no number; allowed: {', '.join(numeric)}")
         metadata = ScenarioSpace.model_fields[field].metadata
         least = [getattr(m, kind) for m in metadata for kind in ("ge", "gt") if hasattr(m, kind)]
         most = [getattr(m, kind) for m in metadata for kind in ("le", "lt") if hasattr(m, kind)]

@@ -1,5 +1,6 @@
 """Scenarios: TOML in and out, refusals in one clear line, and the draws of a space."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -289,3 +290,34 @@ def test_the_path_loss_table_is_eq_10(scenario: Scenario, data: st.DataObject) -
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
     snr = 10 ** (scenario.edge_snr / 10) * (distance / edge) ** -scenario.path_loss_exponent
     assert world_of(space).mean_snr[coarse, fine] == pytest.approx(10 * np.log10(snr), abs=1e-9)
+
+
+# --- limits ---
+
+
+def test_values_at_the_limits_are_allowed_and_those_beyond_are_not() -> None:
+    space = ScenarioSpace.of(charge_start=10, charge_complete=100)
+    fields = (*SAMPLED, "pads", "quota", "arrival_rate", "communication_slots", "edge_snr")
+    for field in fields:
+        low, high = space.limits(field)
+        kind = type(getattr(space, field)[0] if field in SAMPLED else getattr(space, field) or 1)
+        assert low < high < math.inf
+        for allowed in (low, high):
+            if (field, allowed) not in {("charge_start", 100), ("charge_complete", 10)}:
+                ScenarioSpace.of(space, **{field: kind(allowed)})
+        for refused in (low - 1, high + 1):
+            with pytest.raises(InputError, match=field):
+                ScenarioSpace.of(space, **{field: kind(refused)})
+
+
+def test_limits_follow_the_zone_and_may_be_none() -> None:
+    space = ScenarioSpace.of(zone=(0, 0, 2, 2))
+    assert space.limits("uavs") == space.limits("pads") == (1, 4)
+    assert space.limits("initial_data") == (0, math.inf)
+    assert space.limits("reward_step") == (-math.inf, math.inf)
+
+
+@pytest.mark.parametrize("field", ["zone", "nodes", "forbid_swaps", "uav", "zone_cells"])
+def test_what_is_no_number_has_no_limits(field: str) -> None:
+    with pytest.raises(InputError, match=f"field: '{field}' is no number; allowed: .*pads.*uavs"):
+        ScenarioSpace.of().limits(field)
