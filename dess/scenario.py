@@ -241,6 +241,12 @@ class ScenarioSpace(_Constants):
         base = scenario.model_dump() if scenario is not None else {}
         return _validated(cls, base | values, "scenario")
 
+    @property
+    def numeric(self) -> list[str]:
+        """The fields that hold a number, or a range of numbers."""
+        others = (*SAMPLED, "initial_data", "pads")
+        return [name for name, value in self if name in others or _is_number(value)]
+
     def limits(self, field: str) -> tuple[float, float]:
         """The least and the largest value that a numeric field may have, infinite without a limit.
 
@@ -254,9 +260,9 @@ class ScenarioSpace(_Constants):
             "initial_data": (0, inf),
             **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
         }
-        numeric = [name for name, value in self if name in bounded or _is_number(value)]
-        if field not in numeric:
-            raise InputError(f"field: {field!r} is no number; allowed: {', '.join(numeric)}")
+        if field not in self.numeric:
+            allowed = ", ".join(self.numeric)
+            raise InputError(f"field: {field!r} is no number; allowed: {allowed}")
         if field in bounded:
             return bounded[field]
         metadata = ScenarioSpace.model_fields[field].metadata

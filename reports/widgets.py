@@ -38,6 +38,7 @@ class WhatIfPanel(widgets.VBox):
         variation: The same of the variation; one that stands like that of the baseline follows it.
         policies: Policy -> its checkbox.
         missions: The number of missions of each policy, in the baseline and in the variation.
+        more: The fields that have no slider; the one that is chosen gets its sliders.
         button: Simulates.
         progress: How many of the missions are done.
         output: The answer, or why there is none, as HTML.
@@ -60,12 +61,14 @@ class WhatIfPanel(widgets.VBox):
             missions: The number of missions at first.
             ask: As ``analysis.what_if``, with values of fields and keywords.
         """
-        self._ask = ask
-        self.baseline, self.variation = (
-            {field: _slider(sides, side, field) for field in fields} for side in (0, 1)
-        )
-        for field, slider in self.baseline.items():
-            slider.observe(_following(self.variation[field]), "value")
+        self._sides, self._ask = sides, ask
+        self.baseline: dict[str, widgets.Widget] = {}
+        self.variation: dict[str, widgets.Widget] = {}
+        self._table = _table()
+        self.more = widgets.Dropdown(description="Add a field", style={"description_width": "auto"})
+        for field in fields:
+            self.add(field)
+        self.more.observe(self._chosen, "value")
         teams = dict.fromkeys([*chosen, *registry.names()])
         self.policies = {team: _checkbox(team, team in chosen) for team in teams}
         self.missions = widgets.BoundedIntText(missions, min=2, max=100_000, description="Missions")
@@ -75,7 +78,26 @@ class WhatIfPanel(widgets.VBox):
         self.output = widgets.HTML()
         run = widgets.HBox([self.missions, self.button, self.progress])
         chooser = widgets.HBox([*self.policies.values()], layout={"flex_flow": "row wrap"})
-        super().__init__([self._table(), chooser, run, self.output])
+        super().__init__([self._table, self.more, chooser, run, self.output])
+
+    def add(self, field: str) -> None:
+        """Add the sliders of a field.
+
+        Raises:
+            InputError: If it holds no numbers.
+        """
+        before, after = (_slider(self._sides, side, field) for side in (0, 1))
+        before.observe(_following(after), "value")
+        self.baseline[field], self.variation[field] = before, after
+        name = names.parameter(field)
+        label = widgets.Label(f"{name.plain} [{name.unit}]".removesuffix(" []"))
+        self._table.children += (label, before, after)
+        others = [other for other in self._sides[0].numeric if other not in self.baseline]
+        self.more.options = ["", *others]
+
+    def _chosen(self, change: Any) -> None:
+        if change.new:
+            self.add(change.new)
 
     def simulate(self) -> None:
         """Ask what the sliders say, and show the answer."""
@@ -99,16 +121,6 @@ class WhatIfPanel(widgets.VBox):
 
     def _count(self, missions: int) -> None:
         self.progress.value += missions
-
-    def _table(self) -> widgets.GridBox:
-        """The sliders, a row per field and a column per side."""
-        cells = [widgets.HTML(f"<b>{text}</b>") for text in ("", *map(str.capitalize, SIDES))]
-        for field, slider in self.baseline.items():
-            name = names.parameter(field)
-            label = f"{name.plain} [{name.unit}]".removesuffix(" []")
-            cells += [widgets.Label(label), slider, self.variation[field]]
-        columns = "max-content repeat(2, minmax(12rem, 22rem))"
-        return widgets.GridBox(cells, layout={"grid_template_columns": columns})
 
 
 def what_if_panel(
@@ -135,7 +147,7 @@ def what_if_panel(
         folder: Where results are kept.
         missions: The number of missions at first.
         seed: Of the missions.
-        fields: The fields that have sliders; each holds a number, or a range of numbers.
+        fields: The fields that have sliders at first; each holds a number, or a range of numbers.
 
     Raises:
         InputError: If the scenario, a field or a value is not allowed.
@@ -145,7 +157,7 @@ def what_if_panel(
     sides = (load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed))
 
     def ask(before: Fields, after: Fields, teams: Sequence[str], number: int, count: Any) -> WhatIf:
-        others = [{f: v for f, v in of.items() if f not in fields} for of in (fixed, changed)]
+        others = [{f: v for f, v in of.items() if f not in before} for of in (fixed, changed)]
         moved = {f: v for f, v in before.items() if v != _plain(_value(scenario_itself, f))}
         varied = {field: value for field, value in after.items() if value != before[field]}
         return what_if(
@@ -154,6 +166,13 @@ def what_if_panel(
         )  # fmt: skip
 
     return WhatIfPanel(sides, fields, policies, missions, ask)
+
+
+def _table() -> widgets.GridBox:
+    """A table for sliders, a row per field and a column per side."""
+    heads = [widgets.HTML(f"<b>{text}</b>") for text in ("", *map(str.capitalize, SIDES))]
+    columns = "max-content repeat(2, minmax(12rem, 22rem))"
+    return widgets.GridBox(heads, layout={"grid_template_columns": columns})
 
 
 def _slider(sides: Sequence[ScenarioSpace], side: int, field: str) -> widgets.Widget:

@@ -102,6 +102,18 @@ def test_fields_without_a_slider_stay_as_they_are_asked(tmp_path: Path) -> None:
     assert len([*manifests(tmp_path)]) == 1
 
 
+def test_fields_are_chosen(tmp_path: Path) -> None:
+    panel = panel_of(tmp_path, fields=["quota"])
+    assert [*panel.baseline] == ["quota"]
+    assert "pads" in panel.more.options and not {"quota", "zone"} & {*panel.more.options}
+    panel.more.value = "pads"
+    assert [*panel.baseline] == [*panel.variation] == ["quota", "pads"]
+    assert "pads" not in panel.more.options
+    panel.variation["pads"].value = 1
+    panel.button.click()
+    assert "collection ratio" in shown(panel)
+
+
 def test_policies_are_chosen(tmp_path: Path) -> None:
     panel = panel_of(tmp_path)
     assert {name for name, box in panel.policies.items() if box.value} == {"greedy"}
