@@ -154,7 +154,7 @@ def test_links_lead_somewhere(page: str) -> None:
     for link in filter(None, (a or b for a, b in links)):
         if not link.startswith("https://"):
             name, _, anchor = link.partition("#")
-            target = (ROOT / page).parent / name
+            target = (ROOT / page).parent / name if name else ROOT / page
             assert target.exists(), link
             assert not anchor or anchor in anchors(target), link
 
