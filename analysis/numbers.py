@@ -75,6 +75,13 @@ def money(amount: float, currency: str) -> str:
     return f"{minus(f'{amount:,.0f}' if abs(amount) >= 100 else f'{amount:.2f}')} {currency}"
 
 
+def amounts(mean: float, low: float, high: float) -> str:
+    """A cost and its interval as ``69,120 [68,400, 69,840]``; with two decimals below 100."""
+    digits = 0 if abs(mean) >= 100 else 2
+    middle, *ends = [minus(f"{amount:,.{digits}f}") for amount in (mean, low, high)]
+    return f"{middle} [{ends[0]}, {ends[1]}]"
+
+
 def seconds(time: float) -> str:
     """A time [s] with three digits at most, as ``2.35 µs`` or ``1.1 ms``."""
     units = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9))

@@ -10,6 +10,7 @@ meet. Fleets are compared under one condition at a time, and over all of them by
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import ceil
 from typing import Any
 
@@ -134,6 +135,15 @@ def judged(results: Results, requirements: Mapping[str, float] | None = None) ->
     return table.assign(selected=table.index.isin(best))
 
 
+def checks(results: Results) -> pd.DataFrame:
+    """The selected settings in missions that did not select them.
+
+    Returns:
+        A row per policy and selected design point, with the columns of ``priced``.
+    """
+    return priced(replace(results, missions=results.checks))
+
+
 def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
     """The fleets over all conditions; empty, if there is but one condition.
 
@@ -179,15 +189,11 @@ def answers(
     given = requirements or (rule.requirements if isinstance(rule, Cheapest) else {})
     wanted, sentences = {str(metric): least for metric, least in given.items()}, []
     for (condition, policy), rows in table.groupby(["condition", "policy"], sort=False):
-        where = f"{condition}, {policy}" if condition else f"{policy}"
-        sentences.append(f"{where}: {_answer(rows, wanted, currency)}")
-    for policy, rows in everywhere(results, table).groupby("policy", sort=False):
-        best = rows[rows["selected"]]
-        text = "no fleet is known to meet the requirements under all of them."
-        if len(best):
-            fleet, cost = best["fleet"].iloc[0], numbers.money(best[COST].iloc[0], currency)
-            text = f"the cheapest fleet is **{fleet}**, for {cost} in the mean over the conditions."
-        sentences.append(f"All conditions together, {policy}: {text}")
+        where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
+        sentences.append(f"{_capital(where)}: {_answer(rows, wanted, currency)}")
+    for policy, fleets in everywhere(results, table).groupby("policy", sort=False):
+        text = _answer_everywhere(fleets, table[table["policy"] == policy], currency)
+        sentences.append(f"All conditions together, `{policy}`: {text}")
     return sentences
 
 
@@ -244,6 +250,31 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[str, float], currency: str) -> s
     return " ".join(texts)
 
 
+def _answer_everywhere(fleets: pd.DataFrame, rows: pd.DataFrame, currency: str) -> str:
+    """The answer for one policy over all conditions.
+
+    Args:
+        fleets: Its rows of ``everywhere``.
+        rows: Its rows of ``judged``.
+        currency: Of the costs.
+    """
+    best = fleets[fleets["selected"]]
+    if best.empty:
+        return "no fleet is known to meet the requirements under each of them."
+    text = f"the cheapest fleet that meets the requirements is {_what(best.iloc[0], currency)}, "
+    text += "the mean cost over the conditions."
+    cheaper = fleets[fleets[COST] < best[COST].iloc[0]]
+    if cheaper.empty:
+        return f"{text} No fleet of the study is cheaper."
+    row = cheaper.iloc[-1]
+    text += f" The next cheaper one, {_what(row, currency)}, "
+    if row["verdict"] == MET:
+        return f"{text}saves less than the indifference."
+    failed = rows[(rows["fleet"] == row["fleet"]) & (rows["verdict"] == row["verdict"])]
+    does = "misses them" if row["verdict"] == MISSED else "is not known to meet them"
+    return f"{text}{does} under {numbers.words([*failed['condition']])}."
+
+
 def _what(row: pd.Series, currency: str) -> str:
     """``**3 UAVs and 1 pad** for 69,000 EUR``."""
     return f"**{row['fleet']}** for {numbers.money(row[COST], currency)}"
@@ -267,6 +298,10 @@ def _why_not(row: pd.Series, wanted: Mapping[str, float]) -> str:
     else:
         words = "is not known to meet the requirements"
     return f"{words}: it has {_metrics(row, short or wanted)}"
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _interval(row: pd.Series, metric: str) -> str:

@@ -292,5 +292,8 @@ def _verdict(tests: Sequence[MeanTest]) -> Verdict:
 
 def _in_words(requirements: Mapping[Share, float], shift: float) -> str:
     """``a mean success of at least 0.985``."""
-    means = [f"{metric} of at least {least + shift:g}" for metric, least in requirements.items()]
+    means = [
+        f"{metric.replace('_', ' ')} of at least {least + shift:g}"
+        for metric, least in requirements.items()
+    ]
     return f"a mean {' and a mean '.join(means)}"

@@ -8,7 +8,7 @@ import pandas as pd
 from analysis import numbers
 from analysis.execution.dry_run import Plan
 from analysis.names import COST, PRODUCT, SHORT_METRICS, SUCCESS
-from analysis.questions import diff, summary
+from analysis.questions import costs, diff, summary
 from analysis.questions.summary import settings
 from analysis.replication import paper
 from analysis.results.tables import Results
@@ -48,6 +48,9 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     if study["selection"]:
         selected = summary.selections(results)
         _print_selections(selected)
+        if results.store.manifest.costs and "condition" in selected:
+            for text in costs.answers(results, costs.judged(results)):
+                print(f" {text.translate(str.maketrans('', '', '*`'))}")
         if checks := study["selection"]["check"]:
             means = summary.checks(results)
             if "condition" in selected:
@@ -103,7 +106,7 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
         return
     cells = table[["condition", "policy"]].set_index(table["fleet"])
     ends = table[[COST, f"{COST}_low", f"{COST}_high"]].to_numpy(float)
-    cells[f"cost [{currency}]"] = [f"{m:,.0f} [{low:,.0f}, {high:,.0f}]" for m, low, high in ends]
+    cells[f"cost [{currency}]"] = [numbers.amounts(*costs) for costs in ends]
     shares = table[[SUCCESS, f"{SUCCESS}_low", f"{SUCCESS}_high"]].to_numpy(float)
     cells["success"] = [numbers.interval(*share) for share in shares]
     cells["on the front"] = [numbers.percent(share) for share in table["probability"]]

@@ -27,7 +27,7 @@ from IPython.display import display
 from analysis import distribution, load_results, names
 from analysis.questions import settings, summary
 from reports.pages import html
-from reports.pages.study import drawings, tables, words
+from reports.pages.study import costs, drawings, tables, words
 
 # %%
 study = load_results(Path(results))
@@ -63,6 +63,37 @@ tables.best_of_policies(study, by)
 
 # %% tags=["if-one-setting"]
 display(html.gallery(drawings.means(study, metrics)), tables.means(study))
+
+# %% [markdown] tags=["if-cheapest"]
+# ## The cheapest fleet
+#
+# The fleet is what an operator decides on; the other fields are conditions that it has to meet.
+
+# %% tags=["if-cheapest"]
+display(
+    html.say("{answers}", answers=costs.cheapest(study)),
+    costs.judged_table(study),
+    costs.checked_table(study),
+)
+
+# %% [markdown] tags=["if-cheapest"]
+# The missions of the check had no part in the selection, so its means are not too good. The search
+# spends no more missions on a setting once a cheaper one is known to meet the requirements.
+
+# %% [markdown] tags=["if-costs"]
+# ## What it costs
+#
+# The cost is that of the fleet and of all its missions. A setting is on the *Pareto front* if no
+# other one is at most as costly and at least as good. The probability that it truly is reckons
+# with the chance in the missions, by the Bayesian bootstrap over common replications.
+
+# %% tags=["if-costs"]
+fronts = costs.fronts_of(study)
+display(
+    html.gallery(costs.drawn(study, fronts)),
+    costs.front_table(study, fronts),
+    costs.parts_table(study),
+)
 
 # %% [markdown] tags=["if-selection"]
 # ## The selection

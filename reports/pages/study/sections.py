@@ -13,6 +13,8 @@ from analysis import numbers
 from analysis.questions import summary
 from analysis.questions.settings import varied
 from analysis.results.tables import Results, load_results
+from analysis.study.cheapest import Cheapest
+from analysis.study.selection import Selection
 from reports.pages import notebook
 from reports.pages.notebook import SHIPPED, Report, tags_of
 
@@ -85,7 +87,8 @@ TAGS: dict[str, Callable[[Results], bool]] = {
     "if-policies": lambda results: not summary.comparisons(results).empty,
     "if-learned": lambda results: not summary.learned_against_heuristic(results).empty,
     # Tables of the study.
-    "if-selection": _has("selection"),
+    "if-selection": lambda results: isinstance(results.store.manifest.selection, Selection),
+    "if-cheapest": lambda results: isinstance(results.store.manifest.selection, Cheapest),
     "if-precision": _has("precision"),
     "if-costs": _has("costs"),
 }

@@ -1,0 +1,78 @@
+"""Figures of what settings cost: cost against a metric, with the Pareto front."""
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, PercentFormatter
+
+from analysis.figures import style
+from analysis.names import COST, metric_name
+
+WIDE = 20.0  # the ratio of costs from which on their axis is logarithmic
+MOST_NAMES = 6  # settings on the front that are named
+FAINT = 0.15  # the opacity of a setting that is not on the front
+
+
+def front(table: pd.DataFrame, metric: str, currency: str, required: float | None = None) -> Figure:
+    """Cost against a metric under one condition, with 95 % intervals and the front.
+
+    The larger and darker a setting is, the more probable it is that it is on the front.
+
+    Args:
+        table: Rows of ``questions.costs.front``.
+        metric: The metric of the front.
+        currency: Of the costs.
+        required: The least mean of the metric that is required, for a line.
+    """
+    colours = style.policy_colours(table["policy"])
+    with style.look():
+        figure, ax = style.panels(4.1)
+        for policy, rows in table.groupby("policy", sort=False):
+            _settings(rows, metric, *colours[str(policy)], ax)
+        on_front = table[table["on_front"]].sort_values(COST)
+        ax.step(on_front[COST], on_front[metric], where="post", color=style.INK, linewidth=1.1,
+                zorder=1, label="front of the estimates")  # fmt: skip
+        if len(on_front) <= MOST_NAMES:
+            _names(on_front, metric, ax)
+        if required is not None:
+            ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
+        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_name(metric).lower())
+        ax.margins(x=0.12, y=0.12)
+        ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
+        _costs_axis(table[COST], ax)
+        style.legend_below(figure, ax)
+    return figure
+
+
+def _settings(rows: pd.DataFrame, metric: str, colour: str, marker: str, ax: Axes) -> None:
+    """The settings of a policy, with intervals in both directions."""
+    shares = rows["probability"].to_numpy()
+    ends = [style.arms(rows, name, f"{name}_low", f"{name}_high") for name in (COST, metric)]
+    for place, share in enumerate(shares):
+        opacity = FAINT + (1 - FAINT) * share
+        x_arm, y_arm = (of[:, [place]] for of in ends)
+        ax.errorbar(rows[COST].iloc[[place]], rows[metric].iloc[[place]], xerr=x_arm, yerr=y_arm,
+                    color=colour, marker=marker, markersize=4 + 5 * share, alpha=opacity,
+                    elinewidth=1.1, linestyle="", zorder=2)  # fmt: skip
+    ax.plot([], [], color=colour, marker=marker, linestyle="", label=str(rows["policy"].iloc[0]))
+
+
+def _names(rows: pd.DataFrame, metric: str, ax: Axes) -> None:
+    """The names of the settings on the front, below their marks."""
+    for x, y, fleet in zip(rows[COST], rows[metric], rows["fleet"], strict=True):
+        ax.annotate(fleet.replace(" and ", "\n"), (x, y), xytext=(7, -5), va="top", fontsize=8,
+                    textcoords="offset points")  # fmt: skip
+
+
+def _costs_axis(costs: pd.Series, ax: Axes) -> None:
+    """Costs in full, on a logarithmic axis where they differ a lot."""
+    least, most = costs.min(), costs.max()
+    is_wide = least > 0 and most / least > WIDE
+    if is_wide:
+        ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.minorticks_off()
+    else:
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
+    digits = 0 if most - least >= 5 else 2
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:,.{digits}f}"))

@@ -1,0 +1,133 @@
+"""What the settings of a study cost, on its page: the fronts, their tables, the cheapest settings.
+
+fronts = costs.fronts_of(study)
+html.gallery(costs.drawn(study, fronts))
+"""
+
+from collections.abc import Mapping
+
+import pandas as pd
+from IPython.display import HTML
+
+from analysis import numbers
+from analysis.figures import costs as figures
+from analysis.names import COST, METRICS, PRODUCT, SUCCESS, metric_name
+from analysis.questions import costs as questions
+from analysis.results.tables import Results
+from analysis.stats.intervals import LEVEL
+from analysis.study.cheapest import Cheapest
+from reports.pages import html
+from reports.pages.html import Drawing
+from reports.pages.study.words import MOST_ROWS
+
+MOST_CONDITIONS = 9  # that have a figure; the table has all
+CERTAIN = 0.01  # a setting that is less probably on a front is not in the table
+MARKS = "The larger and darker a mark, the more probable is it that the setting is on the front."
+
+
+Fronts = Mapping[str, pd.DataFrame]  # by metric, as of ``questions.costs.front``
+
+
+def fronts_of(results: Results) -> Fronts:
+    """The fronts of the page: by the metrics that are required, or by success and the product."""
+    metrics = [*required(results)] or [SUCCESS, PRODUCT]
+    return {metric: questions.front(results, metric) for metric in metrics}
+
+
+def required(results: Results) -> Mapping[str, float]:
+    """The requirements of a study that selects the cheapest setting."""
+    rule = results.store.manifest.selection
+    given = rule.requirements if isinstance(rule, Cheapest) else {}
+    return {str(metric): least for metric, least in given.items()}
+
+
+def drawn(results: Results, fronts: Fronts) -> list[Drawing]:
+    """Cost against the metrics of the fronts under every condition."""
+    drawings: list[Drawing] = []
+    for metric, front in fronts.items():
+        for condition, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
+            least = required(results).get(metric)
+            drawing = figures.front(rows, metric, _currency(results), least)
+            title = f"Cost against {metric_name(metric).lower()}{', ' * bool(condition)}{condition}"
+            counted = f"{_LEVEL} intervals; n = {numbers.span(rows['n'])} missions per setting."
+            drawings.append((drawing, title, f"{title}. {MARKS} Bars are {counted}", rows))
+    return drawings
+
+
+def front_table(results: Results, fronts: Fronts) -> HTML:
+    """The settings that may be on one of the fronts, with the probabilities."""
+    first = next(iter(fronts.values()))
+    shares = pd.DataFrame({metric: front["probability"] for metric, front in fronts.items()})
+    top = first[(shares >= CERTAIN).any(axis=1)].head(MOST_ROWS)
+    shown = _settings(top, [*fronts])
+    for metric in fronts:
+        head = f"On the front of {metric_name(metric).lower()}"
+        shown[head] = shares.loc[top.index, metric].map(numbers.percent)
+    caption = (
+        f"Settings that may be on a front: mean cost [{_currency(results)}] and metrics with "
+        f"{_LEVEL} intervals, and the probability that they are on it"
+    )
+    data = first.drop(columns=["on_front", "probability"])
+    return html.table(shown, caption, data=data.join(shares.add_prefix("on_front_of_")))
+
+
+def parts_table(results: Results) -> HTML:
+    """What makes up the costs of the settings."""
+    rows = questions.priced(results)
+    rows = rows.merge(questions.parts(results).drop(columns=COST), on=["policy", "point"])
+    top = rows.head(MOST_ROWS)
+    shown = _settings(top, [])
+    for part in questions.PARTS:
+        shown[part.capitalize()] = top[part].map("{:,.0f}".format)
+    caption = f"The mean cost of the settings [{_currency(results)}], and its parts"
+    return html.table(shown, caption, data=rows)
+
+
+def cheapest(results: Results) -> str:
+    """The cheapest settings that meet the requirements, and why, as a list; with the guarantee."""
+    table = questions.judged(results)
+    lines = [f"- {text}" for text in questions.answers(results, table)]
+    said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
+    sure = "\n\n".join(f"What is known of it: {text}." for text in sorted(said))
+    return "\n".join(lines) + f"\n\n{sure}"
+
+
+def judged_table(results: Results) -> HTML:
+    """Whether the settings meet the requirements."""
+    table = questions.judged(results)
+    top = table.head(MOST_ROWS)
+    shown = _settings(top, [*required(results)])
+    shown["Requirements"] = top["verdict"].map(questions.VERDICTS)
+    shown["Selected"] = top["selected"].map({True: "yes", False: ""})
+    shown["Missions"] = top["n"].map("{:,}".format)
+    caption = f"The settings, the cheapest first; means with {_LEVEL} intervals"
+    return html.table(shown, caption, data=table)
+
+
+def checked_table(results: Results) -> HTML:
+    """The check of the selected settings on missions that did not select them."""
+    if results.checks.empty:
+        return HTML("<p>No setting was checked.</p>")
+    rows = questions.checks(results)
+    shown = _settings(rows, [*METRICS])
+    shown["Missions"] = rows["n"].map("{:,}".format)
+    caption = f"The check of the selected settings: means with {_LEVEL} intervals"
+    return html.table(shown, caption, data=rows)
+
+
+def _settings(rows: pd.DataFrame, metrics: list[str]) -> pd.DataFrame:
+    """Condition, fleet, policy, cost and metrics of settings, as text."""
+    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
+    columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
+    write = {COST: numbers.amounts} | dict.fromkeys(metrics, numbers.interval)
+    for name, writing in write.items():
+        ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy(float)
+        columns[metric_name(name)] = pd.Series([writing(*row) for row in ends], rows.index)
+    return pd.DataFrame(columns)
+
+
+def _currency(results: Results) -> str:
+    return results.manifest["study"]["costs"]["currency"]
+
+
+_LEVEL = numbers.level(LEVEL)
