@@ -3,12 +3,13 @@
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, PercentFormatter
 
 from analysis.figures import style
 from analysis.names import COST, metric_name
 
 WIDE = 20.0  # the ratio of costs from which on their axis is logarithmic
+MANY = 10_000  # costs from which on they are in thousands
 MOST_NAMES = 6  # settings on the front that are named
 FAINT = 0.15  # the opacity of a setting that is not on the front
 
@@ -36,10 +37,10 @@ def front(table: pd.DataFrame, metric: str, currency: str, required: float | Non
             _names(on_front, metric, ax)
         if required is not None:
             ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
-        ax.set(xlabel=f"cost [{currency}]", ylabel=metric_name(metric).lower())
+        ax.set_ylabel(metric_name(metric).lower())
         ax.margins(x=0.12, y=0.12)
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
-        _costs_axis(table[COST], ax)
+        _costs_axis(table[COST], currency, ax)
         style.legend_below(figure, ax)
     return figure
 
@@ -64,15 +65,15 @@ def _names(rows: pd.DataFrame, metric: str, ax: Axes) -> None:
                     textcoords="offset points")  # fmt: skip
 
 
-def _costs_axis(costs: pd.Series, ax: Axes) -> None:
-    """Costs in full, on a logarithmic axis where they differ a lot."""
+def _costs_axis(costs: pd.Series, currency: str, ax: Axes) -> None:
+    """Costs at round values, in thousands if large; logarithmic where they differ a lot."""
     least, most = costs.min(), costs.max()
-    is_wide = least > 0 and most / least > WIDE
-    if is_wide:
+    if least > 0 and most / least > WIDE:
         ax.set_xscale("log")
         ax.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.minorticks_off()
     else:
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
-    digits = 0 if most - least >= 5 else 2
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost:,.{digits}f}"))
+        style.round_ticks(ax.xaxis, 5)
+    unit = 1000 if most >= MANY else 1
+    ax.xaxis.set_major_formatter(FuncFormatter(lambda cost, _: f"{cost / unit:,g}"))
+    ax.set_xlabel(f"cost [{'1,000 ' if unit > 1 else ''}{currency}]")

@@ -1,0 +1,235 @@
+"""Questions on costs: hand-worked tables and sentences, and a study of a small sea."""
+
+import math
+
+import pandas as pd
+import pytest
+
+from analysis import load_results, run_study
+from analysis.figures import costs as figures
+from analysis.questions import costs, summary
+from analysis.stats.front import on_front
+from analysis.stats.intervals import mean_interval, wilson
+from analysis.study.study import CHECK
+from dess import InputError
+from tests.analysis.small import small_study
+
+PRICES = {"uav": 1000, "pad": 100, "charge": 2, "hour": 6, "lost_uav": 1000}
+PRICES |= {"missions": 5, "slot_seconds": 60}
+# The UAVs are cheap, so that a fleet of three may be cheaper than one of two that gets lost.
+DESIGN = {"kind": "grid", "values": {"uavs": [1, 2], "pads": [1, 2], "quota": [60, 120]}}
+RULE = {
+    "procedure": "cheapest",
+    "requirements": {"success": 0.8},
+    "tolerance": 0.1,
+    "indifference": 50,
+    "budget": 20_000,
+    "check": 6,
+}
+
+
+@pytest.fixture(scope="module")
+def fixed(tmp_path_factory):
+    """A study of as many missions at every design point."""
+    folder = tmp_path_factory.mktemp("fixed")
+    study = small_study(folder, missions=40, design=DESIGN, costs=PRICES)
+    return run_study(study, folder / "out")
+
+
+@pytest.fixture(scope="module")
+def searched(tmp_path_factory):
+    """A study that looks for the cheapest setting."""
+    folder = tmp_path_factory.mktemp("searched")
+    study = small_study(folder, selection=RULE, design=DESIGN, costs=PRICES)
+    return run_study(study, folder / "out")
+
+
+def test_missions_have_the_cost_of_their_records(fixed):
+    pads = fixed.missions["point"].map(lambda p: fixed.scenario(p).charging_pads)
+    uavs = fixed.uavs.assign(lost=fixed.uavs["end"] == "battery")
+    sums = uavs.groupby(["policy", "point", "replication"])[["slots_charging", "lost"]].sum()
+    keys = pd.MultiIndex.from_frame(fixed.missions[["policy", "point", "replication"]])
+    sums = sums.loc[keys]
+    rate = fixed.scenario(0).charge_rate
+    running = 2 * sums["slots_charging"].to_numpy() * rate / 100 + 1000 * sums["lost"].to_numpy()
+    running += 6 * fixed.missions["slots"].to_numpy() / 60
+    expected = 1000 * fixed.missions["uavs"] + 100 * pads + 5 * running
+    assert fixed.missions["cost"].to_numpy() == pytest.approx(expected.to_numpy())
+    assert sums["lost"].any()
+
+
+def test_settings_are_priced_condition_by_condition(fixed):
+    table = costs.priced(fixed)
+    assert [*dict.fromkeys(table["condition"])] == [
+        "communication quota 60",
+        "communication quota 120",
+    ]
+    assert {"1 UAV and 1 pad", "1 UAV and 2 pads", "2 UAVs and 1 pad", "2 UAVs and 2 pads"} == {
+        *table["fleet"]
+    }
+    for _, rows in table.groupby("condition"):
+        assert rows["cost"].is_monotonic_increasing
+    row = table.iloc[3]
+    missions = fixed.missions.query(f"policy == '{row['policy']}' and point == {row['point']}")
+    assert row[["cost", "cost_low", "cost_high"]].tolist() == pytest.approx(
+        mean_interval(missions["cost"])
+    )
+
+
+def test_parts_add_up(fixed):
+    parts = costs.parts(fixed)
+    assert parts["cost"].to_numpy() == pytest.approx(parts[[*costs.PARTS]].sum(axis=1).to_numpy())
+    means = fixed.missions.groupby(["policy", "point"], sort=False)["cost"].mean()
+    assert parts["cost"].to_numpy() == pytest.approx(means.to_numpy())
+
+
+@pytest.mark.parametrize("metric", ["success", "collection_ratio"])
+def test_each_condition_has_a_front_of_its_own(fixed, metric):
+    table = costs.front(fixed, metric)
+    for _, rows in table.groupby("condition"):
+        expected = on_front(rows["cost"].to_numpy(), rows[metric].to_numpy())
+        assert rows["on_front"].tolist() == expected.tolist()
+        assert rows["probability"].between(0, 1).all()
+        assert rows["probability"].sum() >= 1
+    again = costs.front(fixed, metric)
+    assert again.equals(table)
+
+
+def test_the_figure_shows_the_front_and_what_is_required(fixed):
+    table = costs.front(fixed)
+    rows = table[table["condition"] == table["condition"].iloc[0]]
+    (ax,) = figures.front(rows, "success", "EUR", 0.8).axes
+    lines = {line.get_label(): line for line in ax.lines}
+    members = rows[rows["on_front"]].sort_values("cost")
+    assert lines["front of the estimates"].get_xdata().tolist() == members["cost"].tolist()
+    assert {*lines["required"].get_ydata()} == {0.8}
+    assert {"greedy", "random"} <= lines.keys()
+    assert "EUR" in ax.get_xlabel()
+
+
+def test_requirements_are_judged_by_the_intervals(fixed):
+    table = costs.judged(fixed, {"success": 0.8})
+    for row in table.itertuples():
+        missions = fixed.missions.query("policy == @row.policy and point == @row.point")
+        _, low, high = wilson(missions["success"].sum(), len(missions))
+        verdict = "met" if low >= 0.8 else "missed" if high < 0.8 else "open"
+        assert row.verdict == verdict
+    for _, rows in table.groupby(["condition", "policy"]):
+        met = rows[rows["verdict"] == "met"]
+        assert rows["selected"].sum() == min(len(met), 1)
+        assert met["selected"].iloc[:1].all()
+    assert {"met", "missed"} <= {*table["verdict"]}  # or this test says little
+
+
+def test_a_fleet_is_judged_over_all_conditions(fixed):
+    table = costs.judged(fixed, {"success": 0.8})
+    fleets = costs.everywhere(fixed, table)
+    assert len(fleets) == 2 * 4
+    for row in fleets.itertuples():
+        part = table[(table["policy"] == row.policy) & (table["fleet"] == row.fleet)]
+        assert row.cost == pytest.approx(part["cost"].mean())
+        assert (row.verdict == "met") == (part["verdict"] == "met").all()
+        assert (row.verdict == "missed") == (part["verdict"] == "missed").any()
+    for _, rows in fleets.groupby("policy"):
+        assert rows["selected"].sum() == (rows["verdict"] == "met").any()
+
+
+def test_the_answer_says_why_no_cheaper_fleet_will_do(fixed):
+    """The rows are made by hand, on the frame of the study."""
+    table = costs.judged(fixed, {"success": 0.8})
+    one = table[(table["condition"] == "communication quota 60") & (table["policy"] == "greedy")]
+    one = one.iloc[:3].assign(
+        fleet=["1 UAV", "2 UAVs", "3 UAVs"],
+        cost=[21_000.0, 48_000.0, 69_000.0],
+        success=[0.5, 0.71, 0.997],
+        success_low=[0.4, 0.66, 0.991],
+        success_high=[0.6, 0.76, 0.999],
+        verdict=["missed", "missed", "met"],
+        selected=[False, False, True],
+    )
+    (text,) = costs.answers(fixed, one, {"success": 0.99})
+    assert text == (
+        "Communication quota 60, `greedy`: the cheapest setting that meets the requirements is "
+        "**3 UAVs** for 69,000 EUR. It has success 99.7 % [99.1, 99.9] (99 % required). The next "
+        "cheaper one, **2 UAVs** for 48,000 EUR, misses the requirements: it has success 71.0 % "
+        "[66.0, 76.0] (99 % required)."
+    )
+    none = one.assign(verdict=["missed", "missed", "open"], selected=False)
+    (text,) = costs.answers(fixed, none, {"success": 0.99})
+    assert "no setting is known to meet the requirements." in text
+    assert "The most expensive one, **3 UAVs** for 69,000 EUR, is not known to meet" in text
+    first = one.iloc[2:]
+    assert costs.answers(fixed, first, {"success": 0.99})[0].endswith("of the study is cheaper.")
+
+
+def test_how_many_missions_can_show_a_requirement():
+    for required in (0.5, 0.9, 0.99):
+        n = costs.least_missions(required)
+        assert wilson(n, n).low >= required > wilson(n - 1, n - 1).low
+
+
+def test_a_search_is_kept_told_and_checked(searched):
+    manifest, table = searched.store.manifest, costs.judged(searched)
+    selections = summary.selections(searched)
+    for number, policy in enumerate(searched.policies):
+        choice = searched.cheapest(policy)
+        assert manifest.selected[number] == choice.selected
+        assert choice.done
+        rows = table[table["policy"] == policy].set_index("point")
+        assert rows.loc[range(len(rows)), "verdict"].tolist() == list(choice.verdicts)
+        answers = [a.points for a in choice.answers if a.condition is not None]
+        assert {*rows.index[rows["selected"]]} == {point for points in answers for point in points}
+        missions = searched.missions[searched.missions["policy"] == policy]
+        assert missions.groupby("point").size().tolist() == list(choice.counts)
+        checks = searched.checks[searched.checks["policy"] == policy]
+        assert checks["point"].drop_duplicates().tolist() == choice.selected
+        assert (checks.groupby("point").size() == 6).all()
+        assert checks["replication"].min() == CHECK if choice.selected else checks.empty
+        assert (selections["policy"] == policy).sum() == 3  # two conditions, and both
+    assert table["selected"].any()  # or this test says little
+    assert len(costs.checks(searched)) == len(searched.checks) / 6
+    assert searched.choice("greedy") is None
+    assert "All conditions together, `greedy`" in "\n".join(costs.answers(searched, table))
+
+
+def test_an_interrupted_search_ends_with_the_same_missions(searched, tmp_path):
+    class StopError(Exception):
+        pass
+
+    def stop(announced):
+        if announced.number == 2:
+            raise StopError
+
+    study = small_study(tmp_path, selection=RULE, design=DESIGN, costs=PRICES)
+    with pytest.raises(StopError):
+        run_study(study, tmp_path / "out", announce=stop)
+    again = run_study(study, tmp_path / "out")
+    assert again.manifest["missions"] == searched.manifest["missions"]
+    assert again.manifest["selected"] == searched.manifest["selected"]
+    assert load_results(tmp_path / "out").cheapest("greedy") == searched.cheapest("greedy")
+
+
+def test_bad_questions_get_one_line(fixed, tmp_path):
+    free = run_study(small_study(tmp_path, missions=5), tmp_path / "free")
+    for ask in (costs.priced, costs.parts, costs.front, costs.judged):
+        with pytest.raises(InputError, match=r"no prices; allowed: one with a table \[costs\]"):
+            ask(free)
+    with pytest.raises(InputError, match="metric: 'reward' is unknown"):
+        costs.front(fixed, "reward")
+    for requirements, complaint in [
+        (None, "none are given"),
+        ({"speed": 0.9}, "'speed' is unknown"),
+        ({"success": 1.0}, "between 0 and 1"),
+        ({"success": math.nan}, "between 0 and 1"),
+    ]:
+        with pytest.raises(InputError, match=complaint):
+            costs.judged(fixed, requirements)
+
+
+def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
+    study = small_study(tmp_path, missions=5, costs={"uav": 10.5}, set={"uavs": 2})
+    results = run_study(study, tmp_path / "out")
+    assert set(results.missions["cost"]) == {21.0}
+    table = costs.front(results)
+    assert table["fleet"].tolist() == ["the fleet of the scenario"] * 2
+    assert table["condition"].tolist() == ["", ""]
