@@ -5,7 +5,7 @@ the arrival rate. There is a question for every condition, and, if there are sev
 them: the cheapest setting that meets the requirements everywhere, at the mean cost of the
 conditions. Every setting is a candidate of a question, with a design point for each condition.
 
-Missions come in rounds that grow by a quarter. After each,
+Missions come in rounds that grow by half. After each,
  1. the requirements of every point are tested as of ``feasibility``: a candidate is feasible once
     all requirements of its points are met, infeasible once one is missed;
  2. the feasible candidate i of the least mean cost, the leader of its question, is compared with
@@ -264,7 +264,7 @@ class _Search:
                     question.look(self.verdicts, costs, self.rule.indifference)
             needed = sorted(set().union(*(question.needed for question in self.questions)))
             room = self.rule.budget - int(self.counts.sum())
-            step = min(max(stage // 4, 1), room // len(needed)) if needed else 0
+            step = min(stage // 2, room // len(needed)) if needed else 0
             if step < 1:
                 self.done = True
                 return

@@ -41,7 +41,7 @@ class Problem:
         pairs = zip(self.fleets.tolist(), self.conditions.tolist(), strict=True)
         return [Setting({"uavs": f, "arrival_rate": c}, self._loss) for f, c in pairs]
 
-    def samples(self, seed, missions=25_000):
+    def samples(self, seed, missions=15_000):
         """Values that are correlated over the settings; those that fail pay the loss."""
         generator = np.random.default_rng([9, seed])
         size = (len(self.success), missions)
