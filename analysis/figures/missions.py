@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.figures import style
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
-from dess.scenario import Scenario
+from dess.scenario import Scenario, ScenarioSpace
 
 # Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
 SPREAD = 0.4
@@ -123,6 +123,14 @@ def mission_figure(events: Events, scenario: Scenario) -> Figure:
     return figure
 
 
+def sea_figure(space: ScenarioSpace) -> Figure:
+    """The map of a scenario: its sensor nodes, each in its colour, and its zone."""
+    with style.look():
+        figure = Figure(figsize=(5.6, 5.6), dpi=style.DPI, layout="constrained")
+        _grid(space, figure.subplots())
+    return figure
+
+
 def _outcome(events: Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
@@ -132,7 +140,7 @@ def _outcome(events: Events, scenario: Scenario) -> str:
     return f"I = {scenario.uavs}: {share:.1%} collected, {filled} of {scenario.uavs} quotas filled"
 
 
-def _grid(scenario: Scenario, ax: Axes) -> None:
+def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     """The grid, its zone and its nodes; y grows south."""
     x, y, width, height = scenario.zone
     zone = Rectangle(

@@ -13,7 +13,7 @@ import pandas as pd
 from analysis.results.tables import Results
 from dess import InputError, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
-from dess.scenario import Scenario
+from dess.scenario import Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario
 from policies import load_team
 
@@ -32,6 +32,20 @@ class Resimulated(NamedTuple):
     events: pd.DataFrame
 
 
+def mission_of(
+    space: ScenarioSpace, policy: str, seed: int = 0, replication: int = 0
+) -> Resimulated:
+    """A mission of any scenario, to look at.
+
+    Raises:
+        InputError: If there is no such policy, or it cannot act in the scenario.
+    """
+    record = simulate(space, load_team(policy), seed, replication, events=True)
+    assert record.events is not None
+    events = pd.DataFrame(record.events.columns())
+    return Resimulated(sample_scenario(space, seed, replication), record, events)
+
+
 def resimulate(results: Results, policy: str, point: int, replication: int) -> Resimulated:
     """Simulate a mission of a study again, with the SimPy engine.
 
@@ -39,15 +53,13 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> R
         InputError: If the study has no such mission, or its record is another one.
     """
     space, seed = results.scenario(point), results.store.manifest.seed
-    record = simulate(space, load_team(policy), seed, replication, events=True)
-    if changed := difference(record, recorded(results, policy, point, replication)):
+    mission = mission_of(space, policy, seed, replication)
+    if changed := difference(mission.record, recorded(results, policy, point, replication)):
         raise InputError(
             f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
             f"{changed}; allowed: results of this very code"
         )
-    assert record.events is not None
-    events = pd.DataFrame(record.events.columns())
-    return Resimulated(sample_scenario(space, seed, replication), record, events)
+    return mission
 
 
 def recorded(results: Results, policy: str, point: int, replication: int) -> dict[str, Any]:

@@ -10,6 +10,7 @@ sweep needs and another one has is taken from there. The file of the study lies 
 
 import json
 import os
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
 from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
+from analysis.study.cheapest import Cheapest
 from analysis.study.design import Grid
 from analysis.study.study import Study
 from dess import InputError, simulate_batch
@@ -38,7 +40,9 @@ FOLDER = "sweeps"
 LONGEST = 60  # characters of the fields in a name
 ALIASES = {"ratio": RATIO, "product": PRODUCT}  # short names of metrics that may be required
 
-BUDGET = 1000  # missions per setting that the search of the cheapest one may take, on average
+# Missions that the search of the cheapest setting may take: per setting on average, and of all;
+# and those of every setting that it begins with.
+BUDGET, ALL, FIRST = 2_000, 1_000_000, 20
 LITTLE = 0.01  # of the prices: a saving that does not matter
 
 
@@ -97,6 +101,31 @@ def folder_of(study: Study, folder: str | Path) -> Path:
 def file_of(study: Study, folder: str | Path) -> Path:
     """The file of the study of a sweep."""
     return Path(folder) / FOLDER / f"{study.name}.toml"
+
+
+def command(study: Study) -> str:
+    """The command that asks a sweep."""
+    assert isinstance(study.design, Grid)
+    fixed = {field: [value] for field, value in study.set.items()}
+    values = {**fixed, **study.design.values}
+    words = [w for f, of_f in values.items() for w in ("--set", f"{f}={_listed(of_f)}")]
+    about = {"policy": study.policies, "missions": [study.missions], "seed": [study.seed]}
+    if study.scenario != "paper":
+        about["scenario"] = [Path(study.scenario).name]
+    words += [
+        w for name, of_name in about.items() for w in (f"--{name}", ",".join(map(str, of_name)))
+    ]
+    prices = study.costs.model_dump(exclude_unset=True) if study.costs else {}
+    words += [w for key, amount in prices.items() for w in ("--price", f"{key}={amount}")]
+    rule = study.selection
+    if isinstance(rule, Cheapest):
+        words[words.index("--missions") + 1] = str(rule.check)
+        words += [w for m, q in rule.requirements.items() for w in ("--require", f"{m}={q}")]
+    return shlex.join(["dess", "sweep", *words])
+
+
+def _listed(values: Iterable[Any]) -> str:
+    return json.dumps([*values])[1:-1].replace(" ", "")
 
 
 def ask(
@@ -184,7 +213,8 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
         "procedure": "cheapest",
         "requirements": least,
         "indifference": LITTLE * (fleet or running),
-        "budget": BUDGET * max(study.size, 100),
+        "budget": min(BUDGET * study.size, max(ALL, FIRST * study.size)),
+        "first": FIRST,
         "check": missions,
     }
 

@@ -22,8 +22,9 @@ from analysis.names import PRODUCT
 from analysis.questions import costs, settings
 from analysis.results.tables import Results
 from analysis.study.study import Study
-from analysis.sweeps.question import ask, folder_of, question
+from analysis.sweeps.question import ask, command, folder_of, question
 from analysis.sweeps.values import values_of
+from dess import InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +82,37 @@ class Sweep:
         lines = costs.answers(self.results, costs.judged(self.results))
         return [line.replace("**", "") for line in lines]
 
-    def plot(self, x: str, hue: str | None = None, metric: str = PRODUCT) -> Figure:
+    @property
+    def fields(self) -> list[str]:
+        """The swept fields."""
+        return [*settings.varied(self.results)]
+
+    @property
+    def guarantee(self) -> str:
+        """With requirements: what is promised of the selected settings, in words."""
+        choices = (self.results.cheapest(policy) for policy in self.results.policies)
+        return "; ".join(dict.fromkeys(choice.guarantee for choice in choices if choice))
+
+    @property
+    def command(self) -> str:
+        """The command that asks the same."""
+        return command(self.study)
+
+    def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> Figure:
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.
 
         Args:
-            x: The field.
+            x: The field; without one, the first that is swept, with the second one as ``hue``.
             hue: A field that has a curve for each of its values.
             metric: What is drawn.
+
+        Raises:
+            InputError: If a field is not swept, or there is no such metric.
         """
+        if x is None:
+            if not self.fields:
+                raise InputError("x: no field is swept; allowed: a sweep of one field or more")
+            x, hue = self.fields[0], hue or next(iter(self.fields[1:]), None)
         return figures.plot(self.results, x, hue, metric)
 
 
@@ -149,7 +173,8 @@ def _bar(shown: bool) -> Iterator[tuple[Progress, Any]]:
     """A bar that counts missions; its total grows where a rule asks for more."""
     from tqdm.auto import tqdm
 
-    with tqdm(unit="mission", disable=None if shown else True, delay=1) as bar:
+    hidden = {} if shown else {"disable": True}  # the environment may hide it as well
+    with tqdm(unit="mission", delay=1, **hidden) as bar:
 
         def begin(started: Round) -> None:
             bar.total = started.missions

@@ -152,6 +152,7 @@ def _environment(home: Path) -> dict[str, str]:
         **dict.fromkeys(folders, str(home)),
         "PYTHONPATH": path,
         "OMP_NUM_THREADS": "1",
+        "TQDM_DISABLE": "1",  # a page has no bar
         "MPLBACKEND": "agg",
         "MPLCONFIGDIR": mpl.get_cachedir(),
     }

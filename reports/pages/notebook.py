@@ -33,6 +33,8 @@ NAMES = (  # in the order of the index
     "comparison",
     "explorer",
     "what-if",
+    "sweep",
+    "own-sea",
     "verification",
     SCORECARD,
 )
