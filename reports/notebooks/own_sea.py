@@ -28,8 +28,9 @@ seed = 0  # of the missions
 workers = 1  # processes
 
 # %%
-from analysis import sweep
+from analysis import numbers, sweep
 from analysis.figures.missions import mission_figure, sea_figure
+from analysis.names import METRICS
 from analysis.results.resimulate import mission_of
 from dess import load_scenario
 from reports.pages import html
@@ -108,7 +109,9 @@ html.say("{answers}", answers="\n".join(f"- {line}" for line in answer.answers()
 # %%
 columns = ["policy", *answer.fields, "success", "collection_ratio", "n", "cost", "verdict"]
 costs = answer.table("cost")
-html.table(costs[columns], f"Mean cost over {flights:,} missions in {currency}", data=costs)
+shown = costs[columns].assign(cost=costs["cost"].map("{:,.0f}".format))
+shown[[*METRICS][:2]] = shown[[*METRICS][:2]].map(numbers.percent)
+html.table(shown, f"Mean cost over {flights:,} missions in {currency}", data=costs)
 
 # %%
 caption = "Success, with 95 % intervals; settings that were ruled out early have wide ones."
