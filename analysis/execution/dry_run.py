@@ -147,6 +147,25 @@ def check_effort(
     return sum(missing)
 
 
+def check_policies(study: Study) -> None:
+    """Have every policy act in a mission in every place of the design: a grid, a zone and nodes.
+
+    Any other error than ``InputError`` is left to the run, which records it.
+
+    Raises:
+        InputError: If a policy cannot act in one of them, as one that has learned another place.
+    """
+    spaces = (point.scenario for point in study.points)
+    places = [*{(space.grid, space.zone, space.nodes): space for space in spaces}.values()]
+    for policy in study.policies:
+        try:
+            simulate_batch(places, load_team(policy), study.seed, len(places))
+        except InputError:
+            raise
+        except Exception:  # code of another package may raise anything
+            continue
+
+
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
     """Missions of a team that are missing, and all that are wanted for now."""
     manifest = store.manifest

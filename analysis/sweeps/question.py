@@ -19,7 +19,7 @@ import tomli_w
 from pydantic import ValidationError
 
 import dess
-from analysis.execution.dry_run import check_effort
+from analysis.execution.dry_run import check_effort, check_policies
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
 from analysis.names import METRICS, PRODUCT, RATIO
@@ -29,12 +29,12 @@ from analysis.results.provenance import engine_code, team_of
 from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.cheapest import Cheapest
+from analysis.study.costs import Costs
 from analysis.study.design import Grid
 from analysis.study.study import Study
-from dess import InputError, simulate_batch
+from dess import InputError
 from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
-from policies import load_team
 
 FOLDER = "sweeps"
 LONGEST = 60  # characters of the fields in a name
@@ -73,11 +73,14 @@ def question(
     Raises:
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
     """
+    if unknown := [key for key in prices or () if key not in Costs.model_fields]:
+        allowed = ", ".join(Costs.model_fields)
+        raise InputError(f"prices: {unknown[0]!r} is unknown; allowed: {allowed}")
     fixed = {field: of_field[0] for field, of_field in values.items() if len(of_field) == 1}
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     data = {
-        "name": name or "sweep",
+        "name": "sweep" if name is None else name,
         "description": "a sweep: every combination of the values",
         "scenario": str(scenario),
         "set": fixed,
@@ -90,7 +93,7 @@ def question(
     if requirements:
         data["selection"] = _cheapest(requirements, missions, _study(data))
     study = _study(data)
-    return study if name else study.model_copy(update={"name": _name_of(study, swept)})
+    return study if name is not None else study.model_copy(update={"name": _name_of(study, swept)})
 
 
 def folder_of(study: Study, folder: str | Path) -> Path:
@@ -158,17 +161,6 @@ def ask(
         check_policies(study)
     write(study, folder)
     return run_study(study, out, workers, None, progress, announce, reuse=sorted(others))
-
-
-def check_policies(study: Study) -> None:
-    """Have every policy act in a mission of every value, with the first value of all other fields.
-
-    Raises:
-        InputError: If a policy cannot act in one of them.
-    """
-    spaces = _spaces(study)
-    for policy in study.policies:
-        simulate_batch(spaces, load_team(policy), study.seed, len(spaces))
 
 
 def write(study: Study, folder: str | Path) -> Path:

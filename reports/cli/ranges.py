@@ -68,7 +68,9 @@ def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any
 
     first, last = _number(text, low), _number(text, high)
     if first > last:
-        raise _refused(text, "is the wrong way round", f"{field}={high.strip()}..{low.strip()}")
+        number = "" if count is None else f":{count}"
+        turned = f"{field}={high.strip()}..{low.strip()}{number}"
+        raise _refused(text, "is the wrong way round", turned)
     if count is not None:
         return _spaced(text, first, last, count, field in INTEGERS)
     if field not in INTEGERS:

@@ -11,7 +11,7 @@ import typer
 from dess import InputError
 from dess.files import replacing
 from reports.cli import console
-from reports.cli.report import rendering
+from reports.cli.report import check_pages, rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import PAGES, RESULTS, JsonOption, WorkersOption
 
@@ -52,7 +52,7 @@ def run(
     yes: YesOption = False,
 ) -> None:
     """Run a study into a results folder; run again to resume or to top up."""
-    from analysis.execution.dry_run import check_effort, plan_study
+    from analysis.execution.dry_run import check_effort, check_policies, plan_study
     from analysis.execution.runner import run_study
     from analysis.study.study import load_study
     from reports.cli import study_tables
@@ -65,8 +65,11 @@ def run(
             plan = plan_study(study, out, workers, accept_code=accept_code)
             study_tables.print_plan(plan, study, out, workers)
         return
+    if page:
+        check_pages(PAGES)
     with console.compile_notice():
-        check_effort(study, out, workers, accept_code=accept_code, yes=yes)
+        if check_effort(study, out, workers, accept_code=accept_code, yes=yes):
+            check_policies(study)
     results = complete(
         study.name,
         lambda progress, announce: run_study(
@@ -102,9 +105,9 @@ def show(
     from reports.cli import study_tables
 
     results = load_results(folder)
-    if policy and policy not in results.policies:
+    if policy is not None and policy not in results.policies:
         allowed = ", ".join(results.policies)
-        raise InputError(f"--policy: {policy} is not in the study; allowed: {allowed}")
+        raise InputError(f"--policy: {policy!r} is not in the study; allowed: {allowed}")
     policy = policy or summary.best_policy(results.missions)
     tables = {
         "means": summary.means(results),

@@ -8,7 +8,7 @@ import typer
 
 from reports.cli import console
 from reports.cli.ranges import all_settings, all_values
-from reports.cli.report import rendering
+from reports.cli.report import check_pages, rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import (
     PAGES,
@@ -96,6 +96,7 @@ def sweep(
         all_settings(require or [], "--require", SHARE),
         name,
     )
+    check_pages(out)
     folder, file = question.folder_of(study, results), question.file_of(study, results)
     found = complete(
         study.name,

@@ -33,6 +33,7 @@ BAD = {
     "evaluate --policy greedy --policy gredy": ["'gredy' is unknown"],
     "study run nope": ["nope: no such study", "fig4, fig5", "table4"],
     "study run trial.toml --policy gredy": ["trial.toml: policies", "'gredy' is unknown"],
+    "study run trial.toml --policy ddqn": ["policy ddqn: has learned grid 32, not 8"],
     "study run trial.toml --missions 0": ["--missions", "1"],
     "study run trial.toml --out small.toml": ["small.toml: cannot be written"],
     "study run trial.toml --out small.toml/out": ["small.toml/out: cannot be written"],

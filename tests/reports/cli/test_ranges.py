@@ -40,7 +40,7 @@ REFUSED = {
     "uavs=2,3,2": "uavs: 2 is listed twice",
     "uavz=2..3": "uavz: unknown key; allowed: altitude",
     "uavs=5..2": "'uavs=5..2' is the wrong way round; allowed: uavs=2..5",
-    "arrival_rate=0.5..0.1:3": "is the wrong way round",
+    "arrival_rate=0.5..0.1:3": "is the wrong way round; allowed: arrival_rate=0.1..0.5:3",
     "uavs=a..3": "has an end 'a' that is no number",
     "uavs=..3": "has an end '' that is no number",
     "uavs=2..": "has an end '' that is no number",

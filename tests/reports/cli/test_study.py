@@ -34,6 +34,10 @@ def test_a_dry_run_tells_the_plan_and_writes_nothing(dess, tmp_path):
 
 def test_a_study_is_shown(dess, dess_json):
     assert dess("study", "run", "trial.toml", "--missions", 30)[0] == 0
+    for policy in ("", "tour"):
+        code, _, err = dess("study", "show", "results/trial", "--policy", policy)
+        assert (code, err.count("\n")) == (2, 1)
+        assert f"--policy: {policy!r} is not in the study; allowed: greedy, random" in err
     code, out, _ = dess("study", "show", "results/trial", "--worst", 2)
     assert code == 0
     data = dess_json("study", "show", "results/trial", "--worst", 2)
@@ -87,6 +91,15 @@ def test_results_of_another_version_are_refused(dess, tmp_path):
     assert "out/manifest.json: made by dess 9." in err
     assert "allowed: another --out" in err
     assert err.count("\n") == 1
+    assert files_of(tmp_path) == before
+
+
+def test_pages_that_cannot_be_written_are_refused_before_the_run(dess, tmp_path):
+    (tmp_path / "build").touch()
+    before = files_of(tmp_path)
+    code, out, err = dess("study", "run", "trial.toml", "--report")
+    assert (code, out) == (2, "")
+    assert err == "dess: error: build/reports: cannot be written; allowed: another path\n"
     assert files_of(tmp_path) == before
 
 

@@ -98,7 +98,11 @@ BAD = {
     "--require success=0.9": "requirements: need prices",
     "--price uav=1 --require speed=0.9": "requirements: 'speed' is unknown; allowed: success",
     "--price uav=1 --require success=2": "requirements.success: 2 is out of range",
+    "--price uavs=3": "prices: 'uavs' is unknown; allowed: currency, uav, pad",
     "--name a/b": "name: String should match pattern",
+    "--name ": "name: String should match pattern",
+    "--out small.toml": "small.toml: cannot be written",
+    "--out small.toml/pages": "small.toml/pages: cannot be written",
     "--results small.toml": "cannot be written: Not a directory",
     "--set quota=1..1000 --set arrival_rate=0..1:1000": "600,000,000 missions to simulate "
     "(2 policies, 1,000,000 design points), about",
