@@ -176,7 +176,7 @@ REFUSED = {
     "missions: Input should be greater than or equal to 1": {"missions": 0},
     "name: String should match": {"name": "../mine"},
     "costs.uav: Input should be greater than or equal to 0, not -1": {"prices": {"uav": -1}},
-    "costs.uaf": {"prices": {"uaf": 1}},
+    "prices: 'uaf' is unknown; allowed: currency, uav": {"prices": {"uaf": 1}},
     "requirements: need prices": {"requirements": {"success": 0.9}},
     "requirements: 'speed' is unknown; allowed: success": {
         "requirements": {"speed": 0.9},
