@@ -18,8 +18,8 @@ from pandas.api.types import is_numeric_dtype
 from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, SHARES, parameter, value_text
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
+from analysis.stats.differences import column_tests
 from analysis.stats.intervals import column_intervals
-from analysis.stats.paired import paired
 from analysis.stats.screening import may_be_best
 from dess import InputError
 
@@ -206,13 +206,13 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
         raise InputError(f"baseline: {point} is no design point; allowed: 0..{count - 1}")
     tables = []
     for metric in metrics:
-        rows = []
+        parts = []
         for policy in results.policies:
             missions = _missions(results, metric, policy)
             wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
-            rows += _differences(wide, policy, point, metric)
-        columns = ["metric", "policy", "point", "difference", "low", "high", "p", "n"]
-        table = pd.DataFrame(rows, columns=columns)
+            tests = column_tests(wide.drop(columns=point), wide[point], metric in SHARES)
+            parts.append(tests[tests["n"] > 0].reset_index().assign(metric=metric, policy=policy))
+        table = pd.concat(parts, ignore_index=True)
         tables.append(table.assign(p_adjusted=adjust(table["p"].to_numpy(float), "holm")))
     whole = pd.concat(tables, ignore_index=True)
     fields = points(results).loc[whole["point"]].reset_index(drop=True)
@@ -272,17 +272,6 @@ def _in_order(column: pd.Series) -> pd.Series:
 def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
     sign = -1.0 if metric in LESS_IS_BETTER else 1.0
     return may_be_best(sign * values.to_numpy(float), metric in SHARES)
-
-
-def _differences(wide: pd.DataFrame, policy: str, baseline: int, metric: str) -> list[tuple]:
-    """Every other column of (replications, points) against the baseline's."""
-    rows = []
-    for point in wide.columns.drop(baseline):
-        pairs = wide[[point, baseline]].dropna().to_numpy()
-        if len(pairs):
-            of = paired(pairs[:, 0], pairs[:, 1], share=metric in SHARES)
-            rows.append((metric, policy, point, of.difference, of.low, of.high, of.p, of.n))
-    return rows
 
 
 def _ordered(values: pd.Series) -> list[Any]:

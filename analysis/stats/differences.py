@@ -1,9 +1,10 @@
 """Tests of paired differences: Student's t, for shares with McNemar's, and the sign test."""
 
 import numpy as np
+import pandas as pd
 from scipy import stats
 
-from analysis.stats.intervals import Interval, mean_interval
+from analysis.stats.intervals import LEVEL, Interval, column_intervals, mean_interval
 
 _ROUNDING = 64 * np.finfo(float).eps  # relative; differences of differences below are none
 
@@ -42,6 +43,38 @@ def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
         p = float(stats.binomtest(gains, gains + losses).pvalue) if gains + losses else 1.0
     mean = float(differences.mean())
     return Interval(mean, max(smooth.low, -1.0), min(smooth.high, 1.0)), p
+
+
+def column_tests(values: pd.DataFrame, baseline: pd.Series, share: bool = False) -> pd.DataFrame:
+    """Paired comparisons of many columns with a baseline, as ``stats.paired.paired`` has them.
+
+    Args:
+        values: (R, K) a row per replication; nan where a column lacks one.
+        baseline: (R,) the values of the baseline.
+        share: Whether the values are outcomes 0 or 1.
+
+    Returns:
+        (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
+    """
+    differences = values.sub(baseline, axis=0)
+    size = values.abs().max().clip(lower=baseline.abs().max())
+    constant = differences.max() - differences.min() <= _ROUNDING * size
+    differences = differences.mask(differences.abs().le(_ROUNDING * size, axis=1), 0.0)
+    table = column_intervals(differences).rename(columns={"mean": "difference"})
+    t = (table["difference"] / differences.sem()).abs()
+    table["p"] = 2 * stats.t.sf(t, np.maximum(table["n"] - 1, 1))
+    known: dict[tuple[int, int, int], tuple[Interval, float]] = {}
+    for column in differences if share else differences.columns[constant]:
+        own = differences[column].dropna().to_numpy()
+        if share and len(own):
+            key = len(own), int((own > 0).sum()), int((own < 0).sum())  # all that the test needs
+            known[key] = known.get(key) or share_test(own, LEVEL)
+            (mean, low, high), p = known[key]
+            table.loc[column, ["difference", "low", "high", "p"]] = mean, low, high, p
+        elif len(own):
+            table.loc[column, ["low", "high"]] = own[0]
+            table.loc[column, "p"] = sign_test(own)
+    return table
 
 
 def sign_test(equal: np.ndarray) -> float:
