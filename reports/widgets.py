@@ -59,7 +59,8 @@ class WhatIfPanel(widgets.VBox):
             fields: The fields that have sliders.
             chosen: The policies that are chosen at first.
             missions: The number of missions at first.
-            ask: As ``analysis.what_if``, with values of fields and keywords.
+            ask: Asks, with the values of the sliders of the baseline and of the variation, the
+                chosen policies, the missions, and what counts missions that are done.
         """
         self._sides, self._ask = sides, ask
         self.baseline: dict[str, widgets.Widget] = {}

@@ -54,8 +54,9 @@ class Example:
     def _drawing(self, point: int) -> tuple[Figure, str, str]:
         mission = resimulate(self.results, self.policy, point, self.replication)
         figure = mission_figure(mission.events, mission.scenario)
-        caption = answer.outcome(self.results, self.policy, point, self.replication)
-        return figure, "Map of the mission; battery, residual data and charging", caption
+        outcome = answer.outcome(self.results, self.policy, point, self.replication)
+        alt = "Map of the mission; battery, residual data and charging"
+        return figure, alt, f"{outcome} n = 1."
 
 
 @dataclass(frozen=True, eq=False)
