@@ -64,16 +64,17 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, share: bool = False)
     t = (table["difference"] / differences.sem()).abs()
     table["p"] = 2 * stats.t.sf(t, np.maximum(table["n"] - 1, 1))
     known: dict[tuple[int, int, int], tuple[Interval, float]] = {}
+    exact = {}  # columns that Student's t is not for
     for column in differences if share else differences.columns[constant]:
         own = differences[column].dropna().to_numpy()
         if share and len(own):
             key = len(own), int((own > 0).sum()), int((own < 0).sum())  # all that the test needs
             known[key] = known.get(key) or share_test(own, LEVEL)
-            (mean, low, high), p = known[key]
-            table.loc[column, ["difference", "low", "high", "p"]] = mean, low, high, p
+            exact[column] = (*known[key][0], known[key][1])
         elif len(own):
-            table.loc[column, ["low", "high"]] = own[0]
-            table.loc[column, "p"] = sign_test(own)
+            exact[column] = (own[0], own[0], own[0], sign_test(own))
+    if exact:
+        table.loc[[*exact], ["difference", "low", "high", "p"]] = np.array([*exact.values()])
     return table
 
 
