@@ -11,19 +11,16 @@ meet. Fleets are compared under one condition at a time, and over all of them by
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import ceil
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtri
 
 from analysis import numbers
 from analysis.names import COST, DECISIONS, METRICS, SUCCESS, parameter, value_text
 from analysis.questions.settings import points, ranked
 from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
-from analysis.stats.intervals import LEVEL
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import PARTS, Costs
 from dess import InputError
@@ -220,12 +217,6 @@ def selections(results: Results) -> pd.DataFrame:
                 rows.append((*found, answer.settled, choice.guarantee))
     columns = ["policy", "condition", "point", "setting", "missions", "left", "guaranteed"]
     return pd.DataFrame(rows, columns=[*columns, "guarantee"]).astype({"point": "Int64"})
-
-
-def least_missions(required: float) -> int:
-    """Missions without a failure from which on the 95 % interval is above a required success."""
-    z = float(ndtri((1 + LEVEL) / 2))  # Wilson's lower end is n / (n + z^2)
-    return ceil(required / (1 - required) * z**2)
 
 
 def _answer(rows: pd.DataFrame, wanted: Mapping[str, float], currency: str) -> str:

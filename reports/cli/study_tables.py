@@ -51,8 +51,8 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         if results.store.manifest.costs and "condition" in selected:
             for text in costs.answers(results, costs.judged(results)):
                 print(f" {text.translate(str.maketrans('', '', '*`'))}")
-        if checks := study["selection"]["check"]:
-            means = summary.checks(results)
+        if len(results.checks):
+            means, checks = summary.checks(results), study["selection"]["check"]
             if "condition" in selected:
                 words = [
                     f"{row.policy} {settings(results)[row.point]}" for row in means.itertuples()

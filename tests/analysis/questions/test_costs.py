@@ -162,12 +162,6 @@ def test_the_answer_says_why_no_cheaper_fleet_will_do(fixed):
     assert costs.answers(fixed, first, {"success": 0.99})[0].endswith("of the study is cheaper.")
 
 
-def test_how_many_missions_can_show_a_requirement():
-    for required in (0.5, 0.9, 0.99):
-        n = costs.least_missions(required)
-        assert wilson(n, n).low >= required > wilson(n - 1, n - 1).low
-
-
 def test_a_search_is_kept_told_and_checked(searched):
     manifest, table = searched.store.manifest, costs.judged(searched)
     selections = summary.selections(searched)
