@@ -6,7 +6,7 @@ results.plot("uavs", hue="pads")
 results.best()
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -169,14 +169,27 @@ def sweep(
 
 
 @contextmanager
-def _bar(shown: bool) -> Iterator[tuple[Progress, Any]]:
-    """A bar that counts missions; its total grows where a rule asks for more."""
+def _bar(shown: bool) -> Iterator[tuple[Progress, Callable[[Round], None]]]:
+    """A bar that counts missions, once some are simulated; a rule may ask for more on the way."""
     from tqdm.auto import tqdm
 
-    hidden = {} if shown else {"disable": True}  # the environment may hide it as well
-    with tqdm(unit="mission", delay=1, **hidden) as bar:
+    bars: list[tqdm] = []
+    done = 0
 
-        def begin(started: Round) -> None:
+    def begin(started: Round) -> None:
+        if shown and not bars and started.present < started.missions:
+            bars.append(tqdm(unit="mission", initial=done, delay=1))
+        for bar in bars:
             bar.total = started.missions
 
-        yield bar.update, begin
+    def count(missions: int) -> None:
+        nonlocal done
+        done += missions
+        for bar in bars:
+            bar.update(missions)
+
+    try:
+        yield count, begin
+    finally:
+        for bar in bars:
+            bar.close()

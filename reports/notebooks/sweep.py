@@ -63,10 +63,10 @@ tables.best_of_policies(answer.results, PRODUCT)
 # are averaged. Bars are 95 % intervals.
 
 # %%
-of_fields = ", ".join(answer.fields[:2])
+of_fields, each = " and ".join(answer.fields[:2]), f"n = {missions:,} missions per setting"
 html.gallery(
     [
-        (answer.plot(metric=metric), f"{name} by {of_fields}", f"{name} by {of_fields}.")
+        (answer.plot(metric=metric), f"{name} by {of_fields}", f"{name}, {each}.")
         for metric, name in METRICS.items()
     ]
 )

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from analysis import load_results
+from analysis import load_results, load_study
 from analysis.execution import runner
+from analysis.sweeps.question import command
 from reports.pages import render
 from tests.analysis.small import files_of
 
@@ -40,6 +41,15 @@ def test_a_line_leads_to_a_page(dess, tmp_path):
     code, _, err = dess("study", "run", file, "--out", f"results/sweeps/{name}")
     assert code == 0
     assert "48 missions, 48 of them present" in err
+    assert files_of(tmp_path / "results") == before
+
+
+def test_the_command_of_a_sweep_asks_it_again(dess, unrendered, tmp_path):
+    prices = ["--price", "uav=20000", "--price", "currency=USD", "--require", "ratio=0.1"]
+    file = json.loads(dess(*ASKED, *FIELDS, "--set", "pads=2", *prices, "--json")[1])["study_file"]
+    before = files_of(tmp_path / "results")
+    code, _, err = dess(*shlex.split(command(load_study(file)))[1:])
+    assert code == 0
     assert files_of(tmp_path / "results") == before
 
 

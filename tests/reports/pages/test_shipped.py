@@ -6,6 +6,7 @@ import shutil
 from base64 import b64decode
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
@@ -25,8 +26,8 @@ from tests.reports.small import EMBEDDED, Links, run_small_studies, words_of
 
 pytestmark = pytest.mark.slow
 
-# A parameter of what would take long: the missions of what-if.
-QUICK = {"missions": 40}
+# Parameters of what would take long: missions of questions, and what own-sea requires.
+QUICK: dict[str, Any] = {"missions": 40, "requirements": {"success": 0.9}}
 # The width of the text on A4 [px], and the elements that reach beyond a width.
 A4 = 688
 BEYOND = """[...document.querySelectorAll("main *")].filter(
@@ -40,6 +41,8 @@ FIGURES = {
     "comparison": 8 + 4,
     "explorer": 3,
     "what-if": 9,
+    "sweep": 3,
+    "own-sea": 3,
     "verification": 13,
     "scorecard": 0,
 }
@@ -135,7 +138,8 @@ def test_all_pages_are_the_same_bytes_elsewhere(
 ) -> None:
     another_environment(results, out, tmp_path, monkeypatch)
     copy = tmp_path / results.name
-    shutil.rmtree(copy / "what-if")  # its missions are simulated anew, and those drawn elsewhere
+    for asked in ("what-if", "sweeps"):  # simulated anew, like the missions drawn
+        shutil.rmtree(copy / asked)
     for path in (copy / FOLDER).glob("*.parquet"):
         path.unlink()
     render([], copy, tmp_path / "new", parameters=QUICK)

@@ -1,0 +1,89 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from analysis import sweep
+from analysis.names import PRODUCT
+from dess import InputError
+from tests.analysis.small import write_scenario
+
+POLICIES = ["random", "greedy"]
+
+
+@pytest.fixture
+def asking(tmp_path):
+    """Asks a sweep of the small scenario."""
+
+    def run(missions=6, progress=False, **fields):
+        return sweep(
+            write_scenario(tmp_path), POLICIES, missions, 3, tmp_path, progress=progress, **fields
+        )
+
+    return run
+
+
+def test_settings_are_ranked(asking):
+    answer = asking(uavs=range(1, 3), quota=np.array([20, 40]), pads=2)
+    assert answer.fields == ["uavs", "quota"]
+    table = answer.table()
+    assert len(table) == 2 * 2 * 2
+    assert [*table["rank"]] == [*range(1, 9)]
+    assert table[PRODUCT].is_monotonic_decreasing
+    missions = answer.results.missions
+    for row in table.itertuples():
+        of_row = missions[(missions["policy"] == row.policy) & (missions["point"] == row.point)]
+        assert row.collection_ratio == pytest.approx(of_row["collection_ratio"].mean())
+        assert {*of_row["uavs"]} == {row.uavs}
+    best = answer.best()
+    assert [*best["policy"]] == [*table["policy"].unique()]
+    assert best["rank"].iloc[0] == 1
+    assert answer.answers() == []
+    assert answer.guarantee == ""
+
+
+def test_prices_add_their_cost(tmp_path):
+    prices = {"uav": 7, "pad": 2}
+    answer = sweep(
+        write_scenario(tmp_path),
+        missions=4,
+        folder=tmp_path,
+        prices=prices,
+        progress=False,
+        uavs=[1, 2],
+        pads=[1, 3],
+    )
+    table = answer.table("cost")
+    assert [*table["cost"]] == [9.0, 13.0, 16.0, 20.0]
+    assert [*table["cost"]] == [*(7 * table["uavs"] + 2 * table["pads"])]
+
+
+def test_the_cheapest_settings_are_the_best(tmp_path):
+    about = {"missions": 5, "folder": tmp_path, "prices": {"uav": 7}, "progress": False}
+    answer = sweep(
+        write_scenario(tmp_path), requirements={"ratio": 0.1}, uavs=[1, 2], quota=[20, 40], **about
+    )
+    best = answer.best()
+    assert [*best["uavs"]] == [1, 1]
+    assert [*best["quota"]] == [20, 40]
+    assert {*best["verdict"]} == {"met"}
+    assert len(answer.answers()) == 3
+    assert "with probability at least 0.95" in answer.guarantee
+    assert len(answer.results.checks) == 2 * 5
+
+
+def test_a_plot_is_over_the_first_fields(asking):
+    answer = asking(missions=2, uavs=[1, 2], quota=[20, 40])
+    assert isinstance(answer.plot(), Figure)
+    assert answer.plot().axes[0].get_xlabel() == answer.plot("uavs", "quota").axes[0].get_xlabel()
+    with pytest.raises(InputError, match="pads: has not several values"):
+        answer.plot("pads")
+    with pytest.raises(InputError, match="x: no field is swept"):
+        asking(missions=2, uavs=1).plot()
+
+
+def test_progress_counts_missions(asking, capsys):
+    done = []
+    asking(progress=done.append, uavs=[1, 2])
+    assert sum(done) == 2 * 2 * 6
+    asking(progress=True, uavs=[1, 2])
+    assert capsys.readouterr().err == ""  # nothing is simulated
