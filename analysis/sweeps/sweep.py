@@ -80,7 +80,7 @@ class Sweep:
         if not self.study.selection:
             return []
         lines = costs.answers(self.results, costs.judged(self.results))
-        return [line.replace("**", "") for line in lines]
+        return [line.replace("**", "").replace("`", "") for line in lines]
 
     @property
     def fields(self) -> list[str]:
