@@ -1,0 +1,63 @@
+"""``dess report`` and ``dess study run --report``: which pages are rendered, and from what."""
+
+from pathlib import Path
+
+import pytest
+
+from reports.pages import render
+
+
+@pytest.fixture
+def rendered(monkeypatch):
+    """The pages that commands render: nothing is rendered, only noted."""
+    pages = []
+
+    def note_reports(names, results, out, progress=None, parameters=None):
+        pages.append((*names, str(results), str(out)))
+        return Path(out, "index.html")
+
+    def note_study(folder, out, progress=None, parameters=None):
+        pages.append((str(folder), str(out), parameters))
+        return Path(out, f"study-{Path(folder).name}.html")
+
+    monkeypatch.setattr(render, "render", note_reports)
+    monkeypatch.setattr(render, "render_study", note_study)
+    return pages
+
+
+def test_names_are_reports_and_folders_are_studies(dess, rendered, tmp_path):
+    (tmp_path / "fleets").mkdir()
+    code, out, _ = dess(
+        "report", "mission", "fleets", "--out", "pages", "--parameter", "baseline=2"
+    )
+    assert (code, out.split()) == (0, ["pages/index.html", "pages/study-fleets.html"])
+    assert rendered == [("mission", "results", "pages"), ("fleets", "pages", {"baseline": 2})]
+
+
+def test_a_folder_that_is_called_like_a_report_needs_a_separator(dess, rendered, tmp_path):
+    (tmp_path / "learning").mkdir()
+    assert dess("report", "learning")[0] == dess("report", "./learning")[0] == 0
+    pages = str(Path("build", "reports"))
+    assert rendered == [("learning", "results", pages), ("./learning", pages, {})]
+
+
+def test_without_arguments_all_reports_are_rendered(dess, rendered):
+    assert dess("report")[0] == 0
+    assert rendered == [("results", str(Path("build", "reports")))]
+
+
+def test_a_study_is_run_and_its_page_rendered(dess, rendered):
+    code, out, _ = dess("study", "run", "trial.toml", "--missions", 2, "--report")
+    assert code == 0
+    assert out.splitlines()[-1] == str(Path("build", "reports", "study-trial.html"))
+    assert [page[0] for page in rendered] == [str(Path("results", "trial"))]
+
+
+def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
+    def fail(*arguments, **options):
+        raise render.ReportError("report study-fleets: cell 3 of 9 (x): ValueError: no such number")
+
+    monkeypatch.setattr(render, "render_study", fail)
+    code, out, err = dess("report", tmp_path / "fleets")
+    assert (code, out) == (1, "")
+    assert err.splitlines()[-1].startswith("dess: error: report study-fleets: cell 3 of 9")
