@@ -235,8 +235,9 @@ def _answer(rows: pd.DataFrame, wanted: Mapping[str, float], currency: str) -> s
         found = "is known to meet" if is_open else "meets"
         texts.append(f"no setting {found} the requirements.")
     if len(cheaper):
-        row = cheaper.iloc[-1]
-        which = "next cheaper" if len(best) else "most expensive"
+        leads = np.min([rows[metric] - least for metric, least in wanted.items()], axis=0)
+        row = cheaper.iloc[-1 if len(best) else int(np.argmax(leads))]
+        which = "next cheaper" if len(best) else "closest"
         texts.append(f"The {which} one, {_what(row, currency)}, {_why_not(row, wanted)}.")
     return " ".join(texts)
 

@@ -157,7 +157,7 @@ def test_the_answer_says_why_no_cheaper_fleet_will_do(fixed):
     none = one.assign(verdict=["missed", "missed", "open"], selected=False)
     (text,) = costs.answers(fixed, none, {"success": 0.99})
     assert "no setting is known to meet the requirements." in text
-    assert "The most expensive one, **3 UAVs** for 69,000 EUR, is not known to meet" in text
+    assert "The closest one, **3 UAVs** for 69,000 EUR, is not known to meet" in text
     first = one.iloc[2:]
     assert costs.answers(fixed, first, {"success": 0.99})[0].endswith("of the study is cheaper.")
 
