@@ -246,6 +246,13 @@ def _averaged(
     return pd.concat(tables, ignore_index=True)
 
 
+def check_metric(results: Results, metric: str) -> None:
+    """Raise ``InputError`` if missions have no such metric."""
+    known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in results.missions]
+    if metric not in known:
+        raise InputError(f"metric: {metric!r} is unknown; allowed: {', '.join(known)}")
+
+
 def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
     """The missions of a policy, or of all, if they have the metric.
 
@@ -253,9 +260,7 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
         InputError: If there is no such metric or policy.
     """
     missions = results.missions
-    known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in missions]
-    if metric not in known:
-        raise InputError(f"metric: {metric!r} is unknown; allowed: {', '.join(known)}")
+    check_metric(results, metric)
     if policy is None:
         return missions
     if policy not in results.policies:

@@ -153,7 +153,7 @@ html.say(
     "## Compared with a baseline\n\nThe baseline is design point {point}: {words}. Every policy is "
     "compared with itself there. The parameter `baseline` names another point.",
     point=baseline,
-    words=settings.in_words(study)[baseline],
+    words=words.setting(study, baseline),
 )
 
 # %% tags=["if-settings"]

@@ -30,6 +30,12 @@ STUDIES = {
         "selection": {"procedure": "kn", "first": 8, "indifference": 0.1, "budget": 900},
         "design": {"kind": "table", "rows": [{"quota": 20}, {"quota": 60, "uavs": [1, 2]}]},
     },
+    "cheapest": {
+        "selection": {"procedure": "cheapest", "requirements": {"success": 0.2}, "check": 5}
+        | {"indifference": 1, "budget": 500, "first": 8},
+        "costs": {"uav": 3, "pad": 1},
+        "design": grid(uavs=[1, 2]),
+    },
     "costs": {"costs": {"uav": 3, "currency": "EUR"}, "set": {"arrival_rate": 0.01}},
 }
 

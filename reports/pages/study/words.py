@@ -9,15 +9,34 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
+from dess import InputError
 
 MOST_ROWS = 25  # of a table on the page; its data have all
 _MOST_VALUES = 12  # of a field in a list
 
 
 def metric_of(results: Results, metric: str | None = None) -> str:
-    """The metric that ranks the settings: the one given, that of the selection, or the product."""
-    selection = results.manifest["study"]["selection"] or {}
-    return metric or selection.get("metric", PRODUCT)
+    """The metric that ranks the settings: the one given, that of the selection, or the product.
+
+    Raises:
+        InputError: If there is no such metric.
+    """
+    if metric is not None:
+        settings.check_metric(results, metric)
+        return metric
+    return (results.manifest["study"]["selection"] or {}).get("metric", PRODUCT)
+
+
+def setting(results: Results, point: int) -> str:
+    """The design point that all others are compared with.
+
+    Raises:
+        InputError: If there is no such design point.
+    """
+    points = settings.in_words(results)
+    if point not in range(len(points)):
+        raise InputError(f"baseline: {point!r} is no design point; allowed: 0..{len(points) - 1}")
+    return points[point]
 
 
 def metrics_of(metric: str) -> list[str]:

@@ -6,7 +6,9 @@ from html import unescape
 import pytest
 
 from analysis import run_study
+from dess import InputError
 from reports.pages.notebook import SHIPPED
+from reports.pages.study import words
 from reports.pages.study.sections import TAGS, report_of
 from tests.analysis.small import grid, small_study
 from tests.reports.small import shown_by
@@ -111,3 +113,15 @@ def test_the_title_is_that_of_the_study(tmp_path):
     report = report_of(tmp_path / "out")
     assert (report.name, report.title) == ("study-fleets", "Study fleets")
     assert report.description == "greedy and random at the scenario small.toml."
+
+
+def test_a_metric_or_baseline_that_is_none_is_refused(tmp_path):
+    results = run_study(small_study(tmp_path, design=grid(quota=[20, 60])), tmp_path / "out")
+    assert words.metric_of(results, "reward") == "reward"
+    assert words.setting(results, 1) == "communication quota 60"
+    for metric in ("speed", "", 3):
+        with pytest.raises(InputError, match=f"metric: {metric!r} is unknown; allowed: success"):
+            words.metric_of(results, metric)
+    for point in (2, -1, "x"):
+        with pytest.raises(InputError, match=f"baseline: {point!r} is no design .*: 0..1$"):
+            words.setting(results, point)
