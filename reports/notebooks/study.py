@@ -44,6 +44,22 @@ html.say("{simulated}", simulated=words.simulated(study))
 # Every policy meets the same replications at every design point, which have the same realisation
 # of all random draws. So missions are compared one by one, and what they share drops out.
 
+# %% [markdown] tags=["if-cheapest"]
+# ## The cheapest fleet
+#
+# The fleet is what an operator decides on; the other fields are conditions that it has to meet.
+
+# %% tags=["if-cheapest"]
+display(
+    html.say("{answers}", answers=costs.cheapest(study)),
+    costs.judged_table(study),
+    costs.checked_table(study),
+)
+
+# %% [markdown] tags=["if-cheapest"]
+# The missions of the check had no part in the selection, so its means are not too good. The search
+# spends no more missions on a setting once a cheaper one is known to meet the requirements.
+
 # %% tags=["if-ranked"]
 ranked = settings.ranked(study, by)
 best = ranked.iloc[0]
@@ -63,22 +79,6 @@ tables.best_of_policies(study, by)
 
 # %% tags=["if-one-setting"]
 display(html.gallery(drawings.means(study, metrics)), tables.means(study))
-
-# %% [markdown] tags=["if-cheapest"]
-# ## The cheapest fleet
-#
-# The fleet is what an operator decides on; the other fields are conditions that it has to meet.
-
-# %% tags=["if-cheapest"]
-display(
-    html.say("{answers}", answers=costs.cheapest(study)),
-    costs.judged_table(study),
-    costs.checked_table(study),
-)
-
-# %% [markdown] tags=["if-cheapest"]
-# The missions of the check had no part in the selection, so its means are not too good. The search
-# spends no more missions on a setting once a cheaper one is known to meet the requirements.
 
 # %% [markdown] tags=["if-costs"]
 # ## What it costs
