@@ -31,7 +31,7 @@ from reports.pages.verify import is_sealed
 
 RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
-_SPDX, _PYPI = "https://spdx.org/licenses/", "https://pypi.org/project/"
+_SPDX = "https://spdx.org/licenses/"
 _PARQUET = "application/vnd.apache.parquet"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip can have
 _TABLES = {
@@ -171,9 +171,18 @@ def _software(crate: ROCrate, results: Results) -> ContextEntity:
 
 
 def _library(crate: ROCrate, name: str, version: str) -> ContextEntity:
-    url = "https://www.python.org/" if name == "python" else f"{_PYPI}{name}/"
-    about = {"name": name, "version": version, "url": url}
+    about = {"name": name, "version": version, "url": _homepage(name)}
     return crate.add_jsonld({"@id": f"#{name}", "@type": "SoftwareApplication", **about})
+
+
+def _homepage(library: str) -> str:
+    """The address of a library, as its package names it."""
+    if library == "python":
+        return "https://www.python.org/"
+    about = metadata.metadata(library)
+    pairs = (text.split(", ", 1) for text in about.get_all("Project-URL") or [])
+    urls = {label.lower(): url for label, url in pairs}
+    return urls.get("homepage") or about["Home-page"] or next(iter(urls.values()), "")
 
 
 def _tables(crate: ROCrate, results: Results) -> Dataset:

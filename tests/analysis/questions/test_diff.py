@@ -264,7 +264,7 @@ def test_a_changed_constant_of_the_model_is_found(tmp_path):
     assert constant in rules.read_text()
     rules.write_text(rules.read_text().replace(constant, constant.replace("rate", "rate + 1")))
     a = results_of(tmp_path, "a")
-    command = [sys.executable, "-m", "reports.cli", "study", "run", "trial.toml", "--out", "b"]
+    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "b"]
     paths = {"PYTHONPATH": str(tree)}
     subprocess.run(command, cwd=tmp_path, check=True, env=environment() | paths)
     b = load_results(tmp_path / "b")

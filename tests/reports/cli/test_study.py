@@ -105,7 +105,7 @@ def test_pages_that_cannot_be_written_are_refused_before_the_run(dess, tmp_path)
 
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
-    command = [sys.executable, "-m", "reports.cli", "study", "run", "trial.toml", "--out", "out"]
+    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "out"]
     with open("trial.toml", "a") as study:  # slow enough to be caught in the middle
         study.write('engine = "events"\n')
     missions = ("--missions", "1000")

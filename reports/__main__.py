@@ -1,4 +1,4 @@
-"""``python -m reports.cli``: the ``dess`` command."""
+"""``python -m reports``: the ``dess`` command."""
 
 import sys
 
