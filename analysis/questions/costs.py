@@ -162,7 +162,7 @@ def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
             rows.append((policy, fleet, part[COST].mean(), verdict, {*part["point"]}))
     fleets = pd.DataFrame(rows, columns=["policy", "fleet", COST, "verdict", "points"])
     fleets = fleets.sort_values(COST, kind="stable", ignore_index=True)
-    choices = {policy: results.cheapest(policy) for policy in fleets["policy"]}
+    choices = {policy: results.cheapest(policy) for policy in fleets["policy"].unique()}
     if any(choices.values()):
         last = {name: {*choice.answers[-1].points} for name, choice in choices.items() if choice}
         selected = [row.points == last[str(row.policy)] for row in fleets.itertuples()]

@@ -104,16 +104,19 @@ def sweep(
         f"dess study run {file} --out {folder}",
     )
     answer = Sweep(study, folder, found)
+    if not as_json:  # the answer comes before the page, which takes longer
+        _print(answer)
+        print(f"study: {file}", flush=True)
     with rendering() as steps:
         page = render_study(folder, out, steps)
     if as_json:
         _print_json(answer, page, file)
     else:
-        _print(answer, page, file)
+        print(f"page: {page}")
 
 
-def _print(answer: "Sweep", page: Path, file: Path) -> None:
-    """Print the first settings of the ranking, the cheapest ones, and where all of it is."""
+def _print(answer: "Sweep") -> None:
+    """Print the first settings of the ranking, and the cheapest ones."""
     from analysis import numbers
     from analysis.names import COST, SHORT_METRICS, value_text
     from analysis.questions.settings import varied
@@ -133,7 +136,6 @@ def _print(answer: "Sweep", page: Path, file: Path) -> None:
     print(f"{len(table):,} settings{more}; ≈: the product may be as good as that of the first")
     for line in answer.answers():
         print(line)
-    print(f"page: {page}", f"study: {file}", sep="\n")
 
 
 def _print_json(answer: "Sweep", page: Path, file: Path) -> None:

@@ -12,7 +12,7 @@
 # # Explorer
 #
 # Move the paper's parameters and see what becomes of a mission: the three metrics of every policy
-# at each of 216 settings, with their intervals, and their course along each parameter.
+# at every setting of a grid, with their intervals, and their course along each parameter.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of explorer
