@@ -87,7 +87,7 @@ html.say("{lines}", lines=html.commands([answer.command]))
 # missions, as tidy tables:
 
 # %%
-html.table(answer.table().head(3), "The first rows of answer.table()")
+html.table(answer.table().iloc[:3, :8], "The first rows and columns of answer.table()")
 
 # %% [markdown]
 # ## Where the figures come from

@@ -33,6 +33,8 @@ from reports.pages.template import fill
 
 log = logging.getLogger(__name__)
 
+_WIDGET = "application/vnd.jupyter.widget-view+json"  # type of an output, such as a progress bar
+
 # ``C_S`` in the text of a page, or a piece of it that is no text.
 _INDEX_OR_NO_TEXT = re.compile(r"<(code|pre|script|style)\b.*?</\1>|<[^>]*>|\bC_([SC])\b", re.S)
 
@@ -183,12 +185,17 @@ def _page(report: Report) -> str:
 
 
 def html_of(notebook: NotebookNode) -> str:
-    """The outputs and the text of a notebook as HTML; its stderr goes to the log instead."""
+    """The outputs and the text of a notebook as HTML, without widgets, which only Jupyter shows.
+
+    Its stderr goes to the log instead.
+    """
+    notebook.metadata.pop("widgets", None)
     for cell in notebook.cells:
         for output in [*cell.get("outputs", [])]:
             if output.get("name") == "stderr":
                 log.warning(output.text.rstrip())
-            if output.get("name") == "stderr" or output.output_type == "error":
+            is_error = output.get("name") == "stderr" or output.output_type == "error"
+            if is_error or _WIDGET in output.get("data", {}):
                 cell.outputs.remove(output)
     exporter = HTMLExporter(
         template_name="basic",
