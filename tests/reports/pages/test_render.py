@@ -187,6 +187,18 @@ def test_there_are_pages_notebooks_and_an_index_and_nothing_else(files: dict[str
     assert {*files} == {*kinds, "index.html"}
 
 
+def test_a_page_has_no_widgets() -> None:
+    view = {"application/vnd.jupyter.widget-view+json": {"model_id": "1"}, "text/plain": "a bar"}
+    shown = nbformat.v4.new_output("display_data", {"text/plain": "a number"})
+    outputs = [nbformat.v4.new_output("display_data", view), shown]
+    state = {"application/vnd.jupyter.widget-state+json": {"state": {"1": {}}}}
+    notebook = nbformat.v4.new_notebook(metadata={"widgets": state})
+    notebook.cells = [nbformat.v4.new_code_cell("bar", outputs=outputs)]
+    html = html_of(notebook)
+    assert "a number" in html
+    assert "a bar" not in html and "<script" not in html
+
+
 def test_a_page_shows_outputs_and_no_warnings(files: dict[str, str]) -> None:
     page = files["mission.html"]
     text = words_of(page)
