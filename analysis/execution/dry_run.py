@@ -141,8 +141,8 @@ def check_effort(
         least = "at least " if study.rule else ""
         raise InputError(
             f"study {study.name}: {least}{sum(missing):,} missions to simulate "
-            f"({len(study.policies)} policies, {study.size:,} design points), about "
-            f"{numbers.duration(seconds)} with {workers} at work; allowed: {confirmed}"
+            f"(policies: {len(study.policies)}, design points: {study.size:,}, "
+            f"workers: {workers}), about {numbers.duration(seconds)}; allowed: {confirmed}"
         )
     return sum(missing)
 
@@ -162,7 +162,7 @@ def check_policies(study: Study) -> None:
             simulate_batch(places, load_team(policy), study.seed, len(places))
         except InputError:
             raise
-        except Exception:  # code of another package may raise anything
+        except Exception:  # a policy that raises anything else fails in the run, which records it
             continue
 
 

@@ -53,7 +53,8 @@ def membership(
 
     Over 3,000 planted problems of each of three kinds, whose true means were drawn independently,
     stated and true shares of membership differed by 0.005 on average, and by 0.06 at most in any
-    bin of probabilities. Nothing is assumed of how a metric depends on the fleet.
+    bin of probabilities. Nothing is assumed of how a metric depends on the fleet: where each
+    costlier setting is truly better, by less than the missions can show, they are too low.
 
     Args:
         costs: (k, n) costs; entry r of every setting belongs to the same replication, nan where a

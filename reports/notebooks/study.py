@@ -85,7 +85,8 @@ display(html.gallery(drawings.means(study, metrics)), tables.means(study))
 #
 # The cost is that of the fleet and of all its missions. A setting is on the *Pareto front* if no
 # other one is at most as costly and at least as good. The probability that it truly is reckons
-# with the chance in the missions, by the Bayesian bootstrap over common replications.
+# with the chance in the missions, by the Bayesian bootstrap over common replications. It is too
+# low where costlier settings are all better, by less than the missions can show.
 
 # %% tags=["if-costs"]
 fronts = costs.fronts_of(study)

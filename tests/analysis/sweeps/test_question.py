@@ -202,8 +202,8 @@ def test_a_million_settings_are_counted_before_they_are_made(asking, tmp_path):
     study = sweep_of(fields, tmp_path)
     before = files_of(tmp_path)
     line = (
-        r"300,000,000 missions to simulate \(1 policies, 1,000,000 design points\), "
-        r"about [\d,]+ (minutes|hours|days) with 1 at work; allowed: --yes, or less"
+        r"300,000,000 missions to simulate \(policies: 1, design points: 1,000,000, workers: 1\), "
+        r"about [\d,]+ (minutes|hours|days); allowed: --yes, or less"
     )
     with pytest.raises(InputError, match=line):
         ask(study, tmp_path / "results")

@@ -115,7 +115,7 @@ BAD = {
     "--out small.toml/pages": "small.toml/pages: cannot be written",
     "--results small.toml": "cannot be written: Not a directory",
     "--set quota=1..1000 --set arrival_rate=0..1:1000": "600,000,000 missions to simulate "
-    "(2 policies, 1,000,000 design points), about",
+    "(policies: 2, design points: 1,000,000, workers: 1), about",
 }
 
 
