@@ -107,3 +107,15 @@ def writable(path: Path) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot be written: {reason}; allowed: another path") from None
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder that cannot be made or written, before anything takes time.
+
+    Raises:
+        InputError: If it cannot.
+    """
+    there = next(above for above in (path, *path.absolute().parents) if above.exists())
+    if not there.is_dir() or not os.access(there, os.W_OK):
+        reason = "Permission denied" if there.is_dir() else "Not a directory"
+        raise InputError(f"{path}: cannot be written: {reason}; allowed: another path")

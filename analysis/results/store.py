@@ -27,7 +27,7 @@ from analysis.results.manifest import Cell, Manifest, Selected
 from analysis.results.rows import rows_of
 from analysis.study.study import Study
 from dess import InputError
-from dess.files import replacing, writable
+from dess.files import check_folder, replacing, writable
 from dess.record import Records
 
 MANIFEST, LOCK = "manifest.json", ".lock"
@@ -100,8 +100,9 @@ class Store:
         """What ``open`` would find, to count what is missing; nothing is written or locked.
 
         Raises:
-            InputError: If the folder holds something else.
+            InputError: If the folder holds something else, or cannot be written.
         """
+        check_folder(Path(out))
         store = cls(Path(out), _extended(Path(out), Manifest.of(study), accept_code))
         store._scan()
         return store

@@ -77,17 +77,6 @@ def report(
             print(render_study(folder, out, progress=progress, parameters=values))
 
 
-def check_pages(out: Path) -> None:
-    """Refuse a folder of pages that cannot be made or written, before anything takes time.
-
-    Raises:
-        InputError: If it cannot.
-    """
-    there = next(path for path in (out, *out.absolute().parents) if path.exists())
-    if not there.is_dir() or not os.access(there, os.W_OK):
-        raise InputError(f"{out}: cannot be written; allowed: another path")
-
-
 @contextmanager
 def rendering() -> "Iterator[Progress]":
     """A bar for the progress of pages; a notebook that fails is one line and exit code 1."""

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess import InputError
-from dess.files import replacing
+from dess.files import check_folder, replacing
 from reports.cli import console
-from reports.cli.report import check_pages, rendering
+from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import PAGES, RESULTS, JsonOption, WorkersOption
 
@@ -66,7 +66,7 @@ def run(
             study_tables.print_plan(plan, study, out, workers)
         return
     if page:
-        check_pages(PAGES)
+        check_folder(PAGES)
     with console.compile_notice():
         if check_effort(study, out, workers, accept_code=accept_code, yes=yes):
             check_policies(study)

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dess.files import check_folder
 from reports.cli import console
 from reports.cli.ranges import all_settings, all_values
-from reports.cli.report import check_pages, rendering
+from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import (
     PAGES,
@@ -96,7 +97,7 @@ def sweep(
         all_settings(require or [], "--require", SHARE),
         name,
     )
-    check_pages(out)
+    check_folder(out)
     folder, file = question.folder_of(study, results), question.file_of(study, results)
     found = complete(
         study.name,
