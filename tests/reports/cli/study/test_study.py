@@ -99,7 +99,8 @@ def test_pages_that_cannot_be_written_are_refused_before_the_run(dess, tmp_path)
     before = files_of(tmp_path)
     code, out, err = dess("study", "run", "trial.toml", "--report")
     assert (code, out) == (2, "")
-    assert err == "dess: error: build/reports: cannot be written; allowed: another path\n"
+    refusal = "build/reports: cannot be written: Not a directory; allowed: another path"
+    assert err == f"dess: error: {refusal}\n"
     assert files_of(tmp_path) == before
 
 

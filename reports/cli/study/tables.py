@@ -1,4 +1,4 @@
-"""Tables of ``dess study``: the plan of a run, and the results of a study in a terminal."""
+"""Tables of the results of a study, for a terminal."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,36 +6,14 @@ from pathlib import Path
 import pandas as pd
 
 from analysis import numbers
-from analysis.execution.dry_run import Plan
 from analysis.names import COST, PRODUCT, SHORT_METRICS, SUCCESS
-from analysis.questions import costs, diff, summary
+from analysis.questions import costs, summary
 from analysis.questions.summary import settings
 from analysis.replication import paper
 from analysis.results.tables import Results
-from analysis.study.study import Study
 from reports.cli import console
 
 MANY_POINTS = 40  # more design points are not listed
-MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are printed
-
-
-def print_plan(plan: Plan, study: Study, out: Path, workers: int) -> None:
-    """Print the missions that a run would simulate, and an estimate of the time."""
-    rows = [
-        [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
-        for p in plan.policies
-    ]
-    console.print_table(["policy", "missions", "present", "time on one core"], rows)
-    per_cell = f"{study.first} replications"
-    if plan.at_most is not None:
-        rule = "selection" if study.selection else "precision"
-        per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
-    print(
-        f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
-        f"x {plan.points} design points x {per_cell})"
-    )
-    more = "at least " if plan.at_most is not None else ""
-    print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
 
 
 def print_summary(results: Results, folder: Path, short: bool) -> None:
@@ -83,7 +61,7 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
             print_rows(tables[name])
 
 
-def _print_frame(title: str, cells: pd.DataFrame) -> None:
+def print_frame(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text under its title; the index is its first column."""
     rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
     console.print_table([title, *map(str, cells.columns)], rows)
@@ -94,7 +72,7 @@ def _print_selections(selected: pd.DataFrame) -> None:
     heads = ["condition"] if "condition" in selected and any(selected["condition"]) else []
     cells = selected.set_index("policy")[[*heads, "setting", "missions", "left"]]
     cells["missions"] = cells["missions"].map("{:,}".format)
-    _print_frame("selected for", cells)
+    print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
         print(f" {guarantee}")
 
@@ -112,7 +90,7 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
     cells["on the front"] = [numbers.percent(share) for share in table["probability"]]
     if not any(cells["condition"]):
         cells = cells.drop(columns="condition")
-    _print_frame("cost against success", cells)
+    print_frame("cost against success", cells)
 
 
 def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
@@ -120,7 +98,7 @@ def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) 
     cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], "policy")
     if printed:
         cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
-    _print_frame(title, cells.rename(columns=SHORT_METRICS))
+    print_frame(title, cells.rename(columns=SHORT_METRICS))
 
 
 def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
@@ -132,7 +110,7 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         return
     for metric in metrics:
         cells = numbers.wide(means[means["metric"] == metric], "point", "policy")
-        _print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
+        print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
 
 
 def _print_distributions(table: pd.DataFrame) -> None:
@@ -176,19 +154,19 @@ def _print_sensitivities(table: pd.DataFrame) -> None:
 
 def _print_comparisons(table: pd.DataFrame) -> None:
     """Differences of the other policies from the best one."""
-    cells, product = _differences(table, "policy")
+    cells, product = differences(table, "policy")
     cells["pairing saves"] = product["variance_reduction"].map(_gain)
-    _print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
+    print_frame(f"against {table['baseline'].iloc[0]} [points]", cells)
 
 
 def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
-    cells, product = _differences(table, "learner")
+    cells, product = differences(table, "learner")
     cells = cells.assign(about=product["about"], trainings=product["trainings"])
-    _print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
+    print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 
 
-def _differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Differences in every metric and the p-value of the product, as text; rows of the product."""
     estimates = table.rename(columns={"difference": "mean"})
     cells = numbers.wide(estimates, who, write=numbers.points).rename(columns=SHORT_METRICS)
@@ -209,75 +187,3 @@ def _print_worst(table: pd.DataFrame) -> None:
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
         print(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")
-
-
-def print_diff(found: diff.Diff, most: int) -> None:
-    """Print how many missions of two results differ, by how much, and the most changed ones."""
-    missions, differ = len(found.missions), len(found.changed)
-    if found.identical:
-        print(f"identical: {missions:,} missions")
-    elif not differ:
-        print(f"identical: the {missions:,} missions that both have")
-    else:
-        print(f"{differ:,} of {missions:,} missions differ")
-    for origin in diff.origins(found):
-        print(f" {origin}")
-    _print_alone(found.alone)
-    if differ:
-        _print_effects(found)
-        _print_most_changed(found, most)
-
-
-def _print_alone(alone: pd.DataFrame) -> None:
-    """What only one of the folders has."""
-    for side, rows in alone.groupby("only_in"):
-        for row in rows[:MANY].itertuples():
-            print(f" only in {side}: {row.what} ({row.missions:,} missions)")
-        if len(rows) > MANY:
-            print(f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them")
-
-
-def _print_effects(found: diff.Diff) -> None:
-    """Differences by policy, and by policy and design point if there are several."""
-    table = diff.effects(found)
-    _print_differences(table.assign(who=table["policy_a"]))
-    if len(points := settings(found.a)) > 1:
-        table = diff.effects(found, ["policy_a", "point_a"])
-        words = table["point_a"].map(dict(enumerate(points)))
-        _print_differences(table.assign(who=table["policy_a"] + " " + words))
-
-
-def _print_differences(table: pd.DataFrame) -> None:
-    """A row for everything whose missions differ: how many do, and B - A in every metric."""
-    rows = table[table["differ"] > 0]
-    names = rows["who"].drop_duplicates()
-    cells, product = _differences(rows[rows["who"].isin(names[:MANY])], "who")
-    counts = product["differ"].map("{:,}".format) + " of " + product["missions"].map("{:,}".format)
-    cells.insert(0, "missions that differ", counts)
-    _print_frame("B - A [points]", cells)
-    if (more := len(names) - MANY) > 0:
-        print(f" {more:,} more rows; --json has them")
-    if same := table["who"].nunique() - len(names):
-        print(f" {same:,} more without any difference")
-
-
-def _print_most_changed(found: diff.Diff, most: int) -> None:
-    """The most changed missions, with the commands that simulate them again."""
-    points = settings(found.a)
-    for side, results in (("A", found.a), ("B", found.b)):
-        print(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
-    print(" most changed missions:")
-    for row in diff.most_changed(found, most).itertuples():
-        where = f"{row.policy_a} {points[row.point_a]}".strip()
-        print(f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}")
-        commands = {"A": row.command_a, "B": row.command_b}
-        if row.command_a == row.command_b:
-            commands = {"A and B, each with its own code": row.command_a}
-        for side, command in commands.items():
-            print(f"     {side}: {command}")
-
-
-def _shortened(fields: list[str]) -> str:
-    """The first of the fields that differ, and how many more there are."""
-    more = f", and {len(fields) - FIELDS} more" if len(fields) > FIELDS else ""
-    return ", ".join(fields[:FIELDS]) + more

@@ -1,0 +1,38 @@
+"""``dess study export``: results with their page as one file."""
+
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+from dess.files import replacing
+from reports.cli.report import rendering
+
+
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A results folder.")],
+    crate: Annotated[Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write.")],
+    page: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Its page.  [default: it is rendered for the crate]"),
+    ] = None,
+    licence: Annotated[
+        str, typer.Option("--license", metavar="ID", help="Of the results, as SPDX names it.")
+    ] = "MIT",
+) -> None:
+    """Bundle results, page, study and scenario as a research object (RO-Crate)."""
+    from analysis.results.tables import load_results
+    from reports.crate import check_page, licence_of, write_crate
+    from reports.pages.render import render_study
+
+    results, licence = load_results(folder), licence_of(licence)
+    if page:
+        check_page(page, results)
+    with replacing(crate) as temporary, TemporaryDirectory() as pages:
+        if page is None:
+            with rendering() as progress:
+                page = render_study(folder, pages, progress)
+        write_crate(results, page, temporary, date.today(), licence)
+    print(f"{crate}: {len(results.missions):,} missions with {page.name}, licence {licence}")

@@ -1,0 +1,98 @@
+"""``dess study run``: a study into a results folder, or the plan of the run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from dess.files import check_folder
+from reports.cli import console
+from reports.cli.report import rendering
+from reports.cli.running import YesOption, complete
+from reports.cli.settings import PAGES, RESULTS, WorkersOption
+
+if TYPE_CHECKING:
+    from analysis.execution.dry_run import Plan
+    from analysis.study.study import Study
+
+
+def run(
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help=f"Results folder.  [default: {RESULTS}/NAME]"),
+    ] = None,
+    workers: WorkersOption = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Run on this dask.distributed scheduler."),
+    ] = None,
+    missions: Annotated[
+        int | None, typer.Option(min=1, help="Missions per design point and policy.")
+    ] = None,
+    policy: Annotated[
+        list[str] | None, typer.Option(metavar="P[,P...]", help="Policies instead; repeatable.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the plan and the estimated time, run nothing.")
+    ] = False,
+    accept_code: Annotated[
+        bool,
+        typer.Option("--accept-code", help="Keep missions simulated by other code, and note it."),
+    ] = False,
+    page: Annotated[
+        bool, typer.Option("--report", help=f"Render the page of the study into {PAGES} as well.")
+    ] = False,
+    yes: YesOption = False,
+) -> None:
+    """Run a study into a results folder; run again to resume or to top up."""
+    from analysis.execution.dry_run import check_effort, check_policies, plan_study
+    from analysis.execution.runner import run_study
+    from analysis.study.study import load_study
+    from reports.cli.study.tables import print_summary
+
+    changes = {"missions": missions, "policies": policy}
+    study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
+    out = out or RESULTS / study.name
+    if dry_run:
+        with console.compile_notice():
+            plan = plan_study(study, out, workers, accept_code=accept_code)
+            _print_plan(plan, study, out, workers)
+        return
+    if page:
+        check_folder(PAGES)
+    with console.compile_notice():
+        if check_effort(study, out, workers, accept_code=accept_code, yes=yes):
+            check_policies(study)
+    results = complete(
+        study.name,
+        lambda progress, announce: run_study(
+            study, out, workers, scheduler, progress, announce, accept_code
+        ),
+    )
+    print_summary(results, out, short=True)
+    print(f"more: dess study show {out}")
+    if page:
+        from reports.pages.render import render_study
+
+        with rendering() as progress:
+            print(render_study(out, PAGES, progress))
+
+
+def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
+    """Print the missions that a run would simulate, and an estimate of the time."""
+    rows = [
+        [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
+        for p in plan.policies
+    ]
+    console.print_table(["policy", "missions", "present", "time on one core"], rows)
+    per_cell = f"{study.first} replications"
+    if plan.at_most is not None:
+        rule = "selection" if study.selection else "precision"
+        per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
+    print(
+        f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
+        f"x {plan.points} design points x {per_cell})"
+    )
+    more = "at least " if plan.at_most is not None else ""
+    print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
