@@ -1,4 +1,4 @@
-"""The sessions: tests, lint, reports, bench, verify. ``nox -l`` lists them."""
+"""The sessions: tests, lint, docs, reports, bench, verify. ``nox -l`` lists them."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ def tests(session: nox.Session) -> None:
 @nox.session
 def verify(session: nox.Session) -> None:
     """Run the longer proofs: the slow tests, with many more hypothesis examples."""
-    install(session, "[test]")
+    install(session, "[test,docs]")
     slow = ("-m", "slow", "--hypothesis-profile=verify")
     session.run("pytest", "-q", *slow, *SIDE_BY_SIDE, *session.posargs)
 
@@ -55,6 +55,14 @@ def lint(session: nox.Session) -> None:
     session.run("ruff", "check")
     session.run("ruff", "format", "--check")
     session.run("mypy")
+
+
+@nox.session
+def docs(session: nox.Session) -> None:
+    """Build the documentation as a site; a broken link fails."""
+    install(session, "[docs]")
+    session.run("mkdocs", "build", "--strict", env={"NO_MKDOCS_2_WARNING": "1"})
+    session.log(f"The site is at {Path('build/site/index.html').resolve().as_uri()}")
 
 
 @nox.session

@@ -10,7 +10,7 @@ the charging zone is a monitored ``simpy.Resource``. Every consequence is a call
 Several things happen at the start of a slot, at the same simulation time. SimPy processes the
 events of one time in the order in which they were scheduled, so a timeout of zero
 (``_after_due_events``) resumes the clock only when everything already scheduled for this time is
-done. That fixes the order inside a slot; ``docs/model.md`` has a drawing of it:
+done. That fixes the order inside a slot; ``docs/concepts/model.md`` has a drawing of it:
 
 1. the UAVs have given back the pads of the slot before;
 2. the policies decide, the safety controller resolves, ``slot_opens`` resumes the UAVs;

@@ -4,8 +4,8 @@
     actions = np.where(mask, values, -np.inf).argmax(1)
 
 A UAV that cannot fill its quota on its present battery must be able to reach a free zone cell of
-its own, with a margin of some slots for teammates in its way. ``docs/policies.md`` describes the
-rules; below are compiled functions on one mission's arrays.
+its own, with a margin of some slots for teammates in its way. ``docs/concepts/return-guard.md``
+describes the rules; below are compiled functions on one mission's arrays.
 """
 
 import numpy as np

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("dess", "policies", "analysis", "reports")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-ASKED = [*PROJECT["dependencies"], *EXTRAS["test"], *EXTRAS["lint"]]
+ASKED = [*PROJECT["dependencies"], *EXTRAS["test"], *EXTRAS["lint"], *EXTRAS["docs"]]
 # What no system in particular needs, all do.
 SYSTEM = dict.fromkeys(("os_name", "sys_platform", "platform_system", "platform_machine"), "other")
 

@@ -1,0 +1,124 @@
+"""What MkDocs builds into the site besides the pages of this folder.
+
+- A line ``[[ NAME ]]`` of a page becomes a part made from the code: the commands, the fields of a
+  scenario, the public names of a package, the changelog.
+- A link from a page to a file of the repository outside of ``docs/`` leads to a page of the site
+  that shows this file. So the same link works in the repository and in the site.
+"""
+
+import os
+import re
+from collections.abc import Callable, Iterable
+from importlib import import_module
+from pathlib import Path, PurePosixPath
+
+import typer.main
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+from typer.cli import get_docs_for_click
+
+import dess
+from reports import cli
+
+ROOT = Path(__file__).parents[1]
+LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
+PART = re.compile(r"^\[\[ (\w+)(?: (\w+))? \]\]$", re.M)
+
+
+# --- parts made from the code ---
+
+
+def commands() -> str:
+    """The help of every command."""
+    command = typer.main.get_command(cli.app)
+    return get_docs_for_click(obj=command, ctx=typer.Context(command), name="dess", indent=1)
+
+
+def scenario_fields() -> str:
+    """A table of the fields of a scenario: meaning, allowed values, default."""
+    rows = ["| field | meaning | allowed | default |", "| --- | --- | --- | --- |"]
+    for name, field in dess.Scenario.model_fields.items():
+        default = str(field.default) if len(str(field.default)) < 40 else "as in the paper"
+        limits = ", ".join(_limits(field.metadata)) or "any"
+        rows.append(f"| `{name}` | {field.description} | {limits} | {default} |")
+    return "\n".join(rows)
+
+
+def _limits(metadata: Iterable[object]) -> Iterable[str]:
+    words = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
+    for bound in metadata:
+        for key, word in words.items():
+            if hasattr(bound, key):
+                yield f"{word} {getattr(bound, key)}"
+
+
+def names(package: str) -> str:
+    """The documentation of a package's public names, by their docstrings."""
+    module = import_module(package)
+    found = [getattr(module, name) for name in module.__all__ if not name.startswith("__")]
+    return "\n\n".join(f"::: {thing.__module__}.{thing.__qualname__}" for thing in found)
+
+
+def changelog() -> str:
+    """The changelog, without its title."""
+    return (ROOT / "CHANGELOG.md").read_text("utf-8").split("\n", 1)[1]
+
+
+PARTS: dict[str, Callable[..., str]] = {
+    part.__name__: part for part in (commands, scenario_fields, names, changelog)
+}
+
+
+# --- files outside of docs/ ---
+
+
+def place(path: str) -> str:
+    """Where a file of the repository is in the site."""
+    inside = path.removeprefix("docs/")
+    return inside if inside != path else f"source/{path.removesuffix('.md')}.md"
+
+
+def linked(path: str, text: str) -> dict[str, str]:
+    """The links of a file of the repository, with the files of the repository they lead to."""
+    folder = PurePosixPath(path).parent
+    return {link: os.path.normpath(folder / link) for link in LINK.findall(text)}
+
+
+def moved(path: str, text: str) -> str:
+    """The text of a file of the repository, with its links as they are in the site."""
+    here = PurePosixPath(place(path)).parent
+    targets = linked(path, text)
+    return LINK.sub(lambda m: os.path.relpath(place(targets[m[0]]), here), text)
+
+
+def shown(path: str) -> str:
+    """The page that shows a file of the repository."""
+    text = (ROOT / path).read_text("utf-8")
+    if path.endswith(".md"):
+        return moved(path, text)
+    return f"# {path}\n\n````{PurePosixPath(path).suffix[1:]}\n{text}````\n"
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add a page for every file outside of ``docs/`` that a page links to."""
+    pending = [f"docs/{file.src_uri}" for file in files.documentation_pages()]
+    seen = set(pending)
+    while pending:
+        path = pending.pop()
+        if path.endswith(".md"):
+            text = (ROOT / path).read_text("utf-8")
+            new = {t for t in linked(path, text).values() if (ROOT / t).is_file()} - seen
+            seen |= new
+            pending += new
+    for path in sorted(seen):
+        if not path.startswith("docs/"):
+            files.append(File.generated(config, place(path), content=shown(path)))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Fill in the parts made from the code, and turn links to where files are in the site."""
+    if not page.file.src_uri.startswith("source/"):
+        markdown = moved(f"docs/{page.file.src_uri}", markdown)
+    return PART.sub(lambda match: PARTS[match[1]](*filter(None, [match[2]])), markdown)

@@ -1,0 +1,76 @@
+"""The documentation as a site: it builds strictly, and a browser opens it from a folder, offline."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from tests.reports.browser import ARGUMENTS, CHROMIUM, Visit
+
+ROOT = Path(__file__).parents[1]
+WIDTHS = (1280, 390)
+
+pytestmark = pytest.mark.slow
+
+
+def build(config: Path, out: Path) -> subprocess.CompletedProcess[str]:
+    """Build the site of a configuration into a folder."""
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-f", str(config), "-d", str(out)]
+    return subprocess.run(command, cwd=config.parent, capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built site."""
+    folder = tmp_path_factory.mktemp("site")
+    built = build(ROOT / "mkdocs.yml", folder)
+    assert built.returncode == 0, built.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def test_pages_ask_nothing_from_elsewhere_and_fit_the_window(site: Path, browser: Browser) -> None:
+    pages = sorted(site.rglob("*.html"))
+    assert len(pages) > 40
+    for path in pages:
+        visit = Visit(browser, path, WIDTHS[0])
+        for width in WIDTHS:
+            visit.resize(width)
+            assert visit.page.evaluate("document.documentElement.scrollWidth") == width, path
+        assert all(url.startswith(site.as_uri()) for url in visit.requests), path
+        assert not visit.complaints, path
+        visit.page.close()
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_search_finds_charging_pads(site: Path, browser: Browser, width: int) -> None:
+    visit = Visit(browser, site / "index.html", width)
+    visit.page.locator("label[for=__search]:visible, .md-search__input:visible").first.click()
+    visit.page.keyboard.type("charging pad")
+    found = visit.page.locator(".md-search-result__item a").first
+    found.wait_for()
+    titles = visit.page.locator(".md-search-result__item h1").all_inner_texts()
+    assert "The model" in titles
+    found.click()
+    visit.page.locator("mark", has_text="pad").first.wait_for(state="attached")
+    assert not visit.complaints
+    visit.page.close()
+
+
+def test_a_broken_link_or_anchor_fails_the_build(tmp_path: Path) -> None:
+    for name in ("docs", "mkdocs.yml", "CHANGELOG.md", "policies", "dess", "analysis", "reports"):
+        os.symlink(ROOT / name, tmp_path / name)
+    (tmp_path / "docs").unlink()
+    (tmp_path / "docs").mkdir()
