@@ -1,11 +1,12 @@
-"""The batch engine: many missions advance slot by slot in compiled code over ``rules.py``.
+"""The batch engine: compiled code that advances many missions together, slot by slot.
 
     records = simulate_batch(load_scenario("paper"), policies.load("greedy"), 1, range(1000))
     records.missions["collection_ratio"].mean()
 
-A batch has a fixed number of places; when a mission ends, the next one takes its place. The
-policies decide once per slot for all UAVs of the batch. Missions are independent: their records
-do not depend on the order or the grouping.
+Like the SimPy model it calls ``rules.py``, so both give the same records. A batch has a fixed
+number of places; when a mission ends, the next mission takes its place. A policy is called once per
+slot for all UAVs of the batch. Missions are independent, so their records depend neither on the
+order of the missions nor on how they are divided into batches.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,7 +31,8 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
-BATCH_SIZE = 256  # many enough to make Python's share small, few enough for the cache
+# Enough missions that the time spent in Python is a small part, few enough for the CPU's cache.
+BATCH_SIZE = 256
 
 
 def simulate_batch(
@@ -47,10 +49,10 @@ def simulate_batch(
 
     Args:
         scenario: One scenario or space for all missions, or one per mission.
-        policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
+        policy: A policy, or a sequence of policies; UAV i follows ``policy[i % len(policy)]``.
         seed: Seed of all missions.
-        replications: Their replication numbers, or how many, counted from 0.
-        workers: Threads; the compiled code does not hold Python's lock.
+        replications: The replication numbers, or a number n for the replications 0 to n - 1.
+        workers: Number of threads; the compiled code does not hold Python's global lock.
         batch_size: Missions in progress per thread.
         progress: Called with the number of missions finished since its last call.
 
@@ -88,7 +90,7 @@ def simulate_batch(
     tasks = []
     for members in _by_world(spaces):
         jobs = np.nonzero(np.isin(kinds, members))[0]
-        which = np.searchsorted(members, kinds)  # read at the jobs of this world only
+        which = np.searchsorted(members, kinds)  # valid only at the indices in ``jobs``
         group = [spaces[member] for member in members]
         tasks += [(part, group, which) for part in np.array_split(jobs, workers) if len(part)]
     if workers == 1:
@@ -99,7 +101,7 @@ def simulate_batch(
             try:
                 for future in [pool.submit(run, *task) for task in tasks]:
                     future.result()
-            finally:  # after an error or Ctrl-C the other threads stop too
+            finally:  # after an error or Ctrl-C, let the other threads stop too
                 stop.set()
     return records
 
@@ -127,7 +129,7 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
 
 
 class _Batch:
-    """Missions that advance together over one world."""
+    """Missions that advance together and share one grid with its nodes and channel."""
 
     def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, batch_size: int):
         self.world, self.team, self.batch_size = world_of(spaces[0]), team, batch_size
@@ -146,7 +148,7 @@ class _Batch:
         source = (self.constants, self.ranges, which, numbers, jobs)
         for b in range(size):
             _next_mission(b, job_of, queue, source, state)
-        # Reporting takes time that all threads share: a hundred reports suffice.
+        # Reporting holds Python's global lock, so about a hundred reports are made in all.
         reported, step = 0, max(1, len(jobs) // 100)
         while queue[1] < len(jobs) and not stop.is_set():
             decide(self.team, state, self.world)
@@ -158,7 +160,7 @@ class _Batch:
 
 @kernel
 def _next_mission(b, job_of, queue, source, state):
-    """Put the next job into place ``b``; without one the place stays empty."""
+    """Start the next job in place ``b``; if no job is left, the place stays empty."""
     constants, ranges, which, numbers, jobs = source
     mission = state.missions[b]
     if queue[0] == len(jobs):

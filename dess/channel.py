@@ -1,8 +1,9 @@
 """The channel: mean SNR, shadowing and the search for the best node of a UAV (eq. 9-11).
 
-The mean SNR comes from a table: for each step, the nodes in descending order of mean SNR. Shadowing
-is drawn only for nodes that can still be the best: deviates are bounded, so the search ends at the
-first batch of nodes whose means lie too far below the best value so far.
+A table holds, for each step of a UAV, the nodes in descending order of mean SNR. Shadowing is drawn
+only for nodes that can still be the best. The normal deviates are bounded (``streams.MAX_NORMAL``),
+so the search ends as soon as the mean SNR of all further nodes, plus the largest possible
+shadowing, lies below the best SNR found.
 """
 
 import math
@@ -18,7 +19,7 @@ from dess.scenario import ScenarioSpace
 from dess.state import STEP_X, STEP_Y
 
 GROUP = 4  # communication slots whose shadowing one Philox block holds
-_BATCH = 8  # nodes drawn together: as many as a vector register holds
+_BATCH = 8  # nodes whose shadowing is drawn together: as many as a vector register holds
 
 _DB_TO_LOG = math.log(10.0) / 10.0
 _PER_LOG_2 = 1.0 / math.log(2.0)
@@ -28,8 +29,8 @@ BATCH = np.dtype(
     [
         ("node", np.int64, _BATCH),
         ("mean", np.float64, (GROUP, _BATCH)),  # mean SNR per communication slot [dB]
-        ("words", np.uint64, (GROUP, _BATCH)),  # shadowing words per communication slot
-        ("snr", np.float64, (GROUP, _BATCH)),  # SNR [dB], or an upper bound in the tails
+        ("words", np.uint64, (GROUP, _BATCH)),  # random words of the shadowing, per slot
+        ("snr", np.float64, (GROUP, _BATCH)),  # SNR [dB], or an upper bound of it
         ("top", np.int64, GROUP),  # place of the highest SNR per communication slot
         ("rest", np.float64),  # highest mean SNR in the slot of all nodes behind these [dB]
     ]
@@ -39,15 +40,18 @@ BATCH = np.dtype(
 class World(NamedTuple):
     """The nodes and the tables of the channel, shared by all missions of a batch.
 
-    A step is an action and the cell that it leads to; its row is computed when first needed.
+    A step is an action together with the cell that it leads to. The row of a step in ``order`` and
+    ``means`` is computed when it is first needed.
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
         mean_snr: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
-            and ``b / m`` cells along the other: the lattice of all positions a UAV can serve from.
-        order: (5 * M * M, K + 1) per step the nodes in descending order of their highest mean
-            SNR in the slot; the last column tells whether the row is filled.
-        means: (5 * M * M, K, m) per step their mean SNR per communication slot [dB].
+            and ``b / m`` cells along the other. These are all relative positions from which a UAV
+            can serve a node.
+        order: (5 * M * M, K + 1) for each step, the nodes in descending order of their highest
+            mean SNR in the slot; the last column tells whether the row is filled.
+        means: (5 * M * M, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
+            communication slot.
     """
 
     nodes: np.ndarray
@@ -61,9 +65,10 @@ class Scratch(NamedTuple):
 
     Attributes:
         batches: (I, C) ``BATCH`` records: the nodes tried for each UAV, eight at a time.
-        search: (I, 4) per UAV the batches drawn, the rank behind them, the row of its step, and
-            the nodes in a batch, always eight. The compiled code reads that number at run time,
-            since the compiler does not vectorise a loop that it knows to be so short.
+        search: (I, 4) for each UAV, the number of batches drawn, the rank of the next node to draw,
+            the row of the UAV's step, and the number of nodes in a batch, which is always eight.
+            The compiled code reads this last number at run time, because the compiler does not
+            vectorise a loop that it knows to be so short.
     """
 
     batches: np.ndarray
@@ -83,7 +88,7 @@ def empty_scratch(uavs: int, nodes: int) -> Scratch:
 def world_of(scenario: ScenarioSpace) -> World:
     """The nodes of a scenario and the tables of its channel (eq. 10, in dB).
 
-    Every thread has its own tables, since it fills them row by row.
+    Every thread has its own tables, because each thread fills them row by row while it simulates.
     """
     return _world_of(scenario, get_ident())
 
@@ -105,7 +110,7 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
 
 @kernel
 def _fill_row(u, row, nodes, mean_snr, order, means):
-    """Fill the row of a step: nodes by descending mean SNR (ties: lower index), and the means."""
+    """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR."""
     count, m = means.shape[1:]
     step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
     value = np.empty((count, m))
@@ -113,7 +118,7 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
     for k in range(count):
         dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
         fine, coarse = (m * dx, dy) if along_x else (m * dy, dx)
-        for n in range(m):  # short of the cell by the communication slots that are left
+        for n in range(m):  # the UAV has still (m - 1 - n) / m of the step before it
             value[k, n] = mean_snr[abs(coarse), abs(fine - (m - 1 - n) * step)]
             high[k] = max(high[k], value[k, n])
     ranking = np.argsort(-high, kind="mergesort")
@@ -125,7 +130,7 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
 
 @inlined
 def open_group(mission, i, u, nodes, mean_snr, order, means, search):
-    """Begin a group of communication slots for UAV ``i``: no shadowing is drawn yet."""
+    """Begin a group of communication slots for UAV ``i``, without drawing any shadowing."""
     row = (u.executed * mission.grid + u.y) * mission.grid + u.x
     search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
     if order[row, mission.nodes] == 0:
@@ -134,17 +139,18 @@ def open_group(mission, i, u, nodes, mean_snr, order, means, search):
 
 @inlined
 def best_node(mission, i, residual, order, means, batches, search, n):
-    """Highest SNR [dB] of UAV ``i`` among the nodes with data, and its node; -1 without any.
+    """The highest SNR [dB] of UAV ``i`` among the nodes with data, and the index of that node.
 
-    On a tie the node with the lowest index wins. The arrays of ``World`` and ``Scratch`` are passed
-    one by one: reference counting of tuples would cost more than the search itself.
+    The index is -1 if no node has data. On a tie the node with the lowest index wins. The arrays of
+    ``World`` and ``Scratch`` are passed one by one, because the reference counting of tuples would
+    cost more time than the search itself.
 
     Args:
         mission: ``MISSION`` record.
         i: Index of the UAV.
         residual: (K,) residual data [data units].
         order, means: As in ``World``.
-        batches, search: As in ``Scratch``; ``open_group`` has begun the group of ``n``.
+        batches, search: As in ``Scratch``; ``open_group`` must have begun the group of slot ``n``.
         n: Communication slot, 1..m.
     """
     group, word = (n - 1) // GROUP, (n - 1) % GROUP
@@ -167,7 +173,7 @@ def best_node(mission, i, residual, order, means, batches, search, n):
 
 @inlined
 def _fill_batch(mission, residual, order, means, row, rank, group, batch):
-    """Put the next nodes of a row, from a rank on, into a batch; returns the rank behind them."""
+    """Put the next nodes of a row, from a rank on, into a batch; return the rank after the last."""
     node, mean = batch.node, batch.mean
     first, count = group * GROUP, min(GROUP, mission.communication_slots - group * GROUP)
     place = 0
@@ -190,7 +196,11 @@ def _fill_batch(mission, residual, order, means, row, rank, group, batch):
 
 @inlined
 def _draw(mission, substream, batch, width):
-    """Draw the shadowing of a batch: the SNR of its nodes [dB], or a bound in the tails."""
+    """Draw the shadowing of a batch and set the SNR [dB] of its nodes.
+
+    In the tails of the normal distribution, an upper bound is set in place of the SNR; it is
+    replaced by the exact value only where that value is needed (``_best_of_batch``).
+    """
     words, mean, snr = batch.words, batch.mean, batch.snr
     streams.blocks(
         mission.seed, mission.replication, streams.SHADOWING, substream, mission.slot,
@@ -206,15 +216,15 @@ def _draw(mission, substream, batch, width):
 
 @inlined
 def _best_of_batch(mission, residual, batch, word, width):
-    """Highest SNR [dB] in a batch, and its node; -1 if no node of it has data."""
-    exact = 0  # places whose bound has been replaced by the exact value, as bits
+    """The highest SNR [dB] in a batch and its node, -1 if no node of the batch has data."""
+    exact = 0  # a bit per place: whether its bound has been replaced by the exact value
     while True:
         place = batch.top[word]
         node, snr = batch.node[place], batch.snr[word, place]
         if snr == -math.inf:
             return snr, -1
         drawn = batch.words[word, place]
-        if residual[node] <= 0.0:  # drained since it was drawn
+        if residual[node] <= 0.0:  # emptied since the batch was drawn
             batch.snr[word, place] = -math.inf
         elif streams.is_central(drawn) or exact >> place & 1:
             return snr, node
@@ -227,7 +237,7 @@ def _best_of_batch(mission, residual, batch, word, width):
 
 @inlined
 def _top(node, snr, word, width):
-    """Place of the highest SNR in a communication slot; the lowest node on a tie."""
+    """The place of the highest SNR in a communication slot; on a tie, of the lowest node index."""
     best = snr[word, 0]
     for place in range(1, _BATCH):
         value = snr[word, place]

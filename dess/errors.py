@@ -1,4 +1,4 @@
-"""The one exception for bad input."""
+"""The exception for all bad input."""
 
 
 class InputError(ValueError):

@@ -20,7 +20,7 @@ class Shipped(NamedTuple):
     """A folder of TOML files in a package, loaded by name.
 
     Attributes:
-        kind: The word for one of the files in messages, such as ``scenario``.
+        kind: What messages call one of the files, such as ``scenario``.
         package: The package that contains the folder.
         folder: The folder.
     """
@@ -35,7 +35,7 @@ class Shipped(NamedTuple):
         return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
 
     def folder_of(self, name_or_path: str | Path) -> Path:
-        """The folder that ``load`` reads a file from."""
+        """The folder from which ``load`` would read a file of this name or path."""
         if str(name_or_path) in self.names():
             return Path(str(resources.files(self.package).joinpath(self.folder)))
         return Path(name_or_path).parent
@@ -77,10 +77,12 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file that replaces ``path`` at the end; on an error it is deleted.
+    """Yield a temporary path that replaces ``path`` at the end, and is deleted on an error.
+
+    So ``path`` has either its old content or all of the new content, never a part of it.
 
     Raises:
-        InputError: Before anything else, if no file can be written there.
+        InputError: Before the block is run, if no file can be written there.
     """
     if path.is_dir():
         raise InputError(f"{path}: is a folder; allowed: a file")
@@ -97,7 +99,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writable(path: Path) -> Iterator[None]:
-    """Turn an ``OSError`` of writing to ``path`` into a one-line message.
+    """Replace an ``OSError`` that is raised while ``path`` is written by a one-line message.
 
     Raises:
         InputError: In place of the ``OSError``.
@@ -110,10 +112,10 @@ def writable(path: Path) -> Iterator[None]:
 
 
 def check_folder(path: Path) -> None:
-    """Refuse a folder that cannot be made or written, before anything takes time.
+    """Refuse a folder that cannot be made or written, before a long computation begins.
 
     Raises:
-        InputError: If it cannot.
+        InputError: If the folder cannot be made, or no file can be written into it.
     """
     there = next(above for above in (path, *path.absolute().parents) if above.exists())
     if not there.is_dir() or not os.access(there, os.W_OK):

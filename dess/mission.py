@@ -1,8 +1,9 @@
 """The SimPy model: one mission as processes and events.
 
-This module owns time. The mission clock opens each mission slot, runs the communication slots at
-t + n/m and the arrivals at its end; one process per UAV asks for a charging pad and gives it back;
-the charging zone is a monitored ``simpy.Resource``. Every consequence is a call of ``rules.py``.
+This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
+the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
+adds the arrivals at its end. One process per UAV requests a charging pad and gives it back. The
+charging zone is a ``simpy.Resource`` that logs its use.
 
     record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
@@ -10,12 +11,13 @@ the charging zone is a monitored ``simpy.Resource``. Every consequence is a call
 Several things happen at the start of a slot, at the same simulation time. SimPy processes the
 events of one time in the order in which they were scheduled, so a timeout of zero
 (``_after_due_events``) resumes the clock only when everything already scheduled for this time is
-done. That fixes the order inside a slot; ``docs/concepts/model.md`` has a drawing of it:
+done. This fixes the order inside a slot, which ``docs/concepts/model.md`` also shows as a drawing:
 
-1. the UAVs have given back the pads of the slot before;
-2. the policies decide, the safety controller resolves, ``slot_opens`` resumes the UAVs;
-3. the UAVs have asked for pads, left the queue or given back theirs;
-4. the pads given back are granted to the next UAVs in the queue, and charging starts.
+1. the UAVs that were charged in the slot before have given back their pads;
+2. the policies decide, the safety controller resolves the moves, and ``slot_opens`` resumes the
+   processes of the UAVs;
+3. the UAVs have requested pads, left the queue or given back their pads;
+4. pads that were given back are granted to the next UAVs in the queue, and charging starts.
 """
 
 from collections.abc import Generator, Sequence
@@ -54,10 +56,13 @@ def simulate(
 
     Args:
         scenario: The scenario, or the space from which the replication draws its parameters.
-        policy: A policy, or a sequence of which UAV i gets number ``i % len(policy)``.
+        policy: A policy, or a sequence of policies; UAV i follows ``policy[i % len(policy)]``.
         seed: Seed of the study.
         replication: Number of the replication.
         events: Whether to keep the event log.
+
+    Returns:
+        The record of the mission.
 
     Raises:
         InputError: If the seed or the replication is out of range.
@@ -82,7 +87,7 @@ class ChargingZone(simpy.Resource):
 
 
 class MissionModel:
-    """The processes of one mission: its clock and its UAVs, around the charging zone."""
+    """The SimPy processes of one mission: a clock and one process per UAV."""
 
     def __init__(
         self,
@@ -240,5 +245,5 @@ class MissionModel:
 
 
 def _after_due_events(env: simpy.Environment) -> simpy.Timeout:
-    """An event that SimPy processes after all events already scheduled for the present time."""
+    """An event that SimPy processes after all events already scheduled for the current time."""
     return env.timeout(0)

@@ -8,7 +8,7 @@ import numpy as np
 from dess.code.kernels import kernel
 from dess.state import END_NAMES, QUOTA
 
-# One mission. Data in data units, rewards summed over the slots and the UAVs (eq. 14).
+# One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
 MISSION_RECORD = np.dtype(
     [
         ("seed", np.uint64),
@@ -30,7 +30,7 @@ MISSION_RECORD = np.dtype(
     ]
 )
 
-# One UAV of a mission; absent ones of a batch have end 0.
+# One UAV of a mission. Where a mission has fewer UAVs than the array, the other rows have end 0.
 UAV_RECORD = np.dtype(
     [
         ("quota", np.int64),  # communications counted toward the quota
@@ -122,15 +122,22 @@ def empty_records(missions: int, uavs: int) -> Records:
 
 @dataclass
 class EventLog:
-    """The events of one mission, in the order in which they happened; columns are attributes too.
+    """The events of one mission, in the order in which they happened.
 
-    ``mission_start`` and ``mission_end`` have one row per UAV (``value`` its battery) and one per
-    node (``value`` its residual data). ``move`` has one row per UAV and mission slot, hovering
-    included: the cell after the slot's action, ``value`` the battery at the end of the slot.
-    ``communication`` and ``arrival`` carry data units, ``quota_filled`` the communications,
-    ``collision`` the action that was overruled, the charging events the battery. A UAV that leaves
-    the queue for a pad has a ``charge_request`` without ``charge_start``. ``uav`` and ``node`` are
-    -1 where an event has none.
+    Every column is also an attribute, as in ``log.time``. The meaning of ``value`` depends on the
+    event:
+
+    - ``mission_start`` and ``mission_end`` have one row per UAV (its battery [%]) and one row per
+      node (its residual data [data units]).
+    - ``move`` has one row per active UAV and mission slot, also where the UAV hovers. The position
+      is the cell after the action, the value is the battery [%] at the end of the slot.
+    - ``communication`` and ``arrival``: the data units collected or arrived.
+    - ``quota_filled``: the number of communication slots in which the UAV collected data.
+    - ``collision``: the number of the action that the safety controller overruled.
+    - ``charge_request``, ``charge_start``, ``charge_end`` and ``battery_empty``: the battery [%].
+
+    A UAV that leaves the queue for a pad has a ``charge_request`` without a ``charge_start``.
+    ``uav`` and ``node`` are -1 where an event concerns no UAV or no node.
     """
 
     rows: list[tuple] = field(default_factory=list)
@@ -161,7 +168,7 @@ class EventLog:
 
 @dataclass(frozen=True)
 class MissionRecord:
-    """The record of one mission; its metrics are attributes too, as in ``record.success``.
+    """The record of one mission; every metric is also an attribute, as in ``record.success``.
 
     Attributes:
         metrics: ``MISSION_RECORD`` scalar.
@@ -179,7 +186,7 @@ class MissionRecord:
         raise AttributeError(name)
 
     def uav_rows(self) -> list[dict[str, Any]]:
-        """Per UAV the quota count, battery, charging slots and how its mission ended."""
+        """A row per UAV: communications, battery [%], charging slots and how its mission ended."""
         return [
             {
                 "quota": int(u["quota"]),

@@ -1,8 +1,8 @@
 """The rules of the model: what one mission slot does to one mission.
 
-Compiled functions that change the arrays of one mission in place. Both engines and the environments
-call them; they know no engine, no random generator object and no global state. The order of a slot
-(Section III-C), as the batch engine runs it in ``advance``:
+The module holds compiled functions that change the arrays of one mission in place. Both engines and
+the environments call these functions, which use no random generator object and no global state.
+The batch engine runs a slot in the order of Section III-C (see ``advance``):
 
     resolve(mission, uavs)               # moves, safety controller
     grant_pads(mission, uavs)            # the SimPy engine has a simpy.Resource instead
@@ -89,7 +89,7 @@ def launch(mission, ranges, uavs, residual):
 def _launch_uavs(mission, uavs):
     """Draw distinct start cells in the zone, without replacement."""
     cells = mission.zone_width * mission.zone_height
-    left = np.arange(cells)
+    free_cells = np.arange(cells)  # entries 0 to i - 1 are the cells already drawn
     for i in range(len(uavs)):
         u = uavs[i]
         u.active = i < mission.uavs
@@ -104,10 +104,10 @@ def _launch_uavs(mission, uavs):
         if u.active:
             words = streams.block(mission.seed, mission.replication, streams.START, 0, 0, i)
             pick = streams.integer(words[0], i, cells - 1)
-            left[i], left[pick] = left[pick], left[i]
-            u.x, u.y = zone_cell(mission, left[i])
+            free_cells[i], free_cells[pick] = free_cells[pick], free_cells[i]
+            u.x, u.y = zone_cell(mission, free_cells[i])
             u.from_x, u.from_y = u.x, u.y
-            _update_latch(mission, u)  # slot 0 is no exception
+            _update_latch(mission, u)  # a UAV may start at or below C_S
 
 
 @inlined
@@ -121,10 +121,11 @@ def _update_latch(mission, u):
 
 @inlined
 def resolve(mission, uavs):
-    """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at once.
+    """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at the same time.
 
-    A move off the grid becomes Hover. So does every move into a cell that another active UAV will
-    occupy, until nothing changes. The result does not depend on the numbering of the UAVs.
+    A move off the grid becomes Hover, and so does a move into a cell that another active UAV will
+    occupy. A cancelled move can block the move of another UAV, so the check is repeated until no
+    move is cancelled. The result does not depend on the numbering of the UAVs.
     """
     count = mission.uavs
     for i in range(count):
@@ -183,20 +184,21 @@ def _cancel(u):
 
 @inlined
 def may_charge(mission, u):
-    """Charging condition (eq. 4): active, in the zone, latched, and Hover was the chosen action.
+    """Whether a UAV meets the charging condition (eq. 4).
 
-    A move that the safety controller turned into Hover does not start charging.
+    The UAV is active, in the zone, has its charging latch set, and its policy chose Hover. A move
+    that the safety controller turned into Hover does not start charging.
     """
     return u.active and u.latch and u.action == HOVER and in_zone(mission, u.x, u.y)
 
 
 @inlined
 def grant_pads(mission, uavs):
-    """Grant free charging pads, first come first served, ties in the order of the UAVs.
+    """Grant free charging pads, first come first served; on a tie the lower UAV index is first.
 
-    The compiled equivalent of the SimPy resource: a UAV that meets the charging condition requests
-    a pad or stays in the queue, one that no longer meets it leaves the queue, and one that has a
-    pad keeps it until it is charged.
+    This is the compiled equivalent of the SimPy resource. A UAV that meets the charging condition
+    requests a pad or stays in the queue. A UAV that no longer meets it leaves the queue. A UAV that
+    has a pad keeps it until it is charged.
     """
     free = mission.pads
     waiting = 0
@@ -222,7 +224,7 @@ def grant_pads(mission, uavs):
 
 @inlined
 def spend(mission, uavs):
-    """Energy of one slot (eq. 8): a charging slot gains, any other active slot costs."""
+    """Update the batteries for one slot (eq. 8): charging UAVs gain, other active UAVs lose."""
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
@@ -242,7 +244,7 @@ def spend(mission, uavs):
 def communicate(
     mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
 ):  # fmt: skip
-    """Communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
+    """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
     among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
@@ -269,15 +271,21 @@ def communicate(
 
 @inlined
 def arrive(mission, residual, arrivals):
-    """Add the new data of one slot (eq. 12): Poisson packets per node, kept in ``arrivals``."""
-    none = math.exp(-mission.arrival_rate)
+    """Add the new data of one slot (eq. 12): a Poisson number of data units per node.
+
+    Args:
+        mission: ``MISSION`` record.
+        residual: (K,) residual data [data units], increased.
+        arrivals: (K,) new data of the slot [data units], overwritten.
+    """
+    probability_of_none = math.exp(-mission.arrival_rate)
     for k in range(0, mission.nodes, 4):
         words = streams.block(
             mission.seed, mission.replication, streams.ARRIVAL, 0, mission.slot, k // 4
         )
         for j in range(min(4, mission.nodes - k)):
             arrivals[k + j] = 0
-            if streams.uniform(words[j]) > none:
+            if streams.uniform(words[j]) > probability_of_none:
                 arrivals[k + j] = streams.poisson(words[j], mission.arrival_rate)
                 residual[k + j] += arrivals[k + j]
                 mission.arrived += arrivals[k + j]
@@ -285,7 +293,7 @@ def arrive(mission, residual, arrivals):
 
 @inlined
 def reward_terms(mission, u, charged):
-    """The terms of the reward of an active UAV in a slot (eq. 14-18), after its ``end`` is set.
+    """The reward terms of an active UAV in one slot (eq. 14-18); its ``end`` must be up to date.
 
     Args:
         mission: ``MISSION`` record.

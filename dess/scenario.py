@@ -28,13 +28,13 @@ _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 # Section VI-A: all combinations of five columns and five rows.
 PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
 
-# The parameters that vary from mission to mission (Table II). The order fixes their draws.
+# The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 
-# Entries of the table of the channel (dess.channel): 8 GiB if every step of it were ever made.
+# Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
 _CHANNEL_LIMIT = 2**30
 
-# Pydantic's error types for a malformed pair or list of cells; a clearer message replaces theirs.
+# Pydantic's error types for a malformed pair or list of cells; we print a clearer message instead.
 _WRONG_FORM = ("tuple_type", "missing", "too_long")
 
 # A strict integer: 2.0, true and "2" are refused.
@@ -196,7 +196,11 @@ class Scenario(_Constants):
 
     @classmethod
     def of(cls, **values: Any) -> Self:
-        """A scenario of the given values, the paper's for all others; one-line errors."""
+        """A scenario with the given values, and the paper's values for all other fields.
+
+        Raises:
+            InputError: For unknown keys, wrong types and values out of range.
+        """
         return _validated(cls, values, "scenario")
 
 
@@ -206,8 +210,8 @@ IntegerRange = tuple[Integer, Integer]
 class ScenarioSpace(_Constants):
     """The ranges from which a mission draws its parameters (Table II), both ends included.
 
-    A single value is a range of one. Narrowing or fixing one range does not change the draws of
-    the other parameters.
+    A single value is a range with one element. If one range is narrowed or fixed, the draws of the
+    other parameters do not change.
     """
 
     uavs: IntegerRange = Field((1, 3), description="number of UAVs (I): an integer or [low, high]")
@@ -250,7 +254,7 @@ class ScenarioSpace(_Constants):
     def limits(self, field: str) -> tuple[float, float]:
         """The least and the largest value that a numeric field may have, infinite without a limit.
 
-        Limits between fields, such as ``charge_start < charge_complete``, are none of these.
+        Constraints between fields, such as ``charge_start < charge_complete``, are not included.
 
         Raises:
             InputError: If the field does not exist, or holds no numbers.
@@ -279,9 +283,10 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     """A shipped scenario by name, or one from a TOML file.
 
     Args:
-        name_or_path: One of ``scenario_names()``, or the path of a TOML file. Its ``nodes`` may be
-            the name of a file beside it, of which ``dess.sea`` makes cells.
-        **overrides: Fields to set on top; setting a sampled field fixes it.
+        name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
+            ``nodes`` may be the name of a file in the same folder, which ``dess.sea`` reads.
+        **overrides: Values that replace those of the file. A sampled field that is set to a single
+            value is no longer sampled.
 
     Raises:
         InputError: If there is no such scenario, or it is not valid.
@@ -339,7 +344,7 @@ def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> An
 
 
 def _tuples(value: Any) -> Any:
-    """Convert lists, as TOML has them, to tuples at any depth."""
+    """Convert the lists that TOML gives to tuples, nested lists included."""
     return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
@@ -348,7 +353,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _sampled(zone_cells: int) -> dict[str, tuple[int, int, str]]:
-    """The limits of the sampled parameters, and where they come from."""
+    """For each sampled parameter the least and the largest value, and the reason for them."""
     return {
         "uavs": (1, min(zone_cells, 64), "cells of the zone, at most 64"),
         "flying_time": (1, 100, "battery capacity"),

@@ -1,12 +1,13 @@
-"""Sensor nodes of an own sea: their cells from a CSV or GeoJSON file.
+"""Read the sensor nodes of a user's own sea from a CSV or GeoJSON file.
 
-    nodes = "buoys.csv"  # in the TOML file of a scenario, for a file beside it
+    nodes = "buoys.csv"  # in the TOML file of a scenario: a file in the same folder
 
-A CSV file has a header. Its columns ``x`` and ``y`` are cells, of which (0, 0) is the north-western
-one. Its columns ``lon`` and ``lat``, like the Point features of a GeoJSON file (RFC 7946), are
-degrees of WGS 84; other columns are ignored. They are projected with the local equirectangular
-projection about the centre of their bounding box (J. P. Snyder, Map projections: a working manual,
-U.S. Geological Survey 1987), which becomes the centre of the grid.
+A CSV file has a header line, with either the columns ``x`` and ``y`` or the columns ``lon`` and
+``lat``; other columns are ignored. ``x`` and ``y`` are a cell of the grid, where (0, 0) is the
+north-western cell. ``lon`` and ``lat``, like the Point features of a GeoJSON file (RFC 7946), are
+degrees of WGS 84. Such positions are projected with the local equirectangular projection about the
+centre of their bounding box, which becomes the centre of the grid (J. P. Snyder, Map projections: a
+working manual, U.S. Geological Survey 1987).
 """
 
 import csv
@@ -30,9 +31,9 @@ class Place(NamedTuple):
     """Where a node is.
 
     Attributes:
-        name: Its place in the file, for messages.
-        x: Longitude [degrees] or column of cells.
-        y: Latitude [degrees] or row of cells.
+        name: Where the node stands in the file, such as ``line 3``; used in messages.
+        x: Longitude [degrees], or column of the cell.
+        y: Latitude [degrees], or row of the cell.
     """
 
     name: str
@@ -41,7 +42,7 @@ class Place(NamedTuple):
 
 
 def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
-    """The cells of the nodes that a file holds, in its order.
+    """The cells of the nodes in a file, in the order of the file.
 
     Args:
         path: A file ``.csv``, ``.geojson`` or ``.json``.
@@ -49,12 +50,12 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
         cell_size: Side of a cell [m].
 
     Raises:
-        InputError: If the file cannot be read, has no nodes, or they are off the grid or share a
-            cell.
+        InputError: If the file cannot be read or has no nodes, or if a node is off the grid or two
+            nodes share a cell.
     """
     readers = {".csv": _of_csv, ".geojson": _of_geojson, ".json": _of_geojson}
     if path.suffix.lower() not in readers:
-        raise InputError(f"{path}: is of no known kind; allowed: {', '.join(readers)}")
+        raise InputError(f"{path}: has no known file ending; allowed: {', '.join(readers)}")
     is_geographic, places = readers[path.suffix.lower()](path, _text(path))
     if not 0 < len(places) <= MAX_NODES:
         raise InputError(f"{path}: has {len(places):,} nodes; allowed: 1..{MAX_NODES}")
@@ -73,7 +74,7 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
 def _text(path: Path) -> str:
     """The content of a regular file that is not too large."""
     if path.exists() and not path.is_file():
-        raise InputError(f"{path}: cannot be read: it is no regular file; allowed: a file")
+        raise InputError(f"{path}: cannot be read: it is not a regular file; allowed: a file")
     try:
         if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{path}: is too large; allowed: {MAX_BYTES:,} bytes at most")
@@ -82,7 +83,7 @@ def _text(path: Path) -> str:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot be read: {reason}; allowed: a file of nodes") from None
     except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is no text; allowed: UTF-8") from None
+        raise InputError(f"{path}: cannot be read: it is not text; allowed: UTF-8") from None
 
 
 def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
@@ -90,7 +91,7 @@ def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
     try:
         rows = list(csv.reader(io.StringIO(text), strict=True))
     except csv.Error as error:
-        raise InputError(f"{path}: is no CSV file: {error}; allowed: CSV with commas") from None
+        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
     header = [name.strip() for name in rows[0]] if rows else []
     found = [pair for pair in (("x", "y"), ("lon", "lat")) if {*pair} <= {*header}]
     if len(found) != 1:
@@ -107,12 +108,12 @@ def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
 
 
 def _of_geojson(path: Path, text: str) -> tuple[bool, list[Place]]:
-    """Whether the nodes are geographic, as GeoJSON is, and where they are."""
+    """True, because the positions in GeoJSON are geographic, and where the nodes are."""
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
         line = " ".join(str(error).split())
-        raise InputError(f"{path}: is no JSON: {line}; allowed: GeoJSON") from None
+        raise InputError(f"{path}: is not JSON: {line}; allowed: GeoJSON") from None
     features = data.get("features") if isinstance(data, dict) else None
     if not isinstance(features, list):
         raise InputError(f"{path}: has no list of features; allowed: a GeoJSON FeatureCollection")
@@ -130,7 +131,7 @@ def _of_geojson(path: Path, text: str) -> tuple[bool, list[Place]]:
 
 
 def _place(path: Path, name: str, columns: Sequence[str], values: Sequence[Any]) -> Place:
-    """A place of the values of two columns, or of two coordinates."""
+    """Make a place from the values of two columns, or from two coordinates."""
     numbers = []
     for column, value in zip(columns, [*values, None, None], strict=False):
         try:
@@ -157,7 +158,7 @@ def _integers(path: Path, places: Iterable[Place]) -> list[Cell]:
     for place in places:
         for column, value in (("x", place.x), ("y", place.y)):
             if value != int(value):
-                line = f"{place.name}: {column} is {value:g}; allowed: an integer, as of a cell"
+                line = f"{place.name}: {column} is {value:g}; allowed: an integer (a cell)"
                 raise InputError(f"{path}: {line}")
         cells.append((int(place.x), int(place.y)))
     return cells
@@ -184,7 +185,7 @@ def _projected(places: Sequence[Place], grid: int, cell_size: float) -> list[Cel
 def _check_grid(
     path: Path, places: Sequence[Place], cells: Sequence[Cell], grid: int, is_centred: bool
 ) -> None:
-    """Refuse cells off the grid, with a grid that they would be on."""
+    """Refuse cells off the grid; the message names a grid that is large enough."""
     for place, cell in zip(places, cells, strict=True):
         if not all(0 <= coordinate < grid for coordinate in cell):
             beyond = max(max(-c, c - grid + 1) for at in cells for c in at)

@@ -1,4 +1,4 @@
-"""The state of B missions with up to I UAVs and K nodes, as plain arrays; one mission is B = 1.
+"""The state of B missions with up to I UAVs and K nodes, as arrays; a single mission has B = 1.
 
 state = empty_state(1, space.uavs[1], len(space.nodes))
 state.missions[:] = constants_of(space)
@@ -22,7 +22,7 @@ ACTION_NAMES = ("north", "east", "south", "west", "hover")
 STEP_X = np.array([0, 1, 0, -1, 0])
 STEP_Y = np.array([-1, 0, 1, 0, 0])
 
-# How a UAV's mission ended; ACTIVE while it has not.
+# How the mission of a UAV ended; ACTIVE while it has not ended.
 ACTIVE, QUOTA, BATTERY, TRUNCATED = range(4)
 END_NAMES = ("active", "quota", "battery", "truncated")
 
@@ -70,7 +70,7 @@ MISSION = np.dtype(
         ("initial", np.float64),  # data units
         ("arrived", np.float64),
         ("collected", np.float64),
-        ("slot_collected", np.float64),  # in the present slot
+        ("slot_collected", np.float64),  # data units, in the present slot
     ]
 )
 
@@ -82,11 +82,11 @@ UAV = np.dtype(
         ("from_x", np.int64),  # cell at the start of the slot
         ("from_y", np.int64),
         ("battery", np.int64),
-        ("communications", np.int64),  # counted toward the quota
-        ("action", np.int64),  # asked for
-        ("executed", np.int64),  # after the safety controller
+        ("communications", np.int64),  # communication slots counted toward the quota
+        ("action", np.int64),  # chosen by the policy
+        ("executed", np.int64),  # what the safety controller made of it
         ("end", np.int64),
-        ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 without
+        ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 if none
         ("slots_flying", np.int64),
         ("slots_charging", np.int64),
         ("slots_waiting", np.int64),  # for a pad
@@ -113,14 +113,17 @@ class State(NamedTuple):
 
 
 def empty_state(missions: int, uavs: int, nodes: int) -> State:
-    """A zeroed state of that many missions, UAVs per mission and nodes."""
+    """A state filled with zeros, for that many missions, UAVs per mission and nodes."""
     return State(
         np.zeros(missions, MISSION), np.zeros((missions, uavs), UAV), np.zeros((missions, nodes))
     )
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
-    """A (1,) ``MISSION`` array with the constants of a scenario; sampled ones at their low end."""
+    """A (1,) ``MISSION`` array with the constants of a scenario.
+
+    Sampled parameters have the low end of their range; ``draw_parameters`` overwrites them.
+    """
     mission = np.zeros(1, MISSION)
     for field in MISSION.fields or ():
         if field in SAMPLED:
@@ -140,7 +143,7 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
 
 
 def ranges_of(scenario: ScenarioSpace) -> np.ndarray:
-    """(4, 2) low and high end of the sampled parameters, in the order of ``SAMPLED``."""
+    """The (4, 2) low and high ends of the sampled parameters, in the order of ``SAMPLED``."""
     return np.array([getattr(scenario, name) for name in SAMPLED], np.int64)
 
 
@@ -155,7 +158,11 @@ def draw_parameters(mission, ranges):
 
 
 def sample_scenario(scenario: ScenarioSpace, seed: int, replication: int) -> Scenario:
-    """The scenario of one replication: the sampled parameters drawn, all else as given."""
+    """The scenario of one replication: its sampled parameters are drawn, its constants are kept.
+
+    Raises:
+        InputError: If the seed or the replication is out of range.
+    """
     check_seed(seed, replication)
     missions = constants_of(scenario)
     missions["seed"], missions["replication"] = seed, replication
@@ -164,11 +171,11 @@ def sample_scenario(scenario: ScenarioSpace, seed: int, replication: int) -> Sce
 
 
 def check_seed(seed: int, replication: int) -> None:
-    """Refuse seeds and replications outside the counter space.
+    """Refuse a seed or a replication that the random streams cannot represent.
 
     Raises:
-        InputError: If one is out of range.
-        TypeError: If one is no integer.
+        InputError: If one of them is out of range.
+        TypeError: If one of them is not an integer.
     """
     seed, replication = index(seed), index(replication)
     if not 0 <= seed <= streams.MAX_SEED:
@@ -178,5 +185,5 @@ def check_seed(seed: int, replication: int) -> None:
 
 
 def spaces_of(scenarios: Sequence[Scenario | ScenarioSpace]) -> list[ScenarioSpace]:
-    """Each scenario as a space, a space as it is."""
+    """The scenarios as spaces; a single scenario becomes a space of one."""
     return [s if isinstance(s, ScenarioSpace) else ScenarioSpace.of(s) for s in scenarios]

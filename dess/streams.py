@@ -1,15 +1,16 @@
-"""All randomness, as a pure function of its coordinates.
+"""All random numbers, each as a pure function of what it is drawn for.
 
-Every exogenous draw is a function of ``(seed, replication, stream, slot, sub-slot, UAV, node)``
-through the counter-based generator Philox 4x32-10 (Salmon et al., SC'11). There is no state
-between draws: a replication is the same alone and inside any sweep, two policies on one replication
-have common random numbers, and draws that are not needed are not made.
+Every random draw of the model is a function of ``(seed, replication, stream, slot, sub-slot, UAV,
+node)``. The function is the counter-based generator Philox 4x32-10 (J. K. Salmon et al., Parallel
+random numbers: as easy as 1, 2, 3, SC'11). No state is kept between draws. Therefore a replication
+gives the same mission alone and in any study, two policies meet common random numbers in the same
+replication, and a draw that is not needed need not be made.
 
     words = block(np.uint64(seed), replication, ARRIVAL, 0, slot, node // 4)
     count = poisson(words[node % 4], 0.02)
 
-One Philox block is four 32-bit words. The seed is the key; the counter words are ``index``,
-``slot``, ``stream`` with its substream, and ``replication``.
+One Philox block is four 32-bit words. The seed is the key. The four counter words are ``index``,
+``slot``, ``stream`` together with its substream, and ``replication``.
 """
 
 import math
@@ -18,7 +19,7 @@ import numpy as np
 
 from dess.code.kernels import kernel
 
-# Streams: the purpose of a draw. They are disjoint parts of the counter space.
+# The stream is the purpose of a draw. Different streams never share a counter value.
 PARAMETERS = 0  # the sampled parameters of a mission's scenario
 START = 1  # start cells
 INITIAL_DATA = 2  # initial data per node
@@ -42,7 +43,7 @@ _WEYL_1 = np.uint64(0xBB67AE85)
 
 @kernel
 def philox(c0, c1, c2, c3, k0, k1):
-    """Philox 4x32-10: four random 32-bit words of a counter and a key.
+    """Philox 4x32-10: compute four random 32-bit words from a counter and a key.
 
     Args:
         c0, c1, c2, c3: Counter words, ``uint64`` below 2**32.
@@ -65,15 +66,15 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 @kernel
 def block(seed, replication, stream, substream, slot, index):
-    """Four random 32-bit words of the coordinates of a draw.
+    """Compute the four random 32-bit words of one block of draws.
 
     Args:
         seed: Seed of the study, ``uint64``.
         replication: Number of the replication, below 2**32.
         stream: Purpose of the draw, one of this module's stream constants.
-        substream: Second coordinate inside the stream (UAV and group of sub-slots), below 2**24.
+        substream: Part of the stream (UAV and group of communication slots), below 2**24.
         slot: Mission slot, below 2**32.
-        index: Running number (node, or group of four nodes), below 2**32.
+        index: Index of a node, or of a group of four nodes, below 2**32.
 
     Returns:
         Four ``uint64`` below 2**32.
@@ -91,12 +92,15 @@ def block(seed, replication, stream, substream, slot, index):
 
 @kernel
 def blocks(seed, replication, stream, substream, slot, indices, words, count):
-    """The blocks of many indices at once; the loop becomes vector code for multiples of eight.
+    """Compute the blocks of many indices at once.
+
+    The compiler makes vector code of the loop if ``count`` is a multiple of eight.
 
     Args:
         seed, replication, stream, substream, slot: As for ``block``.
-        indices: (R,) running numbers.
-        words: (4, R) their words, overwritten.
+        indices: (R,) indices.
+        words: (4, R) the words of each index, overwritten.
+        count: How many of the indices to compute, from the first on.
     """
     key = np.uint64(seed)
     low, high = key & _MASK, key >> _SHIFT
@@ -112,20 +116,23 @@ def blocks(seed, replication, stream, substream, slot, indices, words, count):
 
 @kernel
 def uniform(word):
-    """A number in the open interval (0, 1) of a 32-bit word."""
+    """A uniform number in the open interval (0, 1), computed from a 32-bit word."""
     return (np.float64(word) + 0.5) * 2.0**-32
 
 
 @kernel
 def integer(word, low, high):
-    """An integer in ``low..high``, ends included, of a 32-bit word (bias: (high - low) / 2**32)."""
+    """A uniform integer in ``low..high``, both included, computed from a 32-bit word.
+
+    The probabilities differ by at most 2**-32.
+    """
     span = np.uint64(high - low + 1)
     return low + np.int64((np.uint64(word) * span) >> _SHIFT)
 
 
 @kernel
 def poisson(word, rate):
-    """A Poisson deviate of a 32-bit word, by inversion.
+    """A Poisson deviate, computed from a 32-bit word by inversion.
 
     Args:
         word: 32-bit word.
@@ -147,7 +154,10 @@ def poisson(word, rate):
 
 @kernel
 def central_normal(q):
-    """The normal deviate of a probability ``0.5 + q``, ``abs(q) <= CENTRAL``; no branches."""
+    """The standard normal quantile of probability ``0.5 + q`` for ``abs(q) <= CENTRAL``.
+
+    The function has no branches, so that the compiler can vectorise it.
+    """
     r = 0.180625 - q * q
     numerator = (
         ((((((2.5090809287301226727e3 * r + 3.3430575583588128105e4) * r
@@ -166,7 +176,10 @@ def central_normal(q):
 
 @kernel
 def normal_or_bound(word):
-    """The normal deviate of a word if it is central, else an upper bound of it; no branches."""
+    """The normal deviate of a word if it is central, otherwise an upper bound of it.
+
+    The function has no branches, so that the compiler can vectorise it.
+    """
     q = uniform(word) - 0.5
     bound = MAX_NORMAL
     bound = 3.72 if q < 0.4999 else bound
@@ -178,17 +191,18 @@ def normal_or_bound(word):
 
 @kernel
 def is_central(word):
-    """Whether the deviate of a word is central: ``normal_or_bound`` is exact."""
+    """Whether the deviate of a word is central, so that ``normal_or_bound`` is exact."""
     return abs(uniform(word) - 0.5) <= CENTRAL
 
 
 @kernel
 def normal(word):
-    """A standard normal deviate of a 32-bit word, by inversion.
+    """A standard normal deviate, computed from a 32-bit word by inversion.
 
-    Wichura's algorithm AS 241 (PPND16), relative error about 1e-16; its third branch, for tails
-    below 1e-11, is left out: no 32-bit word reaches there. The result rises with the
-    word and is bounded: ``abs(normal(word)) <= MAX_NORMAL``.
+    The algorithm is AS 241, PPND16 (M. J. Wichura, Applied Statistics 1988), with a relative error
+    of about 1e-16. Its third branch, for tail probabilities below 1e-11, is left out because no
+    32-bit word leads there. The result increases with the word and is bounded:
+    ``abs(normal(word)) <= MAX_NORMAL``.
     """
     q = uniform(word) - 0.5
     if abs(q) <= CENTRAL:

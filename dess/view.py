@@ -1,4 +1,4 @@
-"""The policies' view of the state, and how their actions enter it.
+"""What policies see of the state, and how their actions are written into it.
 
 view = View(state, world, mission, uav)   # one row per UAV that must act
 view.own["battery"], view.residual, view.legal
@@ -19,11 +19,12 @@ from dess.state import HOVER, STEP_X, STEP_Y, State
 class View:
     """What a policy may use to decide: one row per UAV that must act, over any number of missions.
 
-    Policies read it and never write to it. R rows, K nodes, I UAVs in the largest mission.
+    Policies must not write to it. In the shapes below, R is the number of rows, K the number of
+    nodes and I the number of UAVs in the largest mission.
 
     Attributes:
         state: The arrays of the batch that the rows belong to.
-        world: nodes and the tables of the channel.
+        world: The nodes and the tables of the channel.
         mission: (R,) index of each row's mission in ``state``.
         uav: (R,) index of each row's UAV in its mission.
     """
@@ -46,7 +47,10 @@ class View:
 
     @cached_property
     def team(self) -> np.ndarray:
-        """(R, I) ``UAV`` records of each row's team, itself included; absent ones inactive."""
+        """(R, I) ``UAV`` records of each row's team, the row's own UAV included.
+
+        A mission with fewer than I UAVs has inactive records in the other columns.
+        """
         return self.state.uavs[self.mission]
 
     @cached_property
@@ -56,7 +60,7 @@ class View:
 
     @cached_property
     def legal(self) -> np.ndarray:
-        """(R, 5) mask of the legal actions: those that stay on the grid, and Hover."""
+        """(R, 5) mask of the legal actions: Hover, and the moves that stay on the grid."""
         return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)
 
 
@@ -76,18 +80,18 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
 
 
 @kernel
-def acting_rows(missions, uavs, parties, party):
-    """(R,) mission and (R,) UAV index of the UAVs that must act: active and not charging.
+def acting_rows(missions, uavs, policies, number):
+    """The (R,) missions and (R,) UAV indices of the UAVs for which one policy must act.
 
-    Only the UAVs of policy number ``party`` in a team of ``parties`` policies: UAV i has policy
-    ``i % parties``.
+    These UAVs are active and not charging. In a team of ``policies`` policies, UAV i follows policy
+    number ``i % policies``; the function selects the UAVs that follow policy ``number``.
     """
     rows_mission = np.empty(uavs.size, np.int64)
     rows_uav = np.empty(uavs.size, np.int64)
     count = 0
     for b in range(len(missions)):
         if missions[b].active > 0:
-            for i in range(party, missions[b].uavs, parties):
+            for i in range(number, missions[b].uavs, policies):
                 if uavs[b, i].active and not uavs[b, i].charging:
                     rows_mission[count] = b
                     rows_uav[count] = i
@@ -96,7 +100,7 @@ def acting_rows(missions, uavs, parties, party):
 
 
 def team_of(policy: Any) -> list[Any]:
-    """One policy or a sequence of them as a team.
+    """The team of one policy, or of a list or tuple of policies.
 
     Raises:
         ValueError: If the sequence is empty.
@@ -110,15 +114,15 @@ def team_of(policy: Any) -> list[Any]:
 def decide(team: Sequence[Any], state: State, world: World) -> None:
     """Write the actions that the policies of a team choose into the state.
 
-    UAV i has policy ``team[i % len(team)]``. All policies decide before any action is written, so
-    that none sees the decision of a teammate in the same slot.
+    UAV i follows policy ``team[i % len(team)]``. All policies decide before any action is written,
+    so that no policy sees what a teammate decided in the same slot.
 
     Raises:
         ValueError: If a policy does not return one action per row.
     """
     decisions = []
-    for party, policy in enumerate(team):
-        mission, uav = acting_rows(state.missions, state.uavs, len(team), party)
+    for number, policy in enumerate(team):
+        mission, uav = acting_rows(state.missions, state.uavs, len(team), number)
         if len(mission):
             actions = np.asarray(policy.act(View(state, world, mission, uav)))
             if actions.shape != mission.shape or actions.dtype.kind not in "iu":

@@ -1,4 +1,4 @@
-"""Policies: heuristics, the return guard, the learned policy, and those of other packages.
+"""Policies: heuristics, the return guard, the learned policy, and policies of other packages.
 
 policy = policies.load("greedy")      # by name, or the folder of a trained policy
 team = policies.load_team("ddqn,tour")

@@ -18,7 +18,7 @@ __all__ = ["Policy", "View"]
 
 @runtime_checkable
 class Policy(Protocol):
-    """Chooses actions for a batch of UAVs at once and keeps no state between calls.
+    """A policy chooses actions for many UAVs at once, and keeps no state between calls.
 
     Attributes:
         name: The name under which results are stored.

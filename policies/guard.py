@@ -1,11 +1,11 @@
-"""The return guard: which actions keep the charger reachable in time, teammates included.
+"""The return guard: which actions let a UAV still reach the charging zone in time.
 
     mask = guard(view)                                   # (R, 5), at least one action per row
     actions = np.where(mask, values, -np.inf).argmax(1)
 
-A UAV that cannot fill its quota on its present battery must be able to reach a free zone cell of
-its own, with a margin of some slots for teammates in its way. ``docs/concepts/return-guard.md``
-describes the rules; below are compiled functions on one mission's arrays.
+A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
+charging zone, with a margin of some slots for detours around teammates. ``docs/concepts/return-guard.md``
+describes the rules. The functions below are compiled and work on the arrays of one mission.
 """
 
 import numpy as np
@@ -15,25 +15,30 @@ from dess.rules import in_zone, on_grid, zone_cell, zone_number
 from dess.state import STEP_X, STEP_Y
 from dess.view import View
 
-# Margin on the way home per active teammate, since each may cost a detour [slots].
+# Margin [slots] on the way to the zone per active teammate, since each may cause a detour.
 MARGIN_PER_TEAMMATE = 2
-# Margin for the quota when little data is left and communication slots may be lost [slots].
+# Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
 
 
 @inlined
 def slots_needed(mission, u):
-    """Flying slots until the quota of UAV ``u`` is filled if it communicates in all of them."""
+    """Flying slots until the quota of UAV ``u`` is filled, if it collects data in all of them."""
     m = mission.communication_slots
     return (mission.quota - u.communications + m - 1) // m
 
 
 @inlined
 def must_charge(mission, u, data):
-    """Whether UAV ``u`` cannot fill its quota on its battery; ``data`` is all residual data.
+    """Whether UAV ``u`` cannot fill its quota with its battery and must charge first.
 
-    With little data left, communication slots may find no node to serve, so a margin is added.
+    If little data is left, a communication slot may find no node to serve, so a margin is added.
     Where flying costs no battery, no UAV must charge.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        data: Residual data of all nodes together [data units].
     """
     needed = slots_needed(mission, u)
     # A UAV collects some 0.2 data units in a slot near an average node.
@@ -44,13 +49,13 @@ def must_charge(mission, u, data):
 
 @inlined
 def is_parked(mission, u):
-    """Whether an active UAV in the zone charges or is about to: an obstacle for the others."""
+    """Whether an active UAV in the zone charges or is about to charge, and blocks its cell."""
     return u.active and u.latch and in_zone(mission, u.x, u.y)
 
 
 @inlined
 def path_length(mission, uavs, i, x, y, to_x, to_y):
-    """Slots of UAV ``i`` from cell to cell, with the detour around a parked teammate between."""
+    """Slots that UAV ``i`` needs from a cell to another, with a detour around a parked teammate."""
     length = abs(x - to_x) + abs(y - to_y)
     if x == to_x or y == to_y:
         for j in range(mission.uavs):
@@ -64,10 +69,10 @@ def path_length(mission, uavs, i, x, y, to_x, to_y):
 
 @kernel
 def parking_cell(mission, uavs, i, taken):
-    """The zone cell where UAV ``i`` will charge: the nearest that no teammate has or chooses.
+    """The zone cell where UAV ``i`` will charge: the nearest one that no teammate takes.
 
-    Teammates in the zone keep their cells. The others choose one after another, the lowest battery
-    first (ties in index order), so that no two UAVs head for the same cell.
+    Teammates in the zone keep their cells. The other UAVs choose one after another, the lowest
+    battery first (ties in index order), so that no two UAVs fly to the same cell.
 
     Args:
         mission: ``MISSION`` record.
@@ -76,7 +81,7 @@ def parking_cell(mission, uavs, i, taken):
         taken: (zone cells,) working memory.
 
     Returns:
-        x, y and the slots to get to it; the UAV's own cell if all are taken.
+        The x and y of the cell and the slots to reach it; the UAV's own cell if all are taken.
     """
     u = uavs[i]
     taken[: mission.zone_width * mission.zone_height] = False
@@ -110,7 +115,7 @@ def parking_cell(mission, uavs, i, taken):
 
 @inlined
 def _nearest_free(mission, uavs, i, taken):
-    """The nearest zone cell that is not taken, and the slots to it (-1 without any)."""
+    """The nearest zone cell that is not taken (-1 if none), and the slots to reach it."""
     u = uavs[i]
     best_x, best_y, best = -1, -1, -1
     for cell in range(mission.zone_width * mission.zone_height):
@@ -125,17 +130,18 @@ def _nearest_free(mission, uavs, i, taken):
 
 @inlined
 def margin(mission):
-    """Margin on the way home for teammates that may be in the way [slots]."""
+    """The margin [slots] on the way to the zone for detours around teammates."""
     return MARGIN_PER_TEAMMATE * (mission.active - 1)
 
 
 @inlined
 def contest(mission, uavs, i, x, y):
-    """How a cell is contested by teammates of UAV ``i`` in the next slot.
+    """Whether teammates of UAV ``i`` may occupy a cell in the next slot.
 
     Returns:
-        0 free; 1 a teammate that gives way is on it; 2 a teammate with the right of way (less
-        battery, ties: lower index) may come or stay there; 3 a parked teammate is on it.
+        0 if the cell is free; 1 if a teammate that gives way is on it; 2 if a teammate with the
+        right of way (less battery; on a tie, lower index) may come or stay there; 3 if a parked
+        teammate is on it.
     """
     u = uavs[i]
     level = 0
@@ -156,13 +162,13 @@ def contest(mission, uavs, i, x, y):
 
 @kernel
 def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
-    """Find the actions that keep the charger of UAV ``i`` reachable in time.
+    """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
-    If there is none, the actions that lead nearest to the charger are safe, except into cells that
-    a teammate with the right of way may take; the margin may be used to let it pass. Cells off the
-    grid and cells of parked teammates are never safe. A UAV that has just been overruled avoids
-    contested cells too: two UAVs that both insist would block each other until the battery of one
-    is depleted.
+    If there is no such action, the actions that lead nearest to the parking cell are safe, except
+    moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
+    to let this teammate pass. Moves off the grid and into the cell of a parked teammate are never
+    safe. A UAV that has just been overruled also avoids cells that a teammate may occupy:
+    otherwise two UAVs could block each other until the battery of one of them is depleted.
 
     Args:
         mission: ``MISSION`` record.
@@ -173,7 +179,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
-    late = np.zeros(5, np.int64)  # slots by which the charger is reached too late
+    late = np.zeros(5, np.int64)  # slots by which the parking cell is reached too late
     contested = np.empty(5, np.int64)
     least = 1_000_000
     for action in range(5):
@@ -213,9 +219,9 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav):
 
 
 def guard(view: View) -> np.ndarray:
-    """(R, 5) mask of the actions after which the charger is still reached in time.
+    """The (R, 5) mask of the actions after which the charging zone is still reached in time.
 
-    Every row has at least one action. Any policy can restrict its choice to the mask.
+    Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
     state = view.state
     return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav)

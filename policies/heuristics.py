@@ -1,8 +1,8 @@
 """Heuristic policies under the return guard: random, nearest, greedy and tour.
 
-Each policy chooses a goal (``_goal``). ``_step``, the same for all, takes the safe action
-that brings the UAV nearer to the goal and avoids teammates. Compiled functions of one mission's
-arrays.
+Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
+(``_step``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
+functions are compiled and work on the arrays of one mission.
 """
 
 from functools import lru_cache
@@ -25,24 +25,24 @@ from policies.guard import (
 
 _RANDOM, _NEAREST, _GREEDY, _TOUR = range(4)
 
-# A node is worth a visit with at least this share of the mean initial data; otherwise single new
-# packets would send the UAVs back and forth.
+# A node is worth a visit if it has at least this share of the mean initial data. Without such a
+# threshold, UAVs would fly to and fro for single new data units.
 _WORTH = 0.25
 # Weight of a node to which a teammate is nearer (greedy), and slots added to every distance.
 _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
-# Cost, in slots, of a step into a cell by how it is contested (policies.guard.contest).
+# Cost [slots] of a step into a cell, by the result of policies.guard.contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 
 class _Heuristic:
-    """A policy given by a compiled function."""
+    """A policy whose rule for the goal is part of a compiled function."""
 
     name: str
     _kind: int
 
     def act(self, view: View) -> np.ndarray:
-        """(R,) actions for the rows of the view."""
+        """Choose the (R,) actions for the rows of the view."""
         state = view.state
         circuit = _circuit(view.world.nodes.tobytes()) if self._kind == _TOUR else _NO_CIRCUIT
         return _decide(
@@ -58,28 +58,31 @@ class _Heuristic:
 
 
 class Random(_Heuristic):
-    """A random safe action, from the policy's own stream."""
+    """Choose a safe action at random, from a random stream that only policies use."""
 
     name = "random"
     _kind = _RANDOM
 
 
 class Nearest(_Heuristic):
-    """The nearest node that is worth a visit."""
+    """Fly to the nearest node that is worth a visit."""
 
     name = "nearest"
     _kind = _NEAREST
 
 
 class Greedy(_Heuristic):
-    """The node with the most residual data per slot of distance, less if a teammate is nearer."""
+    """Fly to the node with the most residual data per slot of distance.
+
+    A node counts less if a teammate is nearer to it.
+    """
 
     name = "greedy"
     _kind = _GREEDY
 
 
 class Tour(_Heuristic):
-    """A fixed circuit through the nodes, split into equal stretches, one per UAV."""
+    """Follow a fixed circuit through the nodes, split into equal parts, one for each UAV."""
 
     name = "tour"
     _kind = _TOUR
@@ -146,7 +149,7 @@ def _step(mission, team, i, safe, goal_x, goal_y):
 
 @inlined
 def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
-    """The goal of UAV ``i``: the best node in reach, -1 if there is none."""
+    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
     reach = u.battery - 1 - margin(mission) if charge else slots_needed(mission, u)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
@@ -186,7 +189,7 @@ def _teammate_is_nearer(mission, team, i, x, y, slots):
 
 @inlined
 def _circuit_position(mission, i, position):
-    """Position on the circuit, counted from the begin of the stretch of UAV ``i``."""
+    """The position on the circuit, counted from the beginning of the part of UAV ``i``."""
     begin = i * mission.nodes // mission.uavs
     return (position - begin) % mission.nodes
 
@@ -196,7 +199,7 @@ _NO_CIRCUIT = np.zeros(0, np.int64)
 
 @lru_cache(maxsize=64)
 def _circuit(nodes: bytes) -> np.ndarray:
-    """(K,) position of each node on a short round trip: nearest neighbour, then 2-opt."""
+    """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     return _round_trip(np.abs(cells[:, None] - cells[None]).sum(2))
 

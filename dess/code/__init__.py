@@ -1,1 +1,1 @@
-"""Code: kernels that numba compiles, and hashes of the sources that results depend on."""
+"""Compiling functions with numba, and hashing the source code that results depend on."""

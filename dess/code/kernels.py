@@ -1,9 +1,10 @@
-"""How functions are compiled: one decorator, and a disk cache that knows when it is stale.
+"""Compile functions with numba, and keep them in a cache on disk that is valid for this code.
 
-Numba keeps a compiled function as long as the file that defines it stays the same. Our functions
-inline one another across files, so a cached engine would outlive a change of the rules. Here a
-cached function is valid while the code of its module, and of all that this imports, is unchanged
-(``dess.code.sources``): comments and line numbers make no difference.
+Numba's own cache keeps a compiled function as long as the file that defines it is unchanged. The
+functions of this project are inlined into functions of other files, so a cached batch engine would
+still be used after a change of ``rules.py``. Here a cached function is valid as long as the code of
+its module, and of all modules that this module imports, is unchanged (``dess.code.sources``).
+Changes of comments and line numbers do not count.
 """
 
 import inspect
@@ -21,16 +22,16 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 
 def kernel(function: Callable, **options: Any) -> Any:
-    """Compile a function with numba, without Python and its lock, cached on disk.
+    """Compile a function with numba to code that does not hold Python's global lock.
 
-    Where its module has no source, or no folder for the cache can be written, it is compiled anew
-    in every process.
+    The compiled function is cached on disk. If its module has no source file, or no folder for the
+    cache can be written, it is compiled again in every process.
     """
     options = _OPTIONS | options
     stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:
         compiled = njit(cache=bool(stamp), **options)(function)
-    except RuntimeError:  # numba: no locator available
+    except RuntimeError:  # numba has found no folder for its cache ("no locator available")
         return njit(**options)(function)
     if stamp:
         compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
@@ -38,10 +39,12 @@ def kernel(function: Callable, **options: Any) -> Any:
 
 
 def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
-    """The disk cache of a function for one state of the code; one of another state is emptied.
+    """The disk cache of a function for the present code; a cache made by other code is emptied.
 
-    Numba names its files after the line of the function, which a comment above it moves. It also
-    reads an old index before it looks at its stamp, and fails where a type has moved since.
+    Numba puts the line number of the function into the name of the cache file, which changes with
+    every comment above the function, so the number is removed here. Numba also reads an old index
+    before it compares the stamps, and that fails if a type has moved to another module; so an index
+    with another stamp is deleted first.
     """
     name = cache._impl.filename_base.replace(f"-{cache._impl._lineno}.", ".")
     file = IndexDataCacheFile(cache.cache_path, name, stamp)
@@ -52,16 +55,16 @@ def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
 
 
 def inlined(function: Callable) -> Any:
-    """A ``kernel`` whose code goes into its compiled callers.
+    """Compile a function like ``kernel``, and inline its code into the compiled callers.
 
-    A call between kernels costs reference counts of the arrays that it hands over: for the small
-    functions of a mission slot more than their work.
+    A call between kernels updates the reference counts of the arrays that it passes. For the small
+    functions of a mission slot, this would take longer than the functions themselves.
     """
     return kernel(function, forceinline=True)
 
 
 @lru_cache
 def _code_behind(module: str, path: str) -> str:
-    """A hash of the code that the functions of a module may call; empty if it has no source."""
+    """A hash of the code that the functions of a module may call; empty without a source file."""
     code = code_of(Path(path).stem if module == "__main__" else module)
     return combined(code) if code else ""

@@ -1,9 +1,10 @@
-"""What the behaviour of a module depends on: hashes of the code of all that it imports.
+"""Hash the code that the behaviour of a module depends on: the module and all that it imports.
 
-Results and compiled functions are kept on disk, and are valid as long as the code behind them is
-unchanged. A hash is taken of the syntax tree of a module, so its statements count, and comments,
-docstrings, layout and line numbers do not. Imports are read from the source, those inside functions
-included; nothing is executed. A module that is loaded by name (``import_module``) does not count.
+Results and compiled functions are kept on disk, and are valid as long as the code that made them is
+unchanged. The hash of a module is taken of its syntax tree. So every statement counts, whereas
+comments, docstrings, layout and line numbers do not. Imports, also those inside functions, are read
+from the source; no module is executed. A module that is loaded by its name (``import_module``) is
+not found this way and does not count.
 
     >>> sorted(code_of("dess.streams"))
     ['dess.code.kernels', 'dess.code.sources', 'dess.streams']
@@ -17,7 +18,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# Imports of other distributions are not followed: their versions tell what they are.
+# Imports of other distributions are not followed: their versions identify their code.
 OURS = {"dess", "policies"}
 
 
@@ -26,7 +27,8 @@ class Source(NamedTuple):
 
     Attributes:
         code: A hash of its syntax tree.
-        imports: The names of all modules that it may import; those of their members among them.
+        imports: The names of all modules that it may import. Names of functions and classes are
+            among them, since the source alone does not tell these from modules.
     """
 
     code: str
@@ -36,9 +38,10 @@ class Source(NamedTuple):
 def code_of(*modules: str) -> dict[str, str]:
     """Hashes of the code of modules and of all that they import, by the name of the module.
 
-    Imports are followed within the packages of ``OURS`` and the modules' own; from a module outside
-    of packages to those beside it. A package counts where something is imported from its
-    ``__init__.py`` itself. Empty if the modules have no source.
+    Imports are followed inside the packages of ``OURS`` and inside the packages of the modules
+    themselves; from a module outside of any package, to the modules in the same folder. A package
+    counts only where something is imported from its ``__init__.py`` itself. The result is empty if
+    the modules have no source file.
     """
     packages = OURS | {module.partition(".")[0] for module in modules}
     folders = {path.parent for path in map(_path_of, modules) if path}
@@ -55,7 +58,7 @@ def code_of(*modules: str) -> dict[str, str]:
 
 
 def combined(hashes: Mapping[str, str]) -> str:
-    """One hash of several."""
+    """Combine several hashes into one."""
     return sha256(repr(sorted(hashes.items())).encode()).hexdigest()
 
 
@@ -69,7 +72,7 @@ def read(path: Path, module: str) -> Source:
 
 
 def _imports(tree: ast.Module, package: str) -> Iterator[str]:
-    """The modules that a source may import: of ``from a import b`` both ``a.b`` and ``a``."""
+    """The modules that a source may import; for ``from a import b``, both ``a.b`` and ``a``."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -84,10 +87,10 @@ def _imports(tree: ast.Module, package: str) -> Iterator[str]:
 
 
 def _outline(node: Any) -> Any:
-    """A syntax tree as lists, without positions, docstrings and what is empty.
+    """A syntax tree as nested lists, without positions, docstrings, contexts and empty fields.
 
-    What is empty differs between the versions of Python. Whether a name is read or written (its
-    context) follows from its place in the tree.
+    Empty fields are left out because they differ between versions of Python. The context of a name
+    (whether it is read or written) is left out because it follows from its place in the tree.
     """
     if isinstance(node, list):
         return [_outline(item) for item in node]
@@ -111,7 +114,7 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def _path_of(module: str) -> Path | None:
-    """The source of a module, if it has one; its packages are not imported."""
+    """The source file of a module, or None without one; its packages are not imported."""
     top, *below = module.split(".")
     try:
         spec = find_spec(top)

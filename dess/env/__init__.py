@@ -1,4 +1,4 @@
-"""Environments for reinforcement learning, over the rules that both engines use.
+"""Environments for reinforcement learning, with the same rules of the model as both engines.
 
     env = dess.parallel_env(dess.load_scenario("paper"))   # PettingZoo: one mission
     observations, infos = env.reset(seed=1)
@@ -6,10 +6,11 @@
 
     envs = dess.batch_env(dess.load_scenario("paper"), num_envs=256)   # Gymnasium: many missions
 
-Both count replications: mission r of seed s is that of ``dess.simulate``, and the same actions give
-the same record, bit for bit.
+Both environments number their missions: replication r of seed s is the mission that
+``dess.simulate`` runs with this seed and replication, and the same actions give the same record,
+bit for bit.
 
 An observation is the vector of ``dess.env.observation`` with a mask of the legal actions; an action
 is 0 north, 1 east, 2 south, 3 west, 4 hover. The safety controller overrules a move off the grid.
-A charging UAV hovers, whatever its action, without a penalty.
+A charging UAV hovers whatever action it is given, and receives no penalty for that.
 """

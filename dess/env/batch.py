@@ -1,4 +1,4 @@
-"""``batch_env``: many missions in lockstep, after Gymnasium's vector environments.
+"""``batch_env``: many missions in lockstep, with the interface of Gymnasium's vector environments.
 
 env = batch_env(load_scenario("paper"), num_envs=256, seed=1)
 observations, info = env.reset()
@@ -24,8 +24,8 @@ def batch_env(scenario: Scenario | ScenarioSpace, num_envs: int, seed: int = 0) 
 
     Args:
         scenario: The scenario, or the space from which each mission draws its parameters.
-        num_envs: Missions in progress (N).
-        seed: Seed of the missions until ``reset`` is given another.
+        num_envs: Number of missions in progress (N).
+        seed: Seed of the missions, until ``reset`` is called with another seed.
 
     Raises:
         InputError: If the seed or the number of missions is not allowed.
@@ -34,26 +34,28 @@ def batch_env(scenario: Scenario | ScenarioSpace, num_envs: int, seed: int = 0) 
 
 
 class BatchEnv:
-    """N missions in lockstep, after the conventions of Gymnasium's vector environments.
+    """N missions in lockstep, with the conventions of Gymnasium's vector environments.
 
-    Arrays are (N, I, ...): mission, then UAV; I is the largest fleet of the scenario. In a mission
-    with fewer UAVs the others are absent, and a UAV that has ended stays inactive until its mission
-    ends: ``info["active"]`` (N, I) tells which UAVs act next. Other actions are ignored.
+    Arrays have the shape (N, I, ...), first the mission, then the UAV; I is the largest fleet of
+    the scenario. In a mission with fewer UAVs the last columns are unused. A UAV that has ended
+    stays inactive until its mission ends. ``info["active"]`` (N, I) tells which UAVs act next; the
+    actions of all others are ignored.
 
-    An environment is reset in the same step (``metadata["autoreset_mode"]``): when the last UAV of
-    its mission ends, it starts the next mission and returns that mission's first observation.
-    ``info`` then has ``final_obs``, the last observations of the missions that ended, in the rows
-    of their environments; ``_final_obs`` (N,), which environments these are; and
-    ``final_records``, their records in the order of the environments.
+    An environment is reset within a step (``metadata["autoreset_mode"]``): when the last UAV of its
+    mission ends, the environment starts the next mission and returns the first observation of that
+    mission. ``info`` then has ``final_obs``, the last observations of the missions that ended, in
+    the rows of their environments; ``_final_obs`` (N,), which tells these environments; and
+    ``final_records``, the records of these missions in the order of their environments.
 
-    Missions are numbered as they start: replications 0 to N - 1 at the first reset, then one after
-    the other, lower environments first. So a seed gives the sequence of missions 0, 1, 2, ...
-    whatever N is, and a mission depends on its number and the actions of its UAVs alone.
+    Missions are numbered in the order in which they start: replications 0 to N - 1 at the first
+    reset, then one after the other, in a lower environment first. So a seed gives the sequence of
+    missions 0, 1, 2, ... for every N, and a mission depends only on its number and on the actions
+    of its UAVs.
 
     Attributes:
-        num_envs: Missions in progress (N).
-        state: The arrays of the missions in progress, to be read only.
-        world: nodes and the tables of the channel.
+        num_envs: Number of missions in progress (N).
+        state: The arrays of the missions in progress; they must not be changed.
+        world: The nodes and the tables of the channel.
         single_observation_space: The space of one UAV's observation.
         single_action_space: The space of one UAV's action.
         action_space: The space of all actions (N, I).
@@ -76,7 +78,7 @@ class BatchEnv:
         """Start a new mission in every environment.
 
         Args:
-            seed: Start again at replication 0 of this seed; without it, the numbering continues.
+            seed: Start at replication 0 of this seed. If None, the numbering continues.
 
         Returns:
             Observations, and info with ``active`` (N, I) and ``replication`` (N,).
@@ -98,18 +100,19 @@ class BatchEnv:
             actions: (N, I) integers 0..4.
 
         Returns:
-            Observations; rewards, terminated and truncated (N, I), the last two true in the step
-            in which the UAV ends; and info. Info has the other arrays of ``stepper.Outcome`` (the
-            rows with ``acted`` are transitions), ``active`` (N, I) and ``replication`` (N,) of the
-            missions now in progress, and ``final_obs``, ``_final_obs`` and ``final_records`` of
-            those that ended.
+            Observations, rewards, terminated, truncated and info. Rewards, terminated and truncated
+            are (N, I); terminated or truncated is true only in the step in which the UAV ends. Info
+            has the other arrays of ``stepper.Outcome`` (where ``acted`` is true, the step is a
+            transition of that UAV), ``active`` (N, I) and ``replication`` (N,) of the missions now
+            in progress, and ``final_obs``, ``_final_obs`` and ``final_records`` of the missions
+            that ended.
 
         Raises:
             InputError: If ``reset`` was not called first, or the actions are not allowed.
         """
         missions = self.state.missions
         if not missions["active"].all():
-            raise InputError("step: no missions are under way; call reset() first")
+            raise InputError("step: no mission is in progress; call reset() first")
         info = self._stepper.step(checked_actions(actions, self.state.uavs.shape))._asdict()
         rewards, terminated, truncated = map(info.pop, ("reward", "terminated", "truncated"))
         over = missions["active"] == 0
@@ -122,13 +125,13 @@ class BatchEnv:
         return observations, rewards, terminated, truncated, info | self._present()
 
     def view(self) -> View:
-        """The view for policies: a row per UAV that must act."""
+        """The view that a policy's ``act`` takes, with a row per UAV that must act."""
         return View(
             self.state, self.world, *acting_rows(self.state.missions, self.state.uavs, 1, 0)
         )
 
     def close(self) -> None:
-        """Do nothing: no resources are held."""
+        """Do nothing, because the environment holds no resources."""
 
     def _observe(self, environments: np.ndarray) -> Observation:
         return observe(self.state, environments, self._components)

@@ -10,8 +10,8 @@ from dess.view import legal_actions
 
 Observation = dict[str, np.ndarray]
 
-# The UAV's own state, the scenario's parameters and the clock; the residual data of the nodes
-# comes next, then the team mates in the order of their numbers.
+# The UAV's own state, the scenario's parameters and the time. The residual data of the nodes
+# follow, then the teammates in the order of their indices.
 _OWN = (
     "active",
     "x",
@@ -27,15 +27,16 @@ _OWN = (
     "charge_complete",
     "slot",
 )
-_MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 once it has ended
+_MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 after the teammate has ended
 
 
 def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
-    Positions and distances are divided by the grid's last index; battery, C_S and C_C by 100;
-    communications by the quota; the slot by ``max_slots``; residual data by the high end of
-    ``initial_data``. A UAV that has ended keeps its last state; an absent one has zeros.
+    Positions and distances are divided by the largest cell index of the grid, battery, C_S and C_C
+    by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
+    end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has fewer
+    UAVs than the largest fleet, the other rows are zeros.
     """
     space = spaces_of([scenario])[0]
     nodes = [f"residual_{k}" for k in range(len(space.nodes))]
@@ -63,7 +64,7 @@ def observation_space(scenario: Scenario | ScenarioSpace) -> spaces.Dict:
 
 
 def observe(state: State, environments: np.ndarray, components: int) -> dict[str, np.ndarray]:
-    """The observations of some missions of a state, in rows of the same number.
+    """The observations of some missions of a state; each mission keeps its row number.
 
     Args:
         state: The state of N missions with up to I UAVs.
@@ -133,11 +134,11 @@ def _observe_uav(mission, uavs, i, residual, out):
 
 @kernel
 def _quota_share(mission, u):
-    """Communications as a share of the quota, at most 1: the last slot may exceed the quota."""
+    """Communications as a share of the quota, at most 1; the last slot may exceed the quota."""
     return min(u.communications / mission.quota, 1.0)
 
 
 @kernel
 def _nearest(value, first, count):
-    """The nearest of ``count`` cells from ``first`` on."""
+    """The coordinate nearest to ``value`` among the ``count`` coordinates from ``first`` on."""
     return min(max(value, first), first + count - 1)

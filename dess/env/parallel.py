@@ -35,7 +35,7 @@ def parallel_env(
 
     Args:
         scenario: The scenario, or the space from which each episode draws its parameters.
-        seed: Seed of the episodes until ``reset`` is given another.
+        seed: Seed of the episodes, until ``reset`` is called with another seed.
         render_mode: None or ``"rgb_array"``.
 
     Raises:
@@ -45,15 +45,16 @@ def parallel_env(
 
 
 class HarvestEnv(ParallelEnv[str, Observation, int]):
-    """One mission as a PettingZoo ``ParallelEnv``; each UAV is an agent, ``uav_0`` the first.
+    """One mission as a PettingZoo ``ParallelEnv``; each UAV is an agent, from ``uav_0`` on.
 
     ``reset(seed=s)`` starts replication 0 of seed s and each further ``reset()`` the next
     replication, so a seed gives a reproducible sequence of episodes. ``options={"replication": r}``
     starts replication r.
 
-    A UAV that ends has ``terminated`` (quota or battery) or ``truncated`` (``max_slots``) in that
-    step and is removed from ``agents``. ``possible_agents`` is the largest fleet of the scenario;
-    ``reset`` sets ``agents`` to the fleet of the episode.
+    In the step in which a UAV ends, its ``terminated`` is true (quota filled or battery depleted)
+    or its ``truncated`` is true (``max_slots`` reached), and the UAV is removed from ``agents``.
+    ``possible_agents`` is the largest fleet of the scenario; ``reset`` sets ``agents`` to the fleet
+    of the episode.
 
     ``info`` holds, per agent: ``reward_terms`` (their sum is the reward), ``collected`` and
     ``team_collected`` (data units of the slot), ``end`` (``active``, ``quota``, ``battery`` or
@@ -94,7 +95,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         """Start the next episode.
 
         Args:
-            seed: Start again at replication 0 of this seed.
+            seed: Start at replication 0 of this seed. If None, the numbering continues.
             options: ``{"replication": r}`` starts replication r; other keys are ignored.
 
         Raises:
@@ -108,7 +109,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         return self._observations(), {agent: {} for agent in self.agents}
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
-        """One mission slot.
+        """Run one mission slot.
 
         Args:
             actions: An action 0..4 for each of ``agents``.
@@ -117,11 +118,11 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
             Observations, rewards, terminated, truncated and info of the agents that acted.
 
         Raises:
-            InputError: If no episode is under way, or the actions are not those of ``agents``.
+            InputError: If no episode is in progress, or the actions are not those of ``agents``.
         """
         acting = self.agents
         if not acting:
-            raise InputError("step: no episode is under way; call reset() first")
+            raise InputError("step: no episode is in progress; call reset() first")
         if set(actions) != set(acting):
             raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {acting}")
         index = {agent: self.possible_agents.index(agent) for agent in acting}
@@ -137,11 +138,11 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         return observations, rewards, terminated, truncated, infos
 
     def state(self) -> np.ndarray:
-        """The observations of all possible agents one after the other, for a central critic."""
+        """The concatenated observations of all possible agents, for a centralised critic."""
         return self._observe()["observation"].ravel()
 
     def record(self) -> MissionRecord:
-        """The record of the episode, finished or not."""
+        """The record of the episode up to the present slot."""
         records = self._stepper.records(self._stepper.indices)
         return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
 

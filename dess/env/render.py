@@ -16,15 +16,17 @@ _FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180,
 
 
 def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray:
-    """Draw the zone, the nodes (dark: full of data) and the active UAVs (black frame: charging).
+    """Draw the zone, the nodes and the active UAVs of one mission.
+
+    A node is darker the more data it has. A UAV that charges has a black frame.
 
     Args:
         space: The scenario of the mission.
-        state: The state that holds it.
-        environment: Its index there.
+        state: The state that contains the mission.
+        environment: The index of the mission in the state.
 
     Returns:
-        (16 M, 16 M, 3) of uint8, north on top.
+        An image of shape (16 M, 16 M, 3) and type uint8 with north on top; M is the grid.
     """
     uavs, residual = state.uavs[environment], state.residual[environment]
     image = np.full((space.grid * _CELL, space.grid * _CELL, 3), _SEA, np.uint8)
@@ -43,6 +45,6 @@ def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray
 
 
 def _square(image: np.ndarray, x: int, y: int, margin: int, colour: Any) -> None:
-    """Paint a cell but for a margin [pixels]."""
+    """Paint a cell, except for a margin [pixels] at its edges."""
     top, left, size = y * _CELL + margin, x * _CELL + margin, _CELL + 1 - 2 * margin
     image[top : top + size, left : left + size] = colour

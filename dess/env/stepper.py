@@ -1,4 +1,4 @@
-"""Missions that advance slot by slot with actions given from outside, one per environment.
+"""Missions that advance slot by slot with actions that the caller gives; one per environment.
 
 stepper = MissionStepper(space, num_envs=4, seed=1)
 stepper.launch(stepper.indices)    # replications 0 to 3
@@ -30,18 +30,19 @@ REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted")
 
 
 class Outcome(NamedTuple):
-    """The outcome of one mission slot, per mission (N,) and per UAV (N, I).
+    """The outcome of one mission slot, for each mission (N,) or each UAV (N, I).
 
     Attributes:
         acted: (N, I) whether the UAV was active in the slot.
-        reward: (N, I) of the slot; 0 for an inactive UAV.
-        reward_terms: (N, I, 6) its terms, in the order of ``REWARD_TERMS``.
+        reward: (N, I) the reward of the slot; 0 for an inactive UAV.
+        reward_terms: (N, I, 6) the terms of the reward, in the order of ``REWARD_TERMS``.
         end: (N, I) how the UAV's mission ended, an index of ``state.END_NAMES``.
-        terminated: (N, I) whether the UAV ended in this slot, by its quota or its battery.
-        truncated: (N, I) whether the UAV ended in this slot, by ``max_slots``.
+        terminated: (N, I) whether the UAV ended in this slot because its quota was filled or its
+            battery depleted.
+        truncated: (N, I) whether the UAV ended in this slot because of ``max_slots``.
         overruled: (N, I) whether the safety controller overruled the UAV.
         collected: (N, I) data that the UAV collected in the slot [data units].
-        team_collected: (N,) data that its team collected.
+        team_collected: (N,) data that all UAVs of the mission collected in the slot [data units].
     """
 
     acted: np.ndarray
@@ -61,7 +62,7 @@ class MissionStepper:
     Attributes:
         space: The space from which each mission draws its parameters.
         state: The arrays of the missions.
-        world: nodes and the tables of the channel.
+        world: The nodes and the tables of the channel.
         indices: (N,) the indices 0 to N - 1 of the environments.
     """
 
@@ -100,7 +101,11 @@ class MissionStepper:
         self._next += len(environments)
 
     def step(self, actions: np.ndarray) -> Outcome:
-        """Run one slot of every environment; (N, I) actions 0..4, ignored where no UAV acts."""
+        """Run one slot of every environment.
+
+        Args:
+            actions: (N, I) integers 0..4, ignored where no UAV acts.
+        """
         shape = self.state.uavs.shape
         outcome = Outcome(
             acted=np.empty(shape, np.bool_),
@@ -117,7 +122,7 @@ class MissionStepper:
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:
-        """The records of the missions in these environments, finished or not."""
+        """The records of the missions in these environments, up to the present slot."""
         records = empty_records(len(environments), self.state.uavs.shape[1])
         for row, b in enumerate(environments):
             mission, uavs, residual = (part[b] for part in self.state)
@@ -185,5 +190,7 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
         )
     wrong = array[(array < 0) | (array >= len(ACTION_NAMES))]
     if wrong.size:
-        raise InputError(f"actions: {wrong[0]} is no action; allowed: 0..{len(ACTION_NAMES) - 1}")
+        raise InputError(
+            f"actions: {wrong[0]} is not an action; allowed: 0..{len(ACTION_NAMES) - 1}"
+        )
     return array.astype(np.int64)

@@ -116,7 +116,7 @@ TABLES = {
     # 0.09 degrees are 10,008 m, 12.5 cells: 6.25 to both sides of the middle, at 4.
     "lon,lat\n0,0\n0,0.09\n": r"line 2 is off .* at \[4, 10\]; allowed: grid = 14 or more, or a l",
     "lon,lat\n0,0\n0,80\n": "off the grid .*; allowed: a larger cell_size$",
-    'x,y\n"1,1\n': "is no CSV file",
+    'x,y\n"1,1\n': "is not a CSV file",
 }
 
 
@@ -158,15 +158,15 @@ def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             nodes_in(tmp_path / name, 8, 800.0)
 
     refuse("nowhere.csv", "nowhere.csv: cannot be read: No such file")
-    refuse("buoys.xlsx", "buoys.xlsx: is of no known kind; allowed: .csv, .geojson, .json")
+    refuse("buoys.xlsx", "buoys.xlsx: has no known file ending; allowed: .csv, .geojson, .json")
     (tmp_path / "folder.csv").mkdir()
-    refuse("folder.csv", "folder.csv: cannot be read: it is no regular file")
+    refuse("folder.csv", "folder.csv: cannot be read: it is not a regular file")
     os.mkfifo(tmp_path / "pipe.csv")
-    refuse("pipe.csv", "pipe.csv: cannot be read: it is no regular file")
+    refuse("pipe.csv", "pipe.csv: cannot be read: it is not a regular file")
     (tmp_path / "bytes.csv").write_bytes(b"x,y\n\xff,1\n")
-    refuse("bytes.csv", "bytes.csv: cannot be read: it is no text")
+    refuse("bytes.csv", "bytes.csv: cannot be read: it is not text")
     (tmp_path / "no.json").write_text("{")
-    refuse("no.json", "no.json: is no JSON")
+    refuse("no.json", "no.json: is not JSON")
     _csv(tmp_path, "x,y\n1,1\n")
     monkeypatch.setattr(sea, "MAX_BYTES", 7)
     refuse("buoys.csv", "buoys.csv: is too large; allowed: 7 bytes at most")
