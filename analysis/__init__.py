@@ -1,6 +1,6 @@
-"""Studies: what to run, running it, keeping it, and what the numbers say.
+"""Studies: define them, run them, store their results, and analyse the results.
 
-Names load on first use, so that importing the package costs nothing.
+Names are imported on first use, so that ``import analysis`` is fast.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""How metrics and parameters are called, in code and on pages: the one home of these names."""
+"""The names of metrics and parameters, as code, figures and pages use them."""
 
 import re
 from typing import NamedTuple
@@ -14,7 +14,7 @@ METRICS = {
     RATIO: "Collection ratio",
     PRODUCT: "Collection ratio and communication",
 }
-# The same in a terminal, where space is short.
+# Shorter names for the terminal.
 SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "product"}
 
 # All metrics of a mission: shares of missions, and means over missions.
@@ -25,7 +25,7 @@ LESS_IS_BETTER = (COST,)
 
 
 class Parameter(NamedTuple):
-    """How pages call a parameter of a scenario."""
+    """What figures and pages call a parameter of a scenario."""
 
     name: str
     short: str
@@ -33,17 +33,17 @@ class Parameter(NamedTuple):
 
     @property
     def within(self) -> str:
-        """The name inside a sentence."""
+        """The name as it is written inside a sentence."""
         return self.name[0].lower() + self.name[1:]
 
     @property
     def plain(self) -> str:
-        """The name without the symbol of the model, for where no index can be written."""
+        """The name without the symbol C_S or C_C, for text in which no index can be written."""
         return re.sub(r" C_[SC]$", "", self.name)
 
     @property
     def label(self) -> str:
-        """The name in a figure, with its unit, and indices as TeX has them."""
+        """The name with its unit as a label in a figure, with indices in TeX notation."""
         return _tex(f"{self.name} [{self.unit}]".removesuffix(" []"))
 
     @property
@@ -52,7 +52,7 @@ class Parameter(NamedTuple):
         return _tex(self.short)
 
 
-# The parameters of the paper (its Fig. 5), which every mission has values of.
+# The parameters of the paper's Fig. 5; the record of every mission has their values.
 PARAMETERS = {
     "uavs": Parameter("Number of UAVs", "UAVs"),
     "charge_start": Parameter("Charging start capacity C_S", "C_S", "%"),
@@ -60,7 +60,7 @@ PARAMETERS = {
     "initial_data": Parameter("Initial data per node", "Initial data", "data units"),
     "flying_time": Parameter("Flying time", "Flying time", "mission slots"),
 }
-# Others that studies vary.
+# Other parameters that studies vary.
 _OTHERS = {
     "pads": Parameter("Number of charging pads", "Pads"),
     "zone": Parameter("Start and charging zone", "Zone"),
@@ -70,7 +70,7 @@ _OTHERS = {
 }
 
 
-# The fields that an operator decides on. All others are conditions, which a fleet has to meet.
+# The fields that an operator decides on. All other fields are conditions that a fleet has to meet.
 DECISIONS = (
     *("uavs", "pads", "zone", "forbid_swaps", "altitude"),
     *("flying_time", "charge_start", "charge_complete", "charge_rate"),
@@ -78,17 +78,17 @@ DECISIONS = (
 
 
 def parameter(field: str) -> Parameter:
-    """How a field of a scenario is called; by the name of the field, if it has no other."""
+    """The parameter that belongs to a field of a scenario; without one, named after the field."""
     return (PARAMETERS | _OTHERS).get(field, Parameter(field, field))
 
 
 def metric_name(metric: str) -> str:
-    """What a metric is called on pages."""
+    """The name of a metric on pages."""
     return METRICS.get(metric, metric.replace("_", " ").capitalize())
 
 
 def value_text(value: object) -> str:
-    """A value of a parameter: ``12.5``, ``5–7.5`` of a range, ``yes``; text as it is."""
+    """A value of a parameter as text: ``12.5``, ``yes``, or ``5–7.5`` for a range."""
     if isinstance(value, list | tuple):
         return "–".join(map(value_text, value))
     if isinstance(value, bool | np.bool_):

@@ -1,4 +1,4 @@
-"""How numbers are written, on pages and in the terminal: shares in percent, with a proper minus."""
+"""How numbers are written on pages and in the terminal, such as shares in percent."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -21,7 +21,7 @@ def estimate(row: pd.Series) -> str:
 
 
 def difference(value: float, reference: float) -> str:
-    """By how many percentage points a value is above its reference, as ``+7.4`` or ``−2.1``."""
+    """A value minus a reference value in percentage points, as ``+7.4`` or ``−2.1``."""
     points = round(100 * (value - reference), 1) or 0.0  # no −0.0
     return minus(f"{points:+.1f}") if points else "0.0"
 
@@ -33,7 +33,7 @@ def points(value: float, low: float, high: float) -> str:
 
 
 def decimals(value: float, low: float, high: float, digits: int = 3) -> str:
-    """An estimate and its interval as ``1.0123 [0.9868, 1.0378]``, with that many decimals."""
+    """An estimate and its interval as ``1.0123 [0.9868, 1.0378]``, with ``digits`` decimals."""
     middle, *ends = [minus(f"{number:.{digits}f}") for number in (value, low, high)]
     return f"{middle} [{ends[0]}, {ends[1]}]"
 
@@ -50,13 +50,13 @@ def quantities(mean: float, low: float, high: float) -> str:
 
 
 def minus(number: str) -> str:
-    """A number with a proper minus, and none on zero."""
+    """A number with a typographic minus sign (U+2212), and without a sign if it is zero."""
     is_zero = not float(number.replace(",", ""))
     return number.replace("-", "") if is_zero else number.replace("-", "−")
 
 
 def margin(share: float) -> str:
-    """A difference of shares in words, as ``1 point`` or ``0.5 points``."""
+    """A difference between shares in words, as ``1 point`` or ``0.5 points``."""
     return f"{100 * share:g} point{'' if share == 0.01 else 's'}"
 
 
@@ -83,7 +83,7 @@ def amounts(mean: float, low: float, high: float) -> str:
 
 
 def seconds(time: float) -> str:
-    """A time [s] with three digits at most, as ``2.35 µs`` or ``1.1 ms``."""
+    """A time [s] with at most three digits, as ``2.35 µs`` or ``1.1 ms``."""
     units = (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9))
     unit, size = next((pair for pair in units if time >= pair[1]), units[-1])
     return f"{float(f'{time / size:.3g}'):g} {unit}"
@@ -97,18 +97,18 @@ def duration(time: float) -> str:
 
 
 def span(values: Iterable[float], form: str = "{:,}") -> str:
-    """The least and the largest of some numbers: ``300``, or ``20 to 1,200``."""
+    """The smallest and the largest of some numbers, as ``20 to 1,200``, or ``300`` if equal."""
     ordered = sorted(values)
     return " to ".join(dict.fromkeys(map(form.format, (ordered[0], ordered[-1]))))
 
 
 def words(names: Sequence[str]) -> str:
-    """``a, b and c``."""
+    """A list of names as ``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def headed(lines: Iterable[Mapping[tuple[str, str], str]]) -> pd.DataFrame:
-    """A table of text under two rows of heads: a line maps (upper, lower head) to its text."""
+    """A table of text with two header rows: each line maps (upper, lower header) to its text."""
     rows = [*lines]
     return pd.DataFrame(rows, columns=pd.MultiIndex.from_tuples(rows[0] if rows else [("", "")]))
 
@@ -119,13 +119,15 @@ def wide(
     columns: str | list[str] = "metric",
     write: Callable[[float, float, float], str] = interval,
 ) -> pd.DataFrame:
-    """A long table of estimates as a wide one of text, rows and columns in order of appearance.
+    """Turn a long table of estimates into a wide table of text.
+
+    Rows and columns are in the order in which they appear in the long table.
 
     Args:
-        table: A row per estimate: ``mean``, ``low``, ``high``, and the columns named below.
-        index: Columns that name a row.
-        columns: Columns that name a column.
-        write: What is written of an estimate and its interval.
+        table: One row per estimate, with ``mean``, ``low``, ``high`` and the columns named below.
+        index: Columns whose values name a row of the result.
+        columns: Columns whose values name a column of the result.
+        write: Writes a mean and the ends of its interval as text.
     """
     text = [write(*ends) for ends in table[["mean", "low", "high"]].to_numpy(float)]
     rows = [index] if isinstance(index, str) else [*index]

@@ -1,1 +1,1 @@
-"""What a study is: its design, its rules for the number of missions, the shipped ones."""
+"""Studies as data: designs, rules for the number of missions, and the shipped studies."""

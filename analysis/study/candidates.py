@@ -1,8 +1,9 @@
-"""The questions that a search of the cheapest setting answers, and their candidates.
+"""The questions that the search for the cheapest setting answers, and their candidates.
 
-The design points are grouped by their conditions: the fields that no operator decides on. There is
-a question for every condition, and, if there are several, one for all of them. A candidate has a
-design point for each condition of its question.
+A condition is a combination of values of the fields that no operator decides on, such as the
+arrival rate. There is one question for every condition: which setting is the cheapest under it. If
+there are several conditions, there is one more question, about all of them together. A candidate is
+a setting; it has one design point for each condition of its question.
 """
 
 import json
@@ -16,21 +17,23 @@ import numpy as np
 from analysis.names import DECISIONS
 from analysis.study.feasibility import Verdict
 
-# (s, g) design points of candidates, (s,) whether they are feasible -> the feasible candidate of
-# the least mean cost, and (s,) by how much it may cost more than each candidate: 0 for itself.
+# A function that estimates costs. It takes the (s, g) design points of s candidates, and for each
+# (s,) whether it is feasible. It returns the feasible candidate with the lowest mean cost, and (s,)
+# an upper bound of how much more it costs than each candidate (0 for itself).
 Costing = Callable[[np.ndarray, np.ndarray], tuple[int, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest setting under a condition, or under all of them.
+    """The cheapest setting under one condition, or under all conditions together.
 
     Attributes:
-        condition: The fields of the condition with their values; None: of all conditions.
-        points: Design points of the selected setting, one, or one for each condition; none, if no
-            setting is known to meet the requirements.
-        left: The points of the settings that may be as good.
-        settled: Whether that is promised: it is not if the missions or the budget ended before.
+        condition: The fields of the condition with their values; None for all conditions together.
+        points: The design points of the selected setting, one for each condition of the question.
+            Empty if no setting is known to meet the requirements.
+        left: The design points of all settings that may be as good.
+        settled: Whether the answer has the guaranteed confidence. It has not if the budget ended
+            before the question was settled.
     """
 
     condition: dict[str, Any] | None
@@ -40,11 +43,7 @@ class Answer:
 
 
 class Question:
-    """The cheapest of some candidates.
-
-    Attributes:
-        answer: As far as it is known.
-    """
+    """The question which of some candidates is the cheapest."""
 
     def __init__(self, condition: dict[str, Any] | None, candidates: Sequence[Sequence[int]]):
         self._condition = condition
@@ -54,28 +53,28 @@ class Question:
 
     @property
     def pairs(self) -> int:
-        """How many ordered pairs of candidates there are."""
+        """The number of ordered pairs of candidates."""
         return len(self.candidates) * (len(self.candidates) - 1)
 
     @property
     def needed(self) -> set[int]:
-        """The points that need missions to settle it."""
+        """The design points that need more missions to settle the question."""
         return set() if self.settled else set(self.candidates.ravel().tolist())
 
     @property
     def answer(self) -> Answer:
-        """What is known."""
+        """The answer as far as it is known."""
         left = [tuple(points) for points in self.candidates.tolist()]
         best = () if self._best is None else left[self._best]
         return Answer(self._condition, best, tuple(left), self.settled)
 
     def look(self, verdicts: Sequence[Verdict], costs: Costing, indifference: float) -> None:
-        """Rule out what is infeasible or dearer, and see whether the question is settled.
+        """Rule out candidates that are infeasible or more expensive; check if the rest is settled.
 
         Args:
-            verdicts: Whether each design point meets the requirements, as far as is known.
-            costs: Estimates the costs of candidates.
-            indifference: The least saving that matters.
+            verdicts: For each design point, whether it meets the requirements, as far as known.
+            costs: The function that estimates the costs of candidates.
+            indifference: The smallest saving that matters, in the currency.
         """
         of_points = np.array(verdicts)[self.candidates]
         possible = ~(of_points == "missed").any(axis=1)
@@ -91,7 +90,7 @@ class Question:
 
 
 def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
-    """A question for each condition, and one for all of them, if there are several."""
+    """A question for each condition and, if there are several, one for all of them together."""
     conditions = grouped(values, decisions=False)
     questions = [
         Question(json.loads(text), [[point] for point in points])
@@ -105,14 +104,16 @@ def questions_about(values: Sequence[Mapping[str, Any]]) -> list[Question]:
 
 
 def grouped(values: Iterable[Mapping[str, Any]], decisions: bool) -> dict[str, list[int]]:
-    """Design points that are alike in what operators decide on, or in all other fields.
+    """Group design points that share either their decisions or their conditions.
 
     Args:
-        values: The fields that the design sets, by design point.
-        decisions: Whether the points of a group share the decisions, or the conditions.
+        values: For each design point, the fields that the design sets.
+        decisions: True to group by the fields that an operator decides on, False to group by all
+            other fields.
 
     Returns:
-        The shared fields as JSON text -> numbers of the points, in the order of the design.
+        A mapping from the shared fields, as JSON text, to the numbers of the design points in the
+        order of the design.
     """
     groups = defaultdict(list)
     for number, fields in enumerate(values):

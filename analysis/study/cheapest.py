@@ -1,33 +1,37 @@
 """Select the cheapest setting that meets requirements, such as 99 % success.
 
-The design points are grouped by their conditions: the fields that no operator decides on, such as
-the arrival rate. There is a question for every condition, and, if there are several, one for all of
-them: the cheapest setting that meets the requirements everywhere, at the mean cost of the
-conditions. Every setting is a candidate of a question, with a design point for each condition.
+The design points are grouped by their conditions: the values of the fields that no operator decides
+on, such as the arrival rate. For every condition the procedure asks which setting is the cheapest.
+If there are several conditions, it also asks which setting meets the requirements under all of them
+at the lowest mean cost. Every setting is a candidate of a question, with one design point for each
+condition of the question.
 
-Missions come in rounds that grow by half. After each,
- 1. the requirements of every point are tested as of ``feasibility``: a candidate is feasible once
-    all requirements of its points are met, infeasible once one is missed;
- 2. the feasible candidate i of the least mean cost, the leader of its question, is compared with
-    every other candidate l on common replications. It costs at most
+Missions are simulated in rounds; the number of missions grows by half from round to round. After
+each round,
+ 1. the requirements of every design point are tested (see ``feasibility``). A candidate is feasible
+    as soon as all requirements of its points are met, and infeasible as soon as one is missed;
+ 2. the leader i of a question, which is the feasible candidate with the lowest mean cost, is
+    compared with every other candidate l on common replications. It costs at most
         D_il + t(n - 1, 1 - e) sqrt(S2_il / n) + L_i ln(1 / e) / n,    e = alpha / (2 P j (j + 1))
-    more, after n missions and j looks: D_il is the mean and S2_il the variance of the differences,
-    t Student's quantile, P the number of ordered pairs over all questions, and L_i the price of all
-    UAVs of i, as one mission may lose them: losses may be so rare that a sample has none. If that
-    is below 0, l is dearer, and out;
- 3. a question is settled if no candidate is left, or the leader costs at most the indifference more
-    than any that is left, decided or not.
-A design point gets missions as long as a question needs it, so what is clearly too expensive is not
-decided to the end.
+    more than l, after n missions and j such comparisons. D_il is the mean and S2_il the variance of
+    the differences, t is Student's quantile, P the number of ordered pairs over all questions, and
+    L_i the cost of losing all UAVs of i (``Setting.loss``). The last term covers losses of UAVs so
+    rare that the sample has none. If the bound is below 0, l is more expensive than i and is ruled
+    out;
+ 3. a question is settled if no other candidate is left, or if the leader costs at most the
+    indifference more than any candidate that is left, whether that candidate is feasible or not.
+A design point gets more missions only as long as a question needs it. So a setting that is clearly
+too expensive gets few missions, and whether it is feasible may stay open.
 
-All statements hold jointly with the confidence 1 - alpha: half of alpha is for the requirements,
-split evenly over points and requirements, half for the bounds of costs, whose shares for the looks
-add up to one (Bonferroni). The tests of requirements promise that for any distribution. The
-bounds of costs take the mean difference, rare losses aside, for normal, as is usual.
+All statements hold jointly with the confidence 1 - alpha (Bonferroni). Half of alpha is for the
+requirements, split evenly over points and requirements. The other half is for the bounds of costs,
+divided among the successive comparisons. The tests of the requirements keep this confidence for any
+distribution. The bounds of costs assume that the mean difference, apart from rare losses, is
+normally distributed, as is usual.
 
-The two phases and the zone of tolerance are those of S. Andradottir, S.-H. Kim, Fully sequential
-procedures for comparing constrained systems via simulation, Nav. Res. Logist. 57 (2010) 403-421,
-whose tests assume normal values and fail where missions seldom fail.
+The two phases and the zone of tolerance follow S. Andradottir, S.-H. Kim, Fully sequential
+procedures for comparing constrained systems via simulation, Nav. Res. Logist. 57 (2010) 403-421.
+The tests of that article assume normal values and are unreliable where missions seldom fail.
 """
 
 from collections.abc import Mapping, Sequence
@@ -54,7 +58,7 @@ class Setting(NamedTuple):
 
     Attributes:
         values: The fields that the design sets.
-        loss: The price of all its UAVs if one mission loses them, over all missions.
+        loss: The cost over all missions if every mission lost all UAVs, in the currency.
     """
 
     values: Mapping[str, Any]
@@ -68,17 +72,17 @@ class Setting(NamedTuple):
 
 @dataclass(frozen=True)
 class CheapestChoice:
-    """What the search of the cheapest setting came to.
+    """The result of the search for the cheapest setting.
 
     Attributes:
-        answers: One for every condition, in the order of the design, and one for all of them, if
-            there are several.
-        verdicts: Whether each design point meets the requirements: ``met``, ``missed`` or ``open``.
-        counts: Missions per design point that the selection rests on.
-        missions: All missions.
-        rounds: Rounds of simulation.
-        done: Whether the procedure has all missions that it wants.
-        guarantee: What can be said of the selection, in plain words.
+        answers: One answer for every condition, in the order of the design and, if there are
+            several conditions, one for all of them together.
+        verdicts: For each design point, ``met``, ``missed`` or ``open``.
+        counts: Number of missions per design point that the selection is based on.
+        missions: Number of all missions.
+        rounds: Number of rounds of simulation.
+        done: Whether the procedure needs no more missions.
+        guarantee: What is guaranteed about the selection, in words.
     """
 
     answers: tuple[Answer, ...]
@@ -96,10 +100,10 @@ class CheapestChoice:
 
 
 class Cheapest(StrictTable):
-    """The rule that missions are spent to find the cheapest setting that meets requirements.
+    """The rule that missions are added until the cheapest setting that meets requirements is found.
 
-    What is wanted is a function of the values in the order of their replications, found by playing
-    all rounds again, so the counts are the same however a run was interrupted.
+    How many missions are needed is computed by repeating all rounds on the values, in the order of
+    their replications. So the result is the same, whether or not a run was interrupted.
 
     Raises:
         pydantic.ValidationError: If a field is not valid.
@@ -130,22 +134,23 @@ class Cheapest(StrictTable):
             if not self.tolerance < least < 1 - self.tolerance:
                 raise ValueError(
                     f"requirements.{metric}: {least:g} is out of range; allowed: between "
-                    f"{self.tolerance:g} and {1 - self.tolerance:g}, the tolerance off 0 and 1"
+                    f"{self.tolerance:g} and {1 - self.tolerance:g}, which keeps the tolerance "
+                    "away from 0 and 1"
                 )
         return self
 
     def wanted(
         self, samples: Sequence[Mapping[str, np.ndarray]], settings: Sequence[Setting]
     ) -> list[int]:
-        """How many missions every design point is to have.
+        """The number of missions that every design point needs.
 
         Args:
-            samples: Per design point: metric -> (n,) values of replications 0..n-1; ``cost`` is
-                one of the metrics.
+            samples: For each design point a mapping from the metrics, ``cost`` among them, to their
+                (n,) values in replications 0..n-1.
             settings: The design points.
 
         Returns:
-            The numbers, none below the missions given; equal to them if no more are needed.
+            For each design point at least the n missions given; exactly n if no more are needed.
         """
         counts = _Search(self, samples, settings).counts
         return [max(len(s["cost"]), int(n)) for s, n in zip(samples, counts, strict=True)]
@@ -153,14 +158,14 @@ class Cheapest(StrictTable):
     def choice(
         self, samples: Sequence[Mapping[str, np.ndarray]], settings: Sequence[Setting]
     ) -> CheapestChoice:
-        """The selected settings, and what can be said of them.
+        """The selected settings, and what is guaranteed about them.
 
         Args:
-            samples: As of ``wanted``.
+            samples: As for ``wanted``.
             settings: The design points.
 
         Raises:
-            ValueError: If there is no point, or one has not the missions of round one.
+            ValueError: If there is no design point, or one has fewer than ``first`` missions.
         """
         if not samples or min(len(sample["cost"]) for sample in samples) < self.first:
             raise ValueError(f"choice: needs points, with {self.first} or more missions each")
@@ -178,7 +183,7 @@ class Cheapest(StrictTable):
 
     def _guarantee(self, search: "_Search") -> str:
         if not search.done:
-            return "none yet: the procedure wants more missions"
+            return "none yet: the procedure needs more missions"
         low, high = (
             _in_words(self.requirements, shift) for shift in (-self.tolerance, self.tolerance)
         )
@@ -193,7 +198,7 @@ class Cheapest(StrictTable):
         return f"{words}; the budget of {self.budget} missions ended before all was decided"
 
 
-# What a study may select by.
+# The kinds of selection that a study may use.
 AnySelection = Annotated[
     Selection | Cheapest,
     Field(discriminator="procedure"),
@@ -202,14 +207,14 @@ AnySelection = Annotated[
 
 
 class _Search:
-    """The procedure, played as far as the values reach.
+    """The procedure, carried out as far as the simulated missions allow.
 
     Attributes:
-        counts: (k,) missions wanted so far.
-        verdicts: Whether every point meets the requirements.
+        counts: (k,) missions that each point needs so far.
+        verdicts: For each point, whether it meets the requirements.
         questions: All questions.
-        rounds: Rounds played.
-        done: No more missions are wanted: all questions are settled, or the budget has ended.
+        rounds: Number of rounds carried out.
+        done: Whether no more missions are needed: all questions are settled or the budget is spent.
     """
 
     def __init__(
@@ -230,13 +235,13 @@ class _Search:
             for _ in samples
         ]
         self._pairs = max(sum(question.pairs for question in self.questions), 1)
-        self._seen = 0  # missions of the points that are needed
+        self._seen = 0  # missions taken into account, at each point that a question still needs
         self._play()
 
     def _leader(
         self, error: float, candidates: np.ndarray, feasible: np.ndarray
     ) -> tuple[int, np.ndarray]:
-        """The feasible candidate of the least mean cost, and what it may cost more than others."""
+        """The feasible candidate with the lowest mean cost, and how much more it may cost."""
         n = self._seen
         costs = np.array(
             [
@@ -272,7 +277,7 @@ class _Search:
             self.rounds += 1
 
     def _test(self, points: Sequence[int], stage: int) -> None:
-        """Test the requirements of points by their missions up to a stage."""
+        """Test the requirements of points on their first ``stage`` missions."""
         for point in points:
             if self.verdicts[point] != "open":
                 continue
@@ -283,7 +288,7 @@ class _Search:
 
 
 def _verdict(tests: Sequence[MeanTest]) -> Verdict:
-    """Whether all requirements are met, or one is missed."""
+    """The verdict on all requirements together: missed if one is missed, met if all are met."""
     verdicts = {test.verdict for test in tests}
     if "missed" in verdicts:
         return "missed"
@@ -291,7 +296,7 @@ def _verdict(tests: Sequence[MeanTest]) -> Verdict:
 
 
 def _in_words(requirements: Mapping[Share, float], shift: float) -> str:
-    """``a mean success of at least 0.985``."""
+    """The requirements in words, such as ``a mean success of at least 0.985``."""
     means = [
         f"{metric.replace('_', ' ')} of at least {least + shift:g}"
         for metric, least in requirements.items()

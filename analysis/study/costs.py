@@ -1,10 +1,11 @@
-"""Costs: what a fleet costs over the missions that it is to fly, by the prices of a study.
+"""Costs: what a fleet costs over all its planned missions, by the prices of a study.
 
     costs = Costs(uav=20_000, pad=3_000, hour=120, slot_seconds=60, missions=500)
 
-A study's table ``[costs]`` holds the prices. The cost of a mission is the total cost of its setting
-if all missions were like this one: the purchase, and what the mission consumes, times the missions
-that the fleet is to fly. So the mean over missions estimates the total cost that is to be expected.
+A study's table ``[costs]`` holds the prices. The cost of a simulated mission is the total cost of
+the fleet if all its planned missions were like this one: the purchase, plus what this mission
+consumes times the number of planned missions. So the mean over simulated missions estimates the
+expected total cost.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,8 +23,8 @@ PARTS = ("purchase", "charging", "hours", "losses")
 class Costs(StrictTable):
     """Prices in one currency.
 
-    UAVs and pads are bought once. Charges, hours and lost UAVs are paid for in each of the
-    ``missions`` that the fleet is to fly.
+    UAVs and pads are bought once. Charging, hours and lost UAVs are paid for in each of the
+    ``missions`` planned for the fleet.
 
     Raises:
         pydantic.ValidationError: If a price is below 0, or hours are without ``slot_seconds``.
@@ -53,12 +54,12 @@ class Costs(StrictTable):
 
         Args:
             spaces: The scenario of every design point.
-            missions: Columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
-            uavs: Columns of the UAVs of these missions, in their order: ``slots_charging``, and
-                ``end`` by its name.
+            missions: (n,) columns of the missions: ``point`` and the fields of ``MISSION_RECORD``.
+            uavs: Columns of the UAVs of these missions, in the same order: ``slots_charging``, and
+                the name of ``end``.
 
         Returns:
-            Each of ``PARTS`` -> (n,) amounts.
+            The (n,) amounts of each of ``PARTS``.
         """
         fleet, points = np.asarray(missions["uavs"]), np.asarray(missions["point"])
         mission = np.repeat(np.arange(len(fleet)), fleet)

@@ -1,8 +1,8 @@
-"""Designs: which points of the parameter space a study visits.
+"""Experimental designs: the points of the parameter space that a study simulates.
 
-A design is a table ``[design]`` of a study's TOML file, of one of five kinds: ``grid``,
-``one-at-a-time``, ``table``, ``latin-hypercube``, ``saltelli``. It is data: its points are a pure
-function of its fields, in their written order.
+A design is the table ``[design]`` of a study's TOML file. There are five kinds: ``grid``,
+``one-at-a-time``, ``table``, ``latin-hypercube`` and ``saltelli``. The design points are a pure
+function of the fields of the design, in the order in which these are written.
 """
 
 import sys
@@ -20,12 +20,12 @@ from dess import InputError
 from dess.scenario import Integer, Scenario
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
-# The factor of a Saltelli design that is no field of the scenario: which replication is run.
+# The factor of a Saltelli design that is not a field of the scenario: the replication.
 NOISE = "replication (noise)"
 
 MAX_SIZE = 2**20
 
-# Fields that take integers only. What is no field of a scenario is refused when it is loaded.
+# Fields whose values are integers. A name that is not a field is refused when the study is loaded.
 INTEGERS = {
     name
     for name, field in Scenario.model_fields.items()
@@ -42,7 +42,7 @@ class DesignPoint:
 
 
 def as_tuples(value: Any) -> Any:
-    """Lists, as TOML gives them, to tuples, at any depth."""
+    """Convert the lists that TOML gives to tuples, nested lists included."""
     if isinstance(value, dict):
         return {key: as_tuples(item) for key, item in value.items()}
     return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
@@ -71,7 +71,7 @@ def _is_range(field: str, ends: Any) -> bool:
     return (
         isinstance(ends, tuple)
         and len(ends) == 2
-        # Neither true nor nan nor inf is the end of a range.
+        # Booleans, nan and inf cannot be the ends of a range.
         and all(type(end) in kinds and abs(end) <= sys.float_info.max for end in ends)
         and ends[0] <= ends[1]
     )
@@ -124,7 +124,7 @@ class Grid(_Design):
         return prod(map(len, self.values.values()))
 
     def point(self, number: int) -> DesignPoint:
-        """A design point by its number, made alone: there may be too many to make all."""
+        """A design point by its number; the others, which may be very many, are not made."""
         chosen = {}
         for field, values in reversed(self.values.items()):
             number, place = divmod(number, len(values))
@@ -138,9 +138,9 @@ class Grid(_Design):
 
 
 class OneAtATime(_Design):
-    """Each point fixes one field; all others stay as the scenario has them, ranges included.
+    """Each point fixes one field; the other fields keep the values or ranges of the scenario.
 
-    So a point averages over the other parameters, as in the paper's Fig. 5.
+    So the mean at a point averages over the other sampled parameters, as in the paper's Fig. 5.
     """
 
     kind: Literal["one-at-a-time"] = "one-at-a-time"
@@ -157,7 +157,7 @@ class OneAtATime(_Design):
 
 
 class Table(_Design):
-    """The points that are listed."""
+    """The points that the study lists one by one."""
 
     kind: Literal["table"] = "table"
     rows: Rows = Field(min_length=1, description="tables of field -> value, one per point")
@@ -180,21 +180,21 @@ class _Sampled(_Design):
     seed: Integer = Field(0, ge=0, le=MAX_SEED, description="of the sample, not of the missions")
 
     def _point(self, unit: Iterable[float], replication: int = 0) -> DesignPoint:
-        """The point at a place in the unit cube."""
+        """The design point that belongs to a point of the unit cube."""
         places = zip(self.ranges.items(), unit, strict=True)
         values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
         return DesignPoint(values, replication)
 
 
 class LatinHypercube(_Sampled):
-    """A Latin hypercube: cut into ``size`` equal strata, each field has one point in each."""
+    """A Latin hypercube: of ``size`` equal parts of each field's range, each contains one point."""
 
     kind: Literal["latin-hypercube"] = "latin-hypercube"
     size: Integer = Field(ge=1, le=MAX_SIZE, description="number of points")
 
     @property
     def count(self) -> int:
-        """The size."""
+        """The field ``size``."""
         return self.size
 
     def _points(self) -> Iterator[DesignPoint]:
@@ -205,13 +205,17 @@ class LatinHypercube(_Sampled):
 
 
 class Saltelli(_Sampled):
-    """The design of a global sensitivity analysis (Saltelli et al. 2010), noise included.
+    """The design of a global sensitivity analysis, in which the randomness is one of the factors.
 
-    A mission is a deterministic function of its parameters and its replication, so the noise is an
-    input like any other: one more factor, uniform over ``replications``. Each point is one mission.
-    Points come in ``base`` blocks of D + 2 for D factors (the fields and the replication): a point
-    of the sample A; D that differ from it in one factor each, taken from B; the point of B.
-    ``analysis.questions.sensitivity.sensitivity`` makes Sobol indices of the missions.
+    A mission is a deterministic function of its parameters and its replication. So the replication
+    is one more factor, uniform over ``replications``, and stands for the noise. Each design point
+    is one mission. With D factors (the fields and the replication), the points come in ``base``
+    blocks of D + 2: a point of the sample A, then D points that differ from it in one factor each,
+    whose value is taken from the sample B, then the point of B.
+    ``analysis.questions.sensitivity.sensitivity`` computes Sobol indices from the missions.
+
+    Source: A. Saltelli et al., Variance based sensitivity analysis of model output, Comput. Phys.
+    Commun. 181 (2010) 259-270.
     """
 
     kind: Literal["saltelli"] = "saltelli"
@@ -232,7 +236,7 @@ class Saltelli(_Sampled):
 
     @property
     def problem(self) -> dict[str, Any]:
-        """The factors on the unit cube, as SALib wants them; the noise is the last."""
+        """The factors on the unit cube in the form that SALib takes; the noise is the last."""
         names = [*self.ranges, NOISE]
         return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
@@ -245,7 +249,7 @@ class Saltelli(_Sampled):
 
 
 def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
-    """A place in [0, 1] as a value of a range."""
+    """Map a number of [0, 1] to a value of a range."""
     low, high = ends
     if is_integer:
         return min(high, low + int(u * (high - low + 1)))

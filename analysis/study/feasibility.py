@@ -4,18 +4,20 @@
     test.observe(successes)  # in any number of blocks
     test.verdict, test.missions
 
-A mean of ``required`` + ``tolerance`` or more is taken for missed with probability ``error`` at
-most, and so is a mean of ``required`` - ``tolerance`` or less for met; in the zone between, either
-verdict is right. That holds for any distribution on [0, 1], however rare its failures, for any
-number of missions, and whenever one looks. Nothing is asymptotic.
+If the mean is ``required`` + ``tolerance`` or more, the verdict is ``missed`` with probability
+``error`` at most; if it is ``required`` - ``tolerance`` or less, the verdict is ``met`` with
+probability ``error`` at most. Between these two values, either verdict is acceptable. This holds
+for any distribution on [0, 1], however rare failures are, and for any number of missions, even if
+the verdict is looked at after every mission. It is not an asymptotic statement.
 
-Two tests by betting run side by side. Against "the mean is at most m" one bets on every value x at
-odds that are fair if the mean is m: a share b of the wealth becomes b (1 + l (x - m)), 0 < l < 1/m.
-While the mean is m or less, the wealth is a nonnegative supermartingale, so by Ville's inequality
-the chance that it ever grows to 1 / ``error`` times its start is ``error`` at most; then the claim
-is rejected. The wealth is spread over stakes l that halve from 1/m on: one of them is near the best
-for any distribution, and the whole is worth a share of what the best one makes. Against "the mean
-is at least m" the same test takes 1 - x and 1 - m.
+Two tests by betting run in parallel. To test the hypothesis "the mean is at most m", one bets on
+every value x at odds that would be fair if the mean were m: a wealth b becomes b (1 + l (x - m)),
+where the stake l satisfies 0 < l < 1/m. If the mean is at most m, the wealth is a nonnegative
+supermartingale, so by Ville's inequality the probability that it ever grows to 1 / ``error`` times
+its initial value is ``error`` at most. As soon as it does, the hypothesis is rejected. The wealth
+is divided among several stakes l, the largest near 1/m and each half the one before, since the
+best stake is not known in advance. To test "the mean is at least m", the same test is applied to
+1 - x and 1 - m.
 
 Source: I. Waudby-Smith, A. Ramdas, Estimating means of bounded random variables by betting, JRSS-B
 86 (2024) 1-27.
@@ -27,16 +29,16 @@ import numpy as np
 
 Verdict = Literal["met", "missed", "open"]
 
-# The largest stake as a share of the one that a single value can ruin.
+# The largest stake, as a share of the stake with which a single value could lose everything.
 _BOLDEST = 0.999
 
 
 class MeanTest:
-    """Whether a mean meets a requirement; the verdict is the first one that the values force.
+    """A sequential test of whether a mean meets a requirement; the first verdict is final.
 
     Attributes:
         verdict: ``met``, ``missed``, or ``open``.
-        missions: Values observed up to the verdict, or all of them.
+        missions: Number of values observed up to the verdict; all values if it is ``open``.
     """
 
     def __init__(self, required: float, tolerance: float, error: float):
@@ -58,16 +60,16 @@ class MeanTest:
 
 
 class _Wealth:
-    """The wealth of one who bets that a mean is above a bound."""
+    """The wealth of a gambler who bets that a mean is above a bound."""
 
     def __init__(self, bound: float, tolerance: float):
-        # The best stake is 4 * tolerance or more: the lead of the mean over its variance.
+        # The best stake is about (mean - bound) / variance, which is 4 * tolerance or more.
         steps = max(int(np.ceil(np.log2(1 / (4 * tolerance * bound)))), 0)
         self._bound, self._stakes = bound, _BOLDEST / bound * 0.5 ** np.arange(steps + 1)
         self._logs = np.full(steps + 1, -np.log(steps + 1))
 
     def after(self, values: np.ndarray) -> np.ndarray:
-        """(n,) logarithms of the wealth after each of further values, for a start of 1."""
+        """The (n,) logarithms of the wealth after each of n more values; the first wealth is 1."""
         growth = np.log1p(self._stakes[:, None] * (values - self._bound))
         paths = np.cumsum(np.column_stack([self._logs, growth]), axis=1)[:, 1:]
         self._logs = paths[:, -1]
@@ -75,5 +77,5 @@ class _Wealth:
 
 
 def _first(holds: np.ndarray) -> int:
-    """The first place where something holds, or the number of places."""
+    """The index of the first true value, or the number of values if none is true."""
     return int(np.argmax(holds)) if holds.any() else len(holds)

@@ -1,26 +1,29 @@
-"""Select the best of many design points, with more missions for those that are hard to rule out.
+"""Ranking and selection: find the best of many design points, at the points where it is undecided.
 
-Procedures for the largest mean of a metric over k points; ties go to the lowest number.
+Two procedures find the largest mean of a metric over k points; on a tie, the point with the lowest
+number is selected.
 
-``kn``, the fully sequential procedure of Kim and Nelson, finds the best with a promised probability
-if it is better than every other by the indifference or more. Let delta be the indifference,
-1 - alpha the confidence, n0 = ``first``, c = 1, X_i(r) the mean of the first r missions of point i,
-and S2_il the sample variance of the differences between the first n0 missions of i and l:
+``kn`` is the fully sequential procedure of Kim and Nelson. It finds the best point with a
+guaranteed probability if that point is better than every other one by the indifference or more. Let
+delta be the indifference, 1 - alpha the confidence, n0 = ``first``, c = 1, X_i(r) the mean of the
+first r missions of point i, and S2_il the sample variance of the differences between the first n0
+missions of i and l:
     eta = ((2 alpha / (k - 1))^(-2 / (n0 - 1)) - 1) / 2,    h2 = 2 c eta (n0 - 1)
     W_il(r) = max(0, delta / (2 c r) (h2 S2_il / delta^2 - r))
-At every stage r = n0, n0 + 1, ... point i leaves the race if X_i(r) < X_l(r) - W_il(r) for a point
-l that was in the race before the stage. The race ends when one point is left, or when r is more
-than h2 S2_il / delta^2 for all pairs that are left. The variances are those of differences, and the
-errors add up by Bonferroni: it holds under common random numbers, and gains by them. It assumes
-normal values. Where missions fail now and then, the first ones may all have succeeded and tell
-nothing of the spread; then the promise is not kept.
+At every stage r = n0, n0 + 1, ... point i is ruled out if X_i(r) < X_l(r) - W_il(r) for a point l
+that was not ruled out before the stage. The procedure ends when one point is left, or when r is
+more than h2 S2_il / delta^2 for all pairs that are left. It uses the variances of differences and
+adds the errors up (Bonferroni). So it is valid under common random numbers, and needs fewer
+missions with them. It assumes normal values. Where missions fail rarely, all of the first n0
+missions may succeed, so that their variance is too small; then the guarantee does not hold.
 
-``kn-bounded`` is the same race for metrics between 0 and 1 with rare failures. The variances are
-those of all missions so far, taken anew whenever r has grown by half (as in Kim and Nelson's KN++,
-whose promise is asymptotic), and the margin W_il(r) is as if Bernstein's inequality added
+``kn-bounded`` is the same procedure for metrics between 0 and 1 with rare failures. The variances
+are estimated from all missions so far, again whenever r has grown by half (as in Kim and Nelson's
+KN++, whose guarantee is asymptotic). The margin W_il(r) is widened by the term
     2 ln((k - 1) / alpha) / (3 r)
-to the errors of the means, for what has not happened yet: no difference is further than 2 from its
-mean. It takes more missions: a point that lags by g stays for some 2 ln((k - 1) / alpha) / (3 g).
+of Bernstein's inequality for events that have not been observed yet, since no difference is further
+than 2 from its mean. This takes more missions: a point whose mean is lower by g is ruled out only
+after about 2 ln((k - 1) / alpha) / (3 g) missions.
 
 Sources:
     S.-H. Kim, B. L. Nelson, A fully sequential procedure for indifference-zone selection in
@@ -40,27 +43,27 @@ from pydantic import Field, model_validator
 from analysis.study.stopping import MOST, Metric, StrictTable
 from dess.scenario import Integer, Number
 
-# Stages of the race that are summed at once; their number changes no result.
+# Number of stages whose sums are computed together; it does not change any result.
 _BLOCK = 128
 
 
 @dataclass(frozen=True)
 class Choice:
-    """What a selection came to.
+    """The result of a selection.
 
     Attributes:
         best: Number of the selected design point.
-        survivors: The points that were not ruled out, the best among them.
-        counts: Missions per point that the selection rests on.
-        means: Means of the metric over these missions. That of the selected point is likely to be
-            too high: it was selected for it.
+        survivors: The points that were not ruled out, the selected one included.
+        counts: Number of missions per point that the selection is based on.
+        means: Means of the metric over these missions. The mean of the selected point tends to be
+            too high, because the point was selected for its high mean.
         procedure: ``kn`` or ``kn-bounded``.
-        guarantee: What can be said of the selection, in plain words.
-        guaranteed: Whether that is a promised probability.
-        done: Whether the procedure has all missions that it wants.
-        stage: Missions of the selected point that decided.
-        rounds: Rounds of simulation.
-        missions: All missions.
+        guarantee: What is guaranteed about the selection, in words.
+        guaranteed: Whether the guarantee is a probability (and not that the budget has ended).
+        done: Whether the procedure needs no more missions.
+        stage: Number of missions of the selected point when the selection ended.
+        rounds: Number of rounds of simulation.
+        missions: Number of all missions.
     """
 
     best: int
@@ -77,11 +80,11 @@ class Choice:
 
 
 class Selection(StrictTable):
-    """The rule that missions are spent to find the best of the design points.
+    """The rule that missions are added until the best of the design points is found.
 
-    The missions come in rounds that grow. What is wanted is a function of the values in the order
-    of their replications, found by playing all rounds again, so the counts are the same however a
-    run was interrupted; and ``kn`` decides as if missions came one by one.
+    Missions are simulated in rounds of growing size. How many are needed is computed by repeating
+    all rounds on the values, in the order of their replications. So the result is the same, whether
+    or not a run was interrupted, and ``kn`` decides as if the missions came one by one.
 
     Raises:
         pydantic.ValidationError: If a field is not valid.
@@ -112,26 +115,27 @@ class Selection(StrictTable):
         return self
 
     def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
-        """How many missions every design point is to have.
+        """The number of missions that every design point needs.
 
         Args:
-            samples: Per design point: metric -> (n,) values of replications 0..n-1.
+            samples: For each design point, a mapping from metrics to their (n,) values in
+                replications 0..n-1.
 
         Returns:
-            The numbers, none below the missions given; equal to them if no more are needed.
+            For each design point at least the n missions given; exactly n if no more are needed.
         """
         values = self._values(samples)
         counts = _Race(self, values).counts
         return [max(len(sample), int(n)) for sample, n in zip(values, counts, strict=True)]
 
     def choice(self, samples: Sequence[Mapping[str, np.ndarray]]) -> Choice:
-        """The selected design point, and what can be said of it.
+        """The selected design point, and what is guaranteed about it.
 
         Args:
-            samples: As of ``wanted``.
+            samples: As for ``wanted``.
 
         Raises:
-            ValueError: If there is no point, or one has not the missions of round one.
+            ValueError: If there is no design point, or one has fewer than ``first`` missions.
         """
         values = self._values(samples)
         if not values or min(map(len, values)) < self.first:
@@ -159,12 +163,12 @@ class Selection(StrictTable):
         if len(race.values) == 1:
             return "it is the only design point"
         if not race.done:
-            return "none yet: the procedure wants more missions"
+            return "none yet: the procedure needs more missions"
         left = len(race.alive)
         if not race.over:
             return (
                 f"none: the budget of {self.budget} missions ended with {left} design points left;"
-                " this is the best mean of them"
+                " this one has the best mean of them"
             )
         what = "it is the best" if left == 1 else f"the best is among {left} that tie, it included"
         others = "every other" if left == 1 else "those ruled out"
@@ -189,17 +193,17 @@ def _variances_of_differences(values: np.ndarray) -> np.ndarray:
 
 
 class _Race:
-    """The procedure of Kim and Nelson, played as far as the values reach.
+    """The procedure of Kim and Nelson, carried out as far as the simulated missions allow.
 
     Attributes:
-        values: Per design point its values; all points have the missions of round one, or nothing
-            is played.
-        counts: (k,) missions wanted so far.
-        alive: Points not ruled out, in order.
-        stage: The last stage played.
-        rounds: Rounds played.
-        over: The race has ended.
-        done: No more missions are wanted: the race or the budget has ended.
+        values: For each design point its values. Nothing is done before all points have the
+            missions of the first round.
+        counts: (k,) missions that each point needs so far.
+        alive: The points that are not ruled out, in order.
+        stage: The last stage carried out.
+        rounds: Number of rounds carried out.
+        over: Whether the procedure has decided.
+        done: Whether no more missions are needed: it has decided, or the budget is spent.
     """
 
     def __init__(self, rule: Selection, values: list[np.ndarray]):
@@ -217,19 +221,19 @@ class _Race:
 
     @property
     def best(self) -> int:
-        """The point of the best mean."""
+        """The point with the best mean."""
         return int(self.alive[np.argmax(self.sums)])
 
     def _has_missions(self) -> bool:
-        """Whether all missions wanted are there."""
+        """Whether all missions that are needed so far are present."""
         return all(len(sample) >= n for sample, n in zip(self.values, self.counts, strict=True))
 
     def _missions(self, begin: int, end: int) -> np.ndarray:
-        """(s, n) values of the points in the race."""
+        """The (s, n) values of the points that are not ruled out."""
         return np.array([self.values[i][begin:end] for i in self.alive])
 
     def _play(self) -> None:
-        """Play round by round, until the race or the budget ends or missions are missing."""
+        """Carry out rounds until there is a decision, or the budget or the missions end."""
         while self._has_missions():
             target = int(self.counts.max())
             while self.stage < target and not self.over:
@@ -266,7 +270,7 @@ class _Race:
             self.reach += 4 * np.log(odds) / (3 * delta)
 
     def _margins(self, reach: np.ndarray, stage: int) -> np.ndarray:
-        """By how much a mean must fall behind another one to leave the race: W at a stage."""
+        """The margin W at a stage: by how much a mean must be below another one to be ruled out."""
         return np.maximum(0.0, self.rule.indifference / (2 * stage) * (reach - stage))
 
     def _run_block(self, end: int) -> None:
@@ -278,7 +282,7 @@ class _Race:
         left = np.ones(len(self.alive), bool)
         for stage in range(begin + 1, end + 1):
             means = np.where(left, sums[:, stage - begin - 1] / stage, -np.inf)
-            # Only points are compared that the best could beat by their narrowest margin.
+            # Compare only those points that the best point could rule out by their smallest margin.
             close = means.max() - self._margins(tightest, stage)
             behind = np.flatnonzero(left & (means < close))
             if behind.size:
@@ -292,7 +296,7 @@ class _Race:
         self.reach = self.reach[np.ix_(left, left)]
 
     def _ends(self, means: np.ndarray, left: np.ndarray) -> bool:
-        """Whether one is left, or several that no later stage tells apart."""
+        """Whether one point is left, or several points that no later stage can tell apart."""
         if np.count_nonzero(left) == 1:
             return True
         if np.ptp(means[left]) > 0:  # then the margin between them is above zero

@@ -1,4 +1,4 @@
-"""Replicate until the intervals are narrow enough."""
+"""Sequential stopping: add replications until the confidence intervals are narrow enough."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -19,25 +19,25 @@ from dess.scenario import Integer, Number, validation_line
 
 Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
 
-# Missions that a rule may ask for.
+# The largest number of missions that a rule may ask for.
 MOST = 1_000_000_000
-# The level of ``stats.intervals``, which is not imported: studies load without scipy.stats.
+# The level of ``stats.intervals``. That module is not imported, so that studies load quickly.
 _LEVEL = 0.95
-# No round multiplies the missions of a cell by more.
+# No round multiplies the number of missions of a cell by more than this.
 _GROWTH = 2.0
 
 
 class StrictTable(BaseModel):
-    """A table of a study's TOML file: frozen, of known keys, and of the types that TOML gives."""
+    """A table of a study's TOML file: frozen, without unknown keys, strictly typed."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
-    """Read a table as the model that one of its keys names, with one line that speaks of it alone.
+    """Read a table as the model that one of its keys names, so that errors name this model alone.
 
     Args:
-        key: The key; each model allows some literals for it.
+        key: The key. Each model allows some values of it, such as ``kind = "grid"``.
         models: The models.
     """
     kinds = {name: m for m in models for name in get_args(m.model_fields[key].annotation)}
@@ -57,7 +57,7 @@ def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
 
 
 class Target(StrictTable):
-    """How narrow an interval is to be: met if either half-width is."""
+    """How narrow an interval must be; one of the two half-widths has to be reached."""
 
     absolute: Number | None = Field(None, gt=0, description="half-width in units of the metric")
     relative: Number | None = Field(None, gt=0, description="half-width as a share of |mean|")
@@ -69,23 +69,23 @@ class Target(StrictTable):
         return self
 
     def width(self, means: np.ndarray) -> np.ndarray:
-        """The half-widths that meet the target, for these means."""
+        """The largest half-widths that meet the target, for these means."""
         return np.maximum(self.absolute or 0.0, (self.relative or 0.0) * np.abs(means))
 
 
 class Reached(NamedTuple):
-    """What one metric of a design point came to.
+    """The result of a stopping rule for one metric of a design point.
 
     Attributes:
         point: Number of the design point.
         metric: The metric.
-        missions: How many the estimate rests on.
+        missions: Number of missions that the estimate is based on.
         mean: The estimate.
         half_width: Half the length of its 95 % interval.
         target: The half-width that meets the target at this mean.
-        met: Whether the target held in the look-ahead: that of the stopping point, or, without
-            one, the last missions.
-        stop: The stopping point of the cell; None if the missions ended before.
+        met: Whether the target was met throughout the look-ahead after the stopping point or, if
+            there is none, throughout the last missions.
+        stop: The stopping point of the cell [missions]; None if it was not reached.
     """
 
     point: int
@@ -99,26 +99,27 @@ class Reached(NamedTuple):
 
 
 class Precision(StrictTable):
-    """The rule that a cell is replicated until its 95 % intervals are narrow enough.
+    """The rule that missions are added to a cell until its 95 % intervals are narrow enough.
 
-    The half-widths are those of ``stats.intervals``: half the Wilson interval of ``success``,
-    Student's t for the others. The *stopping point* is the first n >= ``first`` at which all
-    targets hold at n, n + 1, ..., n + ``look_ahead``: without the look-ahead, a sample that is
-    narrow by luck would stop too early. The cell keeps the missions of the look-ahead.
+    The half-widths are those of ``stats.intervals``: half the Wilson interval for ``success``,
+    Student's t for the other metrics. The *stopping point* is the first n >= ``first`` at which all
+    targets are met with n, n + 1, ..., n + ``look_ahead`` missions. Without the look-ahead, a
+    sample whose interval is narrow by chance would stop too early. The cell keeps the missions of
+    the look-ahead.
 
-    The stopping point depends on the values alone, not on the rounds. These grow as far as the
-    intervals ask for, but cautiously, so that a cell seldom ends with more than ``look_ahead``
-    missions beyond it; where it does (a mean that moves under a relative target), they are kept
-    as well. Everything is a function of a cell's values in the order of their replications, so
-    the counts are the same however a run was interrupted.
+    The stopping point depends only on the values of the missions, not on the rounds in which they
+    are simulated. The size of a round is an estimate of what is still needed, and a careful one, so
+    that a cell seldom ends with more than ``look_ahead`` missions after its stopping point. If it
+    does, these missions are kept as well. The number of missions is a function of the cell's values
+    in the order of their replications, so it is the same whether or not a run was interrupted.
 
-    After stopping, the intervals cover what they promise as well as with a fixed number. Where a
-    rare event (a failed mission) moves a metric a lot, that is less: Student's interval is narrow
-    until it happens. A larger ``first`` helps.
+    After stopping, the coverage of the intervals is about as good as with a fixed number of
+    missions. It is lower where a rare event, such as a failed mission, changes a metric strongly,
+    because Student's interval is too narrow until the event occurs. A larger ``first`` helps.
 
     Source: K. Hoad, S. Robinson, R. Davies, Automated selection of the number of replications for
-    a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644; here with |mean|, because
-    a relative half-width of a negative mean is negative, and met at once.
+    a discrete-event simulation, J. Oper. Res. Soc. 61 (2010) 1632-1644. In contrast to the article,
+    relative half-widths are taken of |mean|, since a negative mean would meet any target at once.
 
     Raises:
         pydantic.ValidationError: If a field is not valid.
@@ -144,21 +145,22 @@ class Precision(StrictTable):
         return self
 
     def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
-        """How many missions every design point is to have.
+        """The number of missions that every design point needs.
 
         Args:
-            samples: Per design point: metric -> (n,) values of replications 0..n-1.
+            samples: For each design point, a mapping from metrics to their (n,) values in
+                replications 0..n-1.
 
         Returns:
-            The numbers, none below the missions given; equal to them if no more are needed.
+            For each design point at least the n missions given; exactly n if no more are needed.
         """
         return [self._wanted(sample) for sample in samples]
 
     def reached(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[Reached]:
-        """What came of the targets: a row per design point and metric.
+        """Whether the targets were met: a row per design point and metric.
 
         Args:
-            samples: As of ``wanted``, with at least one mission per point.
+            samples: As for ``wanted``, with at least one mission per point.
         """
         return [row for point, sample in enumerate(samples) for row in self._rows(point, sample)]
 
@@ -189,14 +191,14 @@ class Precision(StrictTable):
         return rows
 
     def _excess(self, metric: Metric, sample: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Half-width / target after 1..n missions: at most 1 where the target holds."""
+        """Half-width / target after 1..n missions; at most 1 where the target is met."""
         means, widths = running_interval(metric, sample[metric])
         allowed = self.targets[metric].width(means)
         never = np.where(widths > 0, np.inf, 0.0)
         return np.divide(widths, allowed, out=never, where=allowed > 0)
 
     def _last_miss(self, excess: np.ndarray) -> np.ndarray:
-        """The last number of missions up to 1..n at which a target was missed, or not checked."""
+        """The last count up to 1..n missions at which a target was missed or not checked."""
         counts = np.arange(1, len(excess) + 1)
         missed = (excess > 1) | (counts < self.first)
         return np.maximum.accumulate(np.where(missed, counts, 0))
@@ -208,14 +210,14 @@ class Precision(StrictTable):
 
 
 def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the first 1..n values, and half the lengths of their 95 % intervals.
+    """Means of the first 1..n values, and the half-widths of their 95 % confidence intervals.
 
     Args:
-        metric: ``success`` has Wilson's interval, every other Student's t.
+        metric: ``success`` has Wilson's interval, every other metric Student's t.
         values: (n,) values.
 
     Returns:
-        (n,) means and (n,) half-widths; that of a single value is infinite by Student's t.
+        (n,) means and (n,) half-widths. Student's half-width of a single value is infinite.
     """
     sample = np.asarray(values, float)
     counts = np.arange(1, len(sample) + 1)
@@ -224,7 +226,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
         z = ndtri((1 + _LEVEL) / 2)
         spread = successes * (counts - successes) / counts
         return successes / counts, z * np.sqrt(spread + z**2 / 4) / (counts + z**2)
-    # Shifted by the first value, a constant has no rounding errors: its interval is a point.
+    # The values are shifted by the first one, so that equal values give a width of exactly 0.
     shifted = sample - sample[:1]
     means = np.cumsum(shifted) / counts
     before = np.concatenate([[0.0], means[:-1]])[: len(sample)]
@@ -236,7 +238,7 @@ def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _student(n: int) -> np.ndarray:
-    """(n,) quantiles of Student's t for samples of 1..n values."""
+    """The (n,) quantiles of Student's t for samples of 1..n values."""
     return _student_table(1 << n.bit_length())[:n]
 
 

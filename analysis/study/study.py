@@ -1,4 +1,4 @@
-"""Studies: policies x design points x replications, as data."""
+"""Studies as data: which policies, design points and replications to simulate."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -33,15 +33,16 @@ from policies import load_team
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
 
-# With more design points, a study checks them when they are made, not when it is.
+# A study with more design points checks each point when it is used, not when the study is made.
 MANY_POINTS = 100_000
 
-# The first replication of the missions that check a selected setting: none that selected it.
+# The first replication of the missions that check a selected setting. They are independent of the
+# missions on which the selection was based.
 CHECK = MOST
 
 
 class Point(NamedTuple):
-    """A design point: what the design sets, the scenario that this makes, its first replication."""
+    """A design point: the values that the design sets, their scenario, and a first replication."""
 
     values: dict[str, Any]
     scenario: ScenarioSpace
@@ -49,11 +50,11 @@ class Point(NamedTuple):
 
 
 class Study(StrictTable):
-    """Policies x design points x replications.
+    """A study: every policy at every design point, in a number of replications.
 
-    Every policy meets the same replications, and so does every design point (common random
-    numbers). How many replications a design point gets is ``missions``, or decided on the way by
-    ``precision`` or ``selection``. ``load_study`` makes one from a file, with one-line errors.
+    All policies and all design points use the same replications (common random numbers). The number
+    of replications of a design point is ``missions``, or is decided during the run by ``precision``
+    or ``selection``. ``load_study`` reads a study from a file and reports errors in one line.
 
     Raises:
         pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
@@ -129,7 +130,7 @@ class Study(StrictTable):
             )
 
     def _check_budget(self) -> None:
-        """A selection must be able to afford its first round."""
+        """Check that the budget of a selection is enough for its first round."""
         least = self.first * self.size
         if self.selection and least > self.selection.budget:
             raise ValueError(
@@ -149,7 +150,7 @@ class Study(StrictTable):
 
     @property
     def command(self) -> list[str]:
-        """The command that runs it, as far as it came from ``load_study``."""
+        """The command that runs the study, if it was read by ``load_study``."""
         name, changes = self._origin
         policies = [word for team in changes.get("policies", ()) for word in ("--policy", team)]
         missions = ["--missions", str(changes["missions"])] if "missions" in changes else []
@@ -157,12 +158,12 @@ class Study(StrictTable):
 
     @property
     def rule(self) -> Precision | AnySelection | None:
-        """What decides how many replications a design point gets, if they are not fixed."""
+        """The rule that decides the number of replications; None if the number is fixed."""
         return self.precision or self.selection
 
     @property
     def first(self) -> int:
-        """Replications of every cell before a rule, if there is one, asks for more."""
+        """The number of replications of every cell, before a rule asks for more."""
         return self.rule.first if self.rule else self.missions
 
     @cached_property
@@ -172,7 +173,7 @@ class Study(StrictTable):
 
     @property
     def size(self) -> int:
-        """Number of design points, known without making them."""
+        """The number of design points, computed without making them."""
         return self.design.count if self.design else 1
 
     @cached_property
@@ -180,18 +181,18 @@ class Study(StrictTable):
         """The design points in the order of the design.
 
         Raises:
-            InputError: If there are too many, one is listed twice or has no valid scenario; of a
-                study that has been made, only with more than ``MANY_POINTS``.
+            InputError: If there are too many points, one is listed twice or has no valid scenario.
+                Studies with at most ``MANY_POINTS`` points raise these errors when they are made.
         """
         rows = self.design.points if self.design else (DesignPoint({}),)
         self._check_rows(rows)
         return tuple(map(self._point, rows))
 
     def point(self, number: int) -> Point:
-        """A design point by its number, made alone.
+        """A design point by its number; the other points are not made.
 
         Raises:
-            InputError: If it has no valid scenario.
+            InputError: If its scenario is not valid.
         """
         row = self.design.point(number) if self.design else DesignPoint({})
         self._check_rows([row])
@@ -215,10 +216,10 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     """A shipped study by name, or one from a TOML file.
 
     Args:
-        name_or_path: One of ``study_names()``, or the path of a TOML file. A file that names no
-            study gives it its own name; its scenario, if a file, is looked for beside it.
-        **overrides: Fields of ``Study`` to set on top. With fewer ``missions`` than the study keeps
-            event logs of, all of them keep their log.
+        name_or_path: One of ``study_names()``, or the path of a TOML file. If the file gives no
+            name, the study is named after the file. A scenario file is looked for in its folder.
+        **overrides: Fields of ``Study`` that replace those of the file. If ``missions`` is less
+            than ``logged``, ``logged`` is reduced to it.
 
     Raises:
         InputError: If there is no such study, or it is not valid.
@@ -244,7 +245,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
 
 
 def _with_fewer_logs(values: dict[str, Any], overrides: dict[str, Any]) -> dict[str, Any]:
-    """Overrides; fewer missions than the study keeps event logs of keep fewer logs."""
+    """The overrides, with ``logged`` reduced if there are fewer missions than that."""
     logged, missions = values.get("logged"), overrides.get("missions")
     if isinstance(logged, int) and isinstance(missions, int) and 1 <= missions < logged:
         return {"logged": missions} | overrides
@@ -257,7 +258,7 @@ def study_names() -> list[str]:
 
 
 def budget_of(study: Mapping[str, Any]) -> str:
-    """How the data of a study differ from the shipped study of its name, in words."""
+    """In words, how a study differs from the shipped study of the same name."""
     if study["name"] not in study_names():
         return "as asked"
     shipped = load_study(study["name"]).model_dump(mode="json")
