@@ -1,1 +1,1 @@
-"""Results folders: what they hold, how they are read, and how missions are simulated again."""
+"""Results folders: what they contain, how they are read, and how missions are simulated again."""

@@ -1,4 +1,4 @@
-"""Chunks: what is computed and kept together, and how a study is cut into them."""
+"""Chunks: missions that are computed and stored together, and how studies are split into them."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,14 +20,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Chunk:
-    """What is computed and kept together: parts of the cells of one team."""
+    """Missions of one team that are computed and stored together: parts of its cells."""
 
     team: int
     parts: tuple[Part, ...]
 
     @property
     def missions(self) -> int:
-        """How many missions it has."""
+        """The number of missions in the chunk."""
         return sum(len(part.replications) for part in self.parts)
 
     @property
@@ -37,7 +37,7 @@ class Chunk:
 
     @property
     def name(self) -> str:
-        """A hash of what it holds."""
+        """A hash of the cells and replications in the chunk."""
         return name_of(self.rows)
 
 
@@ -47,9 +47,9 @@ class Failure:
 
     Attributes:
         policy: The team.
-        missions: How many missions are missing for it.
-        error: What went wrong, in a line.
-        command: A command that does it again.
+        missions: Number of missions that are missing because of it.
+        error: What went wrong, in one line.
+        command: A command that reproduces the error.
         traceback: Where it went wrong.
     """
 
@@ -61,7 +61,7 @@ class Failure:
 
 
 def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None) -> list[Part]:
-    """The first missions of every cell of a team: ``counts``, or as many as the manifest wants."""
+    """The first missions of every cell of a team: ``counts`` of them, or as the manifest says."""
     cells, counts = manifest.cells[team], counts or manifest.missions[team]
     return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
@@ -69,7 +69,7 @@ def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None)
 def check_parts(manifest: Manifest, team: int) -> list[Part]:
     """The missions that check the design points selected for a team.
 
-    None of them has selected one.
+    The selection was not based on any of these missions.
     """
     points = manifest.selected_points(team)
     check = range(CHECK, CHECK + manifest.study["selection"]["check"]) if points else range(0)
@@ -77,7 +77,7 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
-    """Parts in their order as chunks of ``size`` missions; a chunk has one team."""
+    """Split parts, in their order, into chunks of ``size`` missions; a chunk has one team."""
     waiting: list[Part] = []
     room = size
     for part in parts:
@@ -96,7 +96,7 @@ def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
 
 
 def gaps(wanted: range, present: list[range]) -> list[range]:
-    """What of a range is in none of the others."""
+    """The parts of a range that are in none of the present ranges."""
     missing, begin = [], wanted.start
     for there in sorted(present, key=lambda r: r.start):
         if there.start > begin:
@@ -108,10 +108,10 @@ def gaps(wanted: range, present: list[range]) -> list[range]:
 
 
 def name_of(rows: Sequence[Sequence[Any]]) -> str:
-    """What a file is called that holds these parts."""
+    """The first half of the name of a file that contains these parts: a hash of them."""
     return short_hash(json.dumps(rows).encode())
 
 
 def short_hash(content: bytes) -> str:
-    """Enough of a hash to tell files apart."""
+    """The beginning of a hash, long enough to tell files apart."""
     return sha256(content).hexdigest()[:16]

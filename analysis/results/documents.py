@@ -1,4 +1,4 @@
-"""JSON documents: frozen models that know their version, read with one-line errors."""
+"""JSON documents as frozen models; a document of another version is refused in one line."""
 
 import json
 from pathlib import Path
@@ -25,15 +25,15 @@ class Document(BaseModel):
 
     @classmethod
     def parse(cls, text: str, where: str, allowed: str) -> Self:
-        """A document from its JSON text.
+        """Read a document from its JSON text.
 
         Args:
             text: The text.
-            where: What holds it, for messages.
-            allowed: What is allowed there.
+            where: The file or page that contains the text, for messages.
+            allowed: What the message says is allowed.
 
         Raises:
-            InputError: If it is no such document.
+            InputError: If the text is not a valid document.
         """
         try:
             return cls.model_validate_json(text)
@@ -42,16 +42,16 @@ class Document(BaseModel):
 
     @classmethod
     def load(cls, path: Path, schema: int, absent: str, allowed: str) -> Self:
-        """A document from a file, with a ``version`` of dess and a ``schema_version``.
+        """Read a document from a file, which has a ``version`` of dess and a ``schema_version``.
 
         Args:
             path: The file.
-            schema: The schema that it must be of.
-            absent: What is allowed, if the file does not exist.
-            allowed: What is allowed otherwise.
+            schema: The schema version that the document must have.
+            absent: What the message says is allowed if the file does not exist.
+            allowed: What all other messages say is allowed.
 
         Raises:
-            InputError: If the file does not exist, is of another version, or is no such document.
+            InputError: If the file does not exist, has another version, or is not valid.
         """
         try:
             text = path.read_text("utf-8")

@@ -1,7 +1,8 @@
-"""What a page carries of the results that it shows, so that anybody can check them.
+"""The evidence in a page: data by which anybody can check the results that the page shows.
 
-A page cannot carry all missions of a study. It carries what they were made with, and a sample of
-them, whose records can be compared, bit for bit, with those of the same missions simulated again.
+A page cannot contain all missions of a study. It contains what they were made with (code,
+libraries, seed, scenario, policies), and the records of a random sample of them. Anybody can
+simulate the missions of the sample again and compare the records bit for bit (``dess verify``).
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from analysis.results.tables import Results
 from dess.record import MISSION_RECORD
 from policies.registry import TRAINED
 
-SAMPLE = 32  # missions of a study that a page carries
+SAMPLE = 32  # missions of a study that a page contains
 
 
 class Mission(Document):
@@ -33,13 +34,13 @@ class Mission(Document):
 
 
 class Evidence(Origin):
-    """What the results of a study were made with, and some of their missions.
+    """What the results of a study were made with, and a sample of their missions.
 
     Attributes:
-        key: Of the study: a hash of all that its records depend on, and of how many there are.
+        key: The study's key: a hash of all that its records depend on, and of their number.
         points: Number of design points.
-        missions: The least and the most of a policy at a design point.
-        sample: Some of the missions.
+        missions: The smallest and the largest number of missions of a policy at a design point.
+        sample: The sample of missions with their records.
     """
 
     key: str
@@ -63,9 +64,9 @@ class Evidence(Origin):
 
         Args:
             results: The results.
-            sample: How many missions to draw, those that check a selection among them.
-            seed: Of the draw. By default a hash of all records: who alters one of them draws
-                others.
+            sample: How many missions to draw. Missions that check a selection may be among them.
+            seed: Seed of the draw. By default a hash of all records, so that a changed record
+                leads to another sample.
         """
         manifest = results.store.manifest
         counts = [n for of_team in manifest.missions for n in of_team]
@@ -97,13 +98,13 @@ def learned_files(folder: Path = TRAINED) -> dict[str, str]:
 
 
 def chosen(count: int, most: int, seed: int) -> Sequence[int]:
-    """Some of the numbers 0..count - 1, ``most`` or all of them, drawn at random, in order."""
+    """Draw at most ``most`` of the numbers 0..count - 1 at random; the result is sorted."""
     numbers = np.random.default_rng(seed).choice(count, min(count, most), replace=False)
     return sorted(numbers.tolist())
 
 
 def _hash(results: Results) -> int:
-    """A number that every record has a part in."""
+    """A number that depends on every record."""
     tables = (results.missions, results.checks, results.uavs)
     hashes = [pd.util.hash_pandas_object(table, index=False).to_numpy() for table in tables]
     return int(sha256(np.concatenate(hashes).tobytes()).hexdigest()[:16], 16)

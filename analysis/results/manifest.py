@@ -1,4 +1,4 @@
-"""What a results folder is about: the study, what it was run with, and what its cells depend on."""
+"""The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
 import shlex
@@ -41,15 +41,15 @@ _PARTS: dict[str, TypeAdapter] = {
 }
 
 
-# What is selected for a team: a design point, or those of all questions; None without a selection.
+# What is selected for a team: a design point, or one for each question; None without a selection.
 Selected = int | list[int] | None
 
 
 class Cell(NamedTuple):
-    """A team on a design point, by their numbers, with the key of what its records depend on.
+    """A team at a design point, given by their numbers.
 
-    ``key`` is a hash of all that the records depend on but the replication. ``first`` is the first
-    replication.
+    ``key`` is a hash of all that the records depend on, except the replication. ``first`` is the
+    first replication.
     """
 
     team: int
@@ -59,20 +59,20 @@ class Cell(NamedTuple):
 
 
 class Origin(Document):
-    """What results were made with; manifests, and what pages carry, have these fields.
+    """What results were made with; manifests and the evidence in pages have these fields.
 
     Attributes:
-        version: Of dess.
-        code: A hash of every module that the records depend on, as of the last run.
-        engine_code: A hash of the code of the engines, as of the first run; it is part of the keys
-            of the cells, like the code of the policies.
+        version: Version of dess.
+        code: For every module that the records depend on, a hash of its code at the last run.
+        engine_code: A hash of the code of the engines at the first run. Like the code of the
+            policies, it is part of the keys of the cells.
         accepted: The changes of code between the runs, in their order.
-        commit: Of the source tree, if it is one of git.
-        libraries: Their versions, by name.
-        seed: Of the missions.
-        scenario: The whole scenario that the design points change.
-        policies: The teams, with the code and weights that the cells are keyed by.
-        study: The data of the study.
+        commit: The git commit of the source tree, if there is one.
+        libraries: The versions of the libraries, by name.
+        seed: Seed of the missions.
+        scenario: The complete scenario, before the design points change it.
+        policies: The teams, with the hashes of code and weights that are part of the cells' keys.
+        study: The study as data.
     """
 
     version: str
@@ -89,7 +89,7 @@ class Origin(Document):
     @field_validator("study")
     @classmethod
     def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
-        study = {"costs": None} | study  # which results of earlier versions lack
+        study = {"costs": None} | study  # results of earlier versions have no costs
         numbers = (study.get("missions"), study.get("logged"))
         if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
             raise ValueError("is not the data of a study")
@@ -97,7 +97,7 @@ class Origin(Document):
             try:
                 part.validate_json(json.dumps(study[field]))
             except ValidationError:
-                raise ValueError(f"has a {field} that is none") from None
+                raise ValueError(f"has an invalid {field}") from None
         return study
 
     def space(self, values: dict[str, Any]) -> ScenarioSpace:
@@ -113,7 +113,7 @@ class Origin(Document):
         """How the code and libraries of this process differ from those that made the results.
 
         Raises:
-            InputError: If a policy is not there.
+            InputError: If a policy cannot be loaded.
         """
         changes = []
         if self.version != dess.__version__:
@@ -130,13 +130,13 @@ class Origin(Document):
     def simulate_command(self, policy: str, values: dict[str, Any], replication: int) -> str:
         """The command that simulates a mission again.
 
-        Where the scenario is not a shipped one, its file may be anywhere: the command sets all that
-        differs from the paper's scenario.
+        If the scenario is not a shipped one, its file may not be at hand. The command then sets
+        every field that differs from the paper's scenario.
 
         Args:
             policy: The team.
-            values: Of the mission's design point.
-            replication: Of the mission.
+            values: The values of the mission's design point.
+            replication: The replication of the mission.
         """
         name, changes = self.study["scenario"], self.study["set"] | values
         if name not in scenario_names():
@@ -149,13 +149,16 @@ class Origin(Document):
 
 
 class Manifest(Origin):
-    """What a results folder is about. No clock and no path: equal runs have equal manifests.
+    """The manifest of a results folder.
+
+    It contains neither a time nor a path, so equal runs have equal manifests.
 
     Attributes:
-        missions: Wanted of every team and design point; grows where a rule decides it.
-        selected: For every team the design point that was selected, or all of them in a list, where
-            one is selected for each of several conditions; None, if the study selects nothing.
-        complete: Whether all of it is there.
+        missions: Number of missions needed of every team at every design point. It grows during the
+            run if a rule decides it.
+        selected: For every team the selected design point, or the list of selected points if one is
+            selected for each of several conditions; None if the study selects nothing.
+        complete: Whether all missions are present.
     """
 
     schema_version: int
@@ -168,7 +171,7 @@ class Manifest(Origin):
     def _fits_together(self) -> Self:
         names = {team.policy for team in self.policies}
         if not self.points or not names or len(names) < len(self.policies):
-            raise ValueError("policies, points: none, or one twice")
+            raise ValueError("policies, points: are empty, or one is listed twice")
         shape = [len(self.points)] * len(self.policies)
         if [*map(len, self.missions)] != shape or len(self.selected) != len(self.policies):
             raise ValueError("missions, selected: not one for every policy and design point")
@@ -176,7 +179,7 @@ class Manifest(Origin):
             raise ValueError(f"missions: out of range; allowed: 1..{CHECK}")
         teams = range(len(self.policies))
         if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
-            raise ValueError("selected: no design point")
+            raise ValueError("selected: is not a design point")
         return self
 
     def selected_points(self, team: int) -> list[int]:
@@ -187,7 +190,7 @@ class Manifest(Origin):
     @classmethod
     def of(cls, study: Study) -> "Manifest":
         """The manifest of a study that is run by this code."""
-        # Where a scenario's file lies does not matter; what it says is told.
+        # The path of a scenario file does not matter, since its content is stored.
         data = study.model_dump(mode="json") | {"scenario": PurePath(study.scenario).name}
         base = load_scenario(study.scenario, **study.set)
         points = [
@@ -217,24 +220,25 @@ class Manifest(Origin):
         """Read a manifest of this version.
 
         Raises:
-            InputError: If there is none, or it is damaged or of another version.
+            InputError: If the file does not exist, is damaged, or has another version.
         """
         absent = "allowed: a results folder, made by dess study run"
         return cls.load(path, SCHEMA_VERSION, absent, _ALLOWED)
 
     def extended_to(self, new: "Manifest", path: Path, accepting: int | None) -> "Manifest":
-        """The manifest of a folder that holds these results and is to hold a new run's as well.
+        """The manifest of a folder with these results, after a new run has added to them.
 
-        It must be the same study, or more of it. Cells keep the keys that they have, so that their
-        missions are found whatever code is accepted.
+        The new run must be of the same study or of an extension of it. Cells keep their keys, so
+        that their missions are found even if other code was accepted.
 
         Args:
             new: The manifest of the run.
-            path: Where this manifest lies, for messages.
-            accepting: Missions in the folder, if they may have been simulated with other code.
+            path: The path of this manifest, for messages.
+            accepting: Number of missions in the folder if missions of other code are accepted, None
+                if they are not.
 
         Raises:
-            InputError: If the results would not fit together.
+            InputError: If the results would not belong together.
         """
         self._check_extended_by(new, path)
         changes = differing(self.code, new.code)
@@ -253,7 +257,7 @@ class Manifest(Origin):
         if self.study == new.study and self.points == new.points:
             progress = ("missions", "selected", "complete")
             update |= {name: getattr(self, name) for name in progress}
-        # Not a copy: what is cached of the new manifest does not hold with other keys.
+        # This is not a copy of ``new``, whose cached properties would be wrong with other keys.
         fields = {name: getattr(new, name) for name in Manifest.model_fields}
         return Manifest(**fields | update)
 
@@ -267,7 +271,7 @@ class Manifest(Origin):
             f"holds study {held}, not {name}": held != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
             f"holds other scenarios than those of study {name}": foreign,
-            f"holds policy {' '.join(dropped)}, which study {name} has not": bool(dropped),
+            f"holds policy {' '.join(dropped)}, which study {name} does not have": bool(dropped),
             f"made by other weights of policy {' '.join(changed)}": bool(changed),
         }
         for complaint, holds in complaints.items():
@@ -281,7 +285,7 @@ class Manifest(Origin):
 
     @property
     def key(self) -> str:
-        """A hash of what all records depend on, and of how many there are."""
+        """A hash of all that the records depend on, and of their number."""
         keys = [cell.key for cells in self.cells for cell in cells]
         accepted = [change.data for change in self.accepted]
         content = _canonical([keys, self.missions, self.selected, accepted])
@@ -295,12 +299,12 @@ class Manifest(Origin):
 
     @cached_property
     def selection(self) -> AnySelection | None:
-        """The rule by which the study selects, if it does."""
+        """The rule by which the study selects design points; None if it selects none."""
         return _PARTS["selection"].validate_json(json.dumps(self.study["selection"]))
 
     @cached_property
     def settings(self) -> list[Setting]:
-        """The design points, as a search of the cheapest one takes them; of a study with prices."""
+        """The design points of a study with prices, for the search for the cheapest setting."""
         assert self.costs is not None
         fields = dict.fromkeys(field for point in self.points for field in point.values)
         rows = [{**self.scenario, **point.values} for point in self.points]
@@ -336,7 +340,7 @@ class Manifest(Origin):
 
     @property
     def text(self) -> str:
-        """The manifest as JSON, a line for each of its parts."""
+        """The manifest as JSON, with a line for each of its parts."""
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
 

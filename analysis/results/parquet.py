@@ -1,7 +1,8 @@
-"""The parquet files of a results folder: records as tables, files named after their content.
+"""The parquet files of a results folder: records as tables, in files that are named by hashes.
 
-The name of a file, ``CONTENT-BYTES.parquet``, has two hashes: of the cells and replications that it
-holds, or the cell and replication of an event log, and of its bytes. So a damaged file is noticed.
+The name of a file, ``CONTENT-BYTES.parquet``, has two hashes. The first identifies the cells and
+replications in the file (for an event log, its cell and replication); the second is a hash of its
+bytes, by which a damaged file is noticed.
 """
 
 import json
@@ -22,7 +23,7 @@ from dess.record import MISSION_RECORD, UAV_RECORD, Records
 from dess.state import END_NAMES
 
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
-_PARTS = b"dess.parts"  # the metadata that says what a file holds, in its order
+_PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
 _KEY = pa.dictionary(pa.int32(), pa.string())
 
 
@@ -31,7 +32,7 @@ def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
     return [(name, pa.from_numpy_dtype(kind[0])) for name, kind in record.fields.items()]
 
 
-# What the tables hold; ``cell`` is the key of the team and the scenario.
+# The columns of the tables; ``cell`` is the key of the team and the scenario.
 MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
 UAVS = pa.schema(
     [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
@@ -40,14 +41,14 @@ UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
 
 
 class Tables(NamedTuple):
-    """What the files of a chunk hold: a row per mission, and a row per UAV."""
+    """The two tables of a chunk: one row per mission, and one row per UAV."""
 
     missions: pa.Table
     uavs: pa.Table
 
 
 def tables_of(chunk: Chunk, records: Records) -> Tables:
-    """The records of the missions of a chunk as tables, which say what parts they hold."""
+    """The records of the missions of a chunk as tables, with their parts as metadata."""
     keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
     cells = np.repeat(keys, lengths)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
@@ -64,7 +65,7 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
 
 
 def tables_with(chunk: Chunk, missions: pd.DataFrame, uavs: pd.DataFrame) -> Tables:
-    """The rows of the missions of a chunk, as ``rows_of`` has them, as tables of the chunk."""
+    """The tables of a chunk from the rows of its missions, as ``rows_of`` returns them."""
     keys = {part.cell.point: part.cell.key for part in chunk.parts}
     tables = []
     for rows, schema in ((missions, MISSIONS), (uavs, UAVS)):
@@ -81,34 +82,34 @@ def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> p
 
 
 def check(missions: pa.Table, chunk: Chunk, seed: int) -> None:
-    """Check replications, seed and finite values of missions before they are written.
+    """Check the replications, the seed and the values of missions before they are written.
 
     Raises:
-        ValueError: If they are not those of the chunk.
+        ValueError: If they are not those of the chunk, or a value is not finite.
     """
     wanted = np.concatenate([part.replications for part in chunk.parts])
     if not np.array_equal(missions["replication"], wanted):
-        raise ValueError("the records are not of the replications that were asked for")
+        raise ValueError("the records are not those of the requested replications")
     if set(missions["seed"].to_pylist()) != {seed}:
         raise ValueError(f"the records are not of seed {seed}")
     for field in missions.schema:
         column = missions[field.name]
         if pa.types.is_floating(field.type) and not np.isfinite(column).all():
-            raise ValueError(f"the records have a {field.name} that is no number")
+            raise ValueError(f"the records have a {field.name} that is not a number")
 
 
 def parts_in(table: pa.Table) -> list[tuple[str, int, int]]:
-    """The parts that a table holds: the key, start and stop of each."""
+    """The parts in a table: the key, start and stop of each."""
     return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
 
 
 def content_hash(path: Path) -> str:
-    """The part of a file's name that says what it holds."""
+    """The part of a file's name that identifies the content of the file."""
     return path.stem.rpartition("-")[0]
 
 
 def write(folder: Path, name: str, table: pa.Table) -> Path:
-    """Write a table into a folder, whole or not at all; returns its file.
+    """Write a table into a folder, completely or not at all, and return its file.
 
     Raises:
         InputError: If it cannot be written.
@@ -125,7 +126,7 @@ def write(folder: Path, name: str, table: pa.Table) -> Path:
 
 
 def read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
-    """Read a table; None if the file is damaged, or not of the schema.
+    """Read a table; the result is None if the file is damaged or has another schema.
 
     Raises:
         InputError: If it cannot be read.
@@ -149,10 +150,10 @@ def files_in(folder: Path) -> list[Path]:
 
 
 def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], list[Path]]:
-    """The tables in a folder by the hash of what they hold, and its damaged files.
+    """The tables in a folder, by the hash of their content, and the damaged files in it.
 
-    Damaged is what does not hold what its name says. Of two files that say different things of the
-    same missions, nobody knows which is right: both are.
+    A file is damaged if its content is not what its name says. Two files with different records of
+    the same missions both count as damaged, since it is unknown which one is right.
     """
     tables, damaged = {}, []
     sound: dict[str, list[tuple[Path, pa.Table]]] = defaultdict(list)
@@ -172,6 +173,6 @@ def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], lis
 
 
 def missions_in(folder: Path) -> int:
-    """The number of missions in a results folder, those of damaged files aside."""
+    """The number of missions in a results folder, without those in damaged files."""
     files = folder.glob("missions/policy=*/*.parquet")
     return sum(len(table) for path in files if (table := read(path, MISSIONS)) is not None)

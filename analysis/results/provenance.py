@@ -1,8 +1,8 @@
-"""What records are made with: the code of the engines and policies, libraries, the git commit.
+"""Provenance of records: the code of the engines and policies, the libraries, the git commit.
 
-Code is told apart by hashes of the syntax trees of modules (``dess.code.sources``): of the modules
-that the engines import, and of those that a policy imports. Environments and drawings are not among
-them, nor are comments and docstrings.
+Code is identified by hashes of the syntax trees of modules (``dess.code.sources``), both of the
+modules that the engines import and of those that a policy imports. So the code of environments and
+figures does not count, nor do comments and docstrings.
 """
 
 import inspect
@@ -28,7 +28,7 @@ LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 class Member(Document):
     """The identity of a policy: its name, its class, and hashes of its code and weights.
 
-    ``learner`` is the same for trained policies that differ in the seed of their training alone.
+    ``learner`` is the same for trained policies that differ only in the seed of their training.
     """
 
     name: str
@@ -39,14 +39,14 @@ class Member(Document):
 
 
 class Team(Document):
-    """A team of a study, as the study names it."""
+    """A team of a study, by the name that it has in the study."""
 
     policy: str
     members: list[Member]
 
     @property
     def weights(self) -> list[tuple[str, str, str]]:
-        """What identifies the policies, whatever their code."""
+        """What identifies the policies, apart from their code."""
         return [(member.name, member.weights, member.learner) for member in self.members]
 
 
@@ -63,7 +63,7 @@ class Acceptance(Document):
 
     @property
     def text(self) -> str:
-        """The change in words."""
+        """The change of code in words."""
         return f"other code of {', '.join(self.modules)} after {self.missions:,} missions"
 
 
@@ -102,20 +102,20 @@ def code_behind(teams: Iterable[str]) -> dict[str, str]:
 
 
 def differing(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple[str, str]]:
-    """The hashes, old and new, of the old modules that are not the same in the new code.
+    """The old and the new hash of each old module that has changed or is gone.
 
-    A new module does not count by itself: an old one must have changed to import it.
+    A new module need not be listed: it matters only if an old module has changed to import it.
     """
     return {name: (code, new.get(name, "")) for name, code in old.items() if new.get(name) != code}
 
 
 def library_versions() -> dict[str, str]:
-    """What records may depend on besides the code: Python, and the libraries that compute."""
+    """The versions of Python and of the libraries on which records may depend."""
     return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
 
 
 def commit_of_source() -> str | None:
-    """The git commit of the source tree; nothing outside one."""
+    """The git commit of the source tree; None outside a git repository."""
     root = Path(inspect.getfile(dess)).parents[1]
     if not (root / ".git").exists():
         return None
@@ -127,7 +127,7 @@ def commit_of_source() -> str | None:
 
 
 def _modules_of(policy: Policy) -> tuple[str, ...]:
-    """The modules of a policy's class, and of the classes of what it holds, such as a network."""
+    """The modules of a policy's class and of its attributes' classes, such as a network's."""
     home = type(policy).__module__
     packages = OURS | {home.partition(".")[0]}
     held = {type(value).__module__ for value in vars(policy).values()}

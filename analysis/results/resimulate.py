@@ -1,4 +1,4 @@
-"""Missions of a study simulated again, to look at them and to check their records.
+"""Simulate missions of a study again, to look at them and to check their records.
 
 >>> mission = resimulate(results, "greedy", point=0, replication=17)
 >>> mission.record.metrics["slots"], mission.events
@@ -22,9 +22,9 @@ class Resimulated(NamedTuple):
     """A mission that was simulated again.
 
     Attributes:
-        scenario: The scenario that its replication draws.
-        record: Its record.
-        events: Its event log, with the columns of ``dess.record.EventLog``.
+        scenario: The scenario of the mission, with its drawn parameters.
+        record: The record of the mission.
+        events: The event log, with the columns of ``dess.record.EventLog``.
     """
 
     scenario: Scenario
@@ -35,7 +35,7 @@ class Resimulated(NamedTuple):
 def mission_of(
     space: ScenarioSpace, policy: str, seed: int = 0, replication: int = 0
 ) -> Resimulated:
-    """A mission of any scenario, to look at.
+    """Simulate a mission of any scenario, with its event log.
 
     Raises:
         InputError: If there is no such policy, or it cannot act in the scenario.
@@ -50,22 +50,23 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> R
     """Simulate a mission of a study again, with the SimPy engine.
 
     Raises:
-        InputError: If the study has no such mission, or its record is another one.
+        InputError: If the study has no such mission, or if the new record differs from the stored
+            one.
     """
     space, seed = results.scenario(point), results.store.manifest.seed
     mission = mission_of(space, policy, seed, replication)
     if changed := difference(mission.record, recorded(results, policy, point, replication)):
         raise InputError(
             f"{results.store.folder}: {policy}, point {point}, replication {replication}: "
-            f"{changed}; allowed: results of this very code"
+            f"{changed}; allowed: results that were made by this code"
         )
     return mission
 
 
 def recorded(results: Results, policy: str, point: int, replication: int) -> dict[str, Any]:
-    """The record of a mission of a study, by field; those of its UAVs as ``uav 1 quota``.
+    """The stored record of a mission, by field; fields of its UAVs are named like ``uav 1 quota``.
 
-    The records of missions that check a selection are without their UAVs.
+    For missions that check a selection, no records of UAVs are stored.
 
     Raises:
         InputError: If the study has no such mission.
@@ -82,7 +83,7 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
 
 
 def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
-    """The recorded fields that are not, bit for bit, those of the record; empty if all are."""
+    """The stored fields that differ, in any bit, from a record, in words; empty if none does."""
     uavs = pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
     simulated = _by_field(record.metrics, uavs.to_dict("records"))
     changed = [name for name in fields if simulated.get(name) != fields[name]]
@@ -93,7 +94,7 @@ def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
 
 
 def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]:
-    """A record by field, from the row of the mission and those of its UAVs."""
+    """A record by field, from the row of the mission and the rows of its UAVs."""
     fields = {name: mission[name] for name in MISSION_RECORD.names or ()}
     for number, uav in enumerate(uavs, 1):
         fields |= {f"uav {number} {name}": uav[name] for name in UAV_RECORD.names or ()}
@@ -101,6 +102,6 @@ def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]
 
 
 def _rows(table: pd.DataFrame, mission: Mapping[str, Any]) -> list[dict[Any, Any]]:
-    """The rows of a mission."""
+    """The rows of a table that belong to a mission."""
     equal = [table[name].to_numpy() == value for name, value in mission.items()]
     return table[np.logical_and.reduce(equal)].to_dict("records")

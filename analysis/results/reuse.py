@@ -1,4 +1,4 @@
-"""Results folders whose missions another study may take over, so that it need not simulate them."""
+"""Find results folders from which a study can copy missions instead of simulating them."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,10 +9,10 @@ from dess import InputError
 
 
 def sources(folders: Iterable[Path], manifest: Manifest) -> list[Store]:
-    """Those of the folders that have cells of a manifest: of the same code, scenarios and seed.
+    """The folders that contain cells of a manifest: same code, scenario, policy and seed.
 
-    A folder that is no results folder is left out, and so is one whose missions were simulated by
-    several versions of the code: the keys of its cells tell of the first version alone.
+    A folder that is not a results folder is left out. So is a folder whose missions were simulated
+    by several versions of the code, because the keys of its cells identify only the first version.
     """
     keys = _keys(manifest)
     return [store for folder in folders if (store := _source(folder, keys))]

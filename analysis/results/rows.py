@@ -14,18 +14,18 @@ def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of the missions of the parts, with the ``point`` of each.
 
     Args:
-        parts: Of one team, all of them in the tables.
-        tables: With the columns ``cell`` and ``replication``.
+        parts: Parts of one team; the tables must contain all of them.
+        tables: Tables with the columns ``cell`` and ``replication``.
 
     Raises:
-        InputError: If two tables have different rows of a mission.
+        InputError: If two tables have different rows for the same mission.
     """
     rows = _wanted(parts).merge(_stacked(tables), on=["cell", "replication"], how="left")
     return rows[["point", *(name for name in tables[0].column_names if name != "cell")]]
 
 
 def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
-    """A row per mission of the parts: its design point, cell and replication."""
+    """A table with the design point, cell and replication of every mission of the parts."""
     lengths = [len(part.replications) for part in parts]
     return pd.DataFrame(
         {
@@ -40,7 +40,7 @@ def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     """The rows of all tables."""
     frame = pa.concat_tables(tables).to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
-    if frame.duplicated(one).any():  # somebody may have put folders together
+    if frame.duplicated(one).any():  # such as after files of two folders were merged
         frame = frame.drop_duplicates()
         if frame.duplicated(one).any():
             raise InputError(

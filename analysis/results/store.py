@@ -1,11 +1,11 @@
-"""A results folder: parquet files named after what they hold, and ``manifest.json``.
+"""A results folder: parquet files that are named by hashes of their content, and a manifest.
 
-``manifest.json`` says what the folder is about. ``missions/`` and ``uavs/`` hold the records in
-chunks, partitioned by policy, ``events/`` the event logs, ``failures/`` what could not be computed.
-A file's name has two parts: a hash of what it holds - cells and replications - and one of its
-bytes, so a run resumes by computing what is missing, and a damaged file counts as missing. A file
-is there whole or not at all. Nothing is pickled, and nothing in the folder depends on when, where,
-in which order or by how many workers it was computed.
+``manifest.json`` describes the study and what it was run with. ``missions/`` and ``uavs/`` contain
+the records in chunks, partitioned by policy; ``events/`` contains event logs, and ``failures/``
+describes what could not be computed. The name of a file has two hashes: of its content (cells and
+replications), and of its bytes. So a run can resume by computing what is missing, and a damaged
+file counts as missing. A file is written completely or not at all. Nothing is pickled. The content
+of the folder does not depend on when, where, in which order or by how many workers it was computed.
 """
 
 import json
@@ -31,7 +31,7 @@ from dess.files import check_folder, replacing, writable
 from dess.record import Records
 
 MANIFEST, LOCK = "manifest.json", ".lock"
-LONG = 150  # characters of a policy in the name of a folder
+LONG = 150  # largest number of characters of a policy's name in the name of a folder
 FOLDERS = ("missions", "uavs", "events", "failures")
 
 
@@ -40,8 +40,8 @@ class Store:
 
     Attributes:
         folder: The folder.
-        manifest: What it is about.
-        damaged: The files that are not what their names say.
+        manifest: The manifest of the folder.
+        damaged: The files whose content is not what their names say.
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
@@ -56,12 +56,12 @@ class Store:
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
         """Open a results folder for a study: a new one, or one that the study completes or extends.
 
-        It stays locked until it is closed, at the end of a ``with`` block.
+        The folder stays locked until the end of the ``with`` block.
 
         Args:
             study: The study.
             out: The folder.
-            accept_code: Whether to go on with missions that other code has simulated.
+            accept_code: Whether to keep missions that were simulated by other code.
 
         Raises:
             InputError: If the folder cannot be written, holds something else, or is in use.
@@ -77,7 +77,8 @@ class Store:
                 allowed = "allowed: another --out, or wait for its end"
                 raise InputError(f"{folder}: in use by another run; {allowed}") from None
         try:
-            store.manifest = _extended(folder, manifest, accept_code)  # a run may have ended here
+            # Read again under the lock, because another run may have ended in the meantime.
+            store.manifest = _extended(folder, manifest, accept_code)
             store._prepare()
         except BaseException:
             store._lock.release()
@@ -86,10 +87,10 @@ class Store:
 
     @classmethod
     def read(cls, out: str | Path) -> Self:
-        """A results folder to load from; nothing is written or locked.
+        """Open a results folder to load from it; nothing is written or locked.
 
         Raises:
-            InputError: If the folder holds none, or one of another version.
+            InputError: If it is not a results folder, or one of another version.
         """
         store = cls(Path(out), Manifest.read(Path(out) / MANIFEST))
         store._scan()
@@ -97,7 +98,7 @@ class Store:
 
     @classmethod
     def peek(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
-        """What ``open`` would find, to count what is missing; nothing is written or locked.
+        """Open a folder only to count which missions are missing; nothing is written or locked.
 
         Raises:
             InputError: If the folder holds something else, or cannot be written.
@@ -114,7 +115,7 @@ class Store:
         self._lock.release()
 
     def _prepare(self) -> None:
-        """Write the manifest, remove what a killed run has left, and scan the folder."""
+        """Write the manifest, remove temporary files of a killed run, and scan the folder."""
         _write(self.folder / MANIFEST, self.manifest.text)
         for name in FOLDERS:
             with writable(self.folder / name):
@@ -127,7 +128,7 @@ class Store:
             self.damaged.pop().unlink()
 
     def _scan(self) -> None:
-        """Learn which missions are there, and which files are damaged."""
+        """Find out which missions are present, and which files are damaged."""
         for team in range(len(self.manifest.policies)):
             uavs, damaged_uavs = parquet.tables_in(self._partition("uavs", team), parquet.UAVS)
             missions, damaged = parquet.tables_in(
@@ -155,7 +156,7 @@ class Store:
         return self.folder / kind / f"policy={policy}"
 
     def missing(self, chunk: Chunk) -> Chunk | None:
-        """What is not there of a chunk, if anything."""
+        """The part of a chunk that is missing; None if all of it is present."""
         parts = tuple(
             Part(part.cell, gap)
             for part in chunk.parts
@@ -164,12 +165,12 @@ class Store:
         return Chunk(chunk.team, parts) if parts else None
 
     def missing_logs(self, cell: Cell, logged: int) -> list[int]:
-        """The first replications, that many, whose event log is not there."""
+        """Those of the first ``logged`` replications whose event log is missing."""
         wanted = range(cell.first, cell.first + logged)
         return [r for r in wanted if self.load_log(cell, r) is None]
 
     def write(self, chunk: Chunk, records: Records) -> None:
-        """Keep the records of a chunk.
+        """Store the records of a chunk.
 
         Raises:
             ValueError: If they are not those of the chunk.
@@ -177,14 +178,14 @@ class Store:
         self._keep(chunk, parquet.tables_of(chunk, records))
 
     def take_over(self, other: "Store", parts: Sequence[Part]) -> None:
-        """Keep those of the missing missions of parts that another folder has.
+        """Copy missing missions of some parts from another folder, as far as it has them.
 
-        Cells of equal keys have equal records, so nothing but time depends on it. A folder that has
-        two different records of a mission gives none.
+        Cells with equal keys have equal records, so this only saves time. Nothing is copied from a
+        folder that has two different records of a mission.
 
         Args:
-            other: The other folder, of any study.
-            parts: Of the study of this folder.
+            other: The other results folder, of any study.
+            parts: Parts of the study of this folder.
         """
         whose = {key: team for team, key in other._present}
         for chunk in split(parts, sum(len(part.replications) for part in parts)):
@@ -206,7 +207,7 @@ class Store:
                 self._present[cell.team, cell.key] += held.get(cell.key, [])
 
     def _shared(self, chunk: Chunk | None, whose: Mapping[str, int]) -> Chunk | None:
-        """What is there of a chunk of another folder, if anything.
+        """The part of a chunk that another folder has; None if it has none of it.
 
         Args:
             chunk: The chunk; its cells have teams and points of the other folder.
@@ -230,13 +231,13 @@ class Store:
         self._failure(chunk).unlink(missing_ok=True)
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
-        """Keep the event log of a replication of a cell."""
+        """Store the event log of a replication of a cell."""
         name = f"{cell.key}-{replication:06}"
         folder = self._partition("events", cell.team)
         self._logs[cell.team, name] = parquet.write(folder, name, pa.table(columns))
 
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
-        """Keep why a chunk could not be computed; its path."""
+        """Store why a chunk could not be computed, and return the path of the file."""
         path = self._failure(chunk)
         _write(path, json.dumps(asdict(failure), indent=2) + "\n")
         return path
@@ -245,7 +246,7 @@ class Store:
         return self.folder / "failures" / f"{chunk.name}.json"
 
     def finish(self, missions: Sequence[Sequence[int]], selected: Sequence[Selected]) -> None:
-        """Note how many missions every team and design point has, and that all of it is there."""
+        """Write into the manifest that all missions are present, and how many there are."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
         _write(self.folder / MANIFEST, self.manifest.text)
@@ -253,9 +254,9 @@ class Store:
             path.unlink()
 
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
-        """The missions of parts of one team, with their ``point``, in the order asked.
+        """The missions of some parts of one team, with their ``point``, in the order of the parts.
 
-        Where the study has prices, they have their ``cost``.
+        If the study has prices, the missions have a ``cost``.
 
         Raises:
             InputError: If some are missing or damaged.
@@ -267,7 +268,7 @@ class Store:
         return missions
 
     def uavs(self, parts: Sequence[Part]) -> pd.DataFrame:
-        """The UAVs of the same missions, in this order.
+        """The UAVs of these missions, in the same order.
 
         Raises:
             InputError: If some are missing or damaged.
@@ -275,7 +276,7 @@ class Store:
         return rows_of(parts, [tables.uavs for tables in self._tables_with(parts)])
 
     def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
-        """The metrics of the missions of every part of one team.
+        """For each part of one team, the metrics of its missions.
 
         Raises:
             InputError: If some are missing or damaged.
@@ -286,7 +287,7 @@ class Store:
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
     def _tables_with(self, parts: Sequence[Part]) -> list[parquet.Tables]:
-        """The tables of a team, all of whose parts are present."""
+        """The tables that contain parts of one team, all of which must be present."""
         for part in parts:
             present = self._present[part.cell.team, part.cell.key]
             for gap in gaps(part.replications, present)[:1]:
@@ -320,10 +321,10 @@ class Store:
 
 
 def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
-    """The manifest of a folder that is to hold this study.
+    """The manifest for a folder into which this study will be written.
 
     Raises:
-        InputError: If it holds something else.
+        InputError: If the folder contains something else.
     """
     path = folder / MANIFEST
     with writable(folder):
@@ -340,11 +341,11 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write a file, whole or not at all."""
+    """Write a file completely or not at all."""
     with replacing(path) as temporary, writable(path):
         temporary.write_text(text, "utf-8")
 
 
 def _is_ours(path: Path) -> bool:
-    """Whether a run may have made it before the manifest was there."""
+    """Whether a run may have made this file or folder before it wrote the manifest."""
     return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")

@@ -1,4 +1,4 @@
-"""What a study found: a results folder as tables, loaded whole."""
+"""The results of a study as tables: load a complete results folder."""
 
 import json
 from collections.abc import Mapping
@@ -25,15 +25,15 @@ class Results:
     """The results of a study.
 
     Attributes:
-        store: The folder that they come from.
-        missions: A row per mission: ``policy``, ``point`` (number of the design point), the fields
-            that the design sets and no record has, and those of ``MISSION_RECORD``; in the order
-            of policy (as the study names them), point and replication.
-            Where the study has prices, ``cost`` is the last column.
-        uavs: A row per UAV of each: ``policy``, ``point``, ``replication``, ``uav`` and the fields
-            of ``UAV_RECORD``, with the name of its ``end``.
-        checks: Missions, as above, of the design points that were selected; others than those that
-            selected them. Empty if the study selects none.
+        store: The results folder.
+        missions: One row per mission: ``policy``, ``point`` (number of the design point), the
+            fields that the design sets and that are not in the record, and the fields of
+            ``MISSION_RECORD``. Rows are in the order of the policies in the study, then of point
+            and replication. If the study has prices, ``cost`` is the last column.
+        uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
+            the fields of ``UAV_RECORD``, with ``end`` as a name.
+        checks: Further missions, in rows as above, of the design points that were selected; the
+            selection was not based on them. Empty if the study selects nothing.
     """
 
     store: Store
@@ -43,7 +43,7 @@ class Results:
 
     @property
     def manifest(self) -> dict[str, Any]:
-        """What the results are about, as plain data."""
+        """The manifest of the results, as plain data."""
         return self.store.manifest.data
 
     @cached_property
@@ -59,7 +59,7 @@ class Results:
         """The event log of a mission, with the columns of ``dess.record.EventLog``.
 
         Raises:
-            InputError: If it has not been kept.
+            InputError: If it has not been stored.
         """
         cell = self.cell(policy, point)
         log = self.store.load_log(cell, replication)
@@ -76,12 +76,12 @@ class Results:
         return self.store.manifest.command(self.cell(policy, point), replication)
 
     def choice(self, policy: str) -> Choice | None:
-        """The design point that was selected for a policy as the best, and what is known of it."""
+        """The design point that was selected as the best for a policy, with its guarantee."""
         rule = self.store.manifest.selection
         return rule.choice(self._samples(policy)) if isinstance(rule, Selection) else None
 
     def cheapest(self, policy: str) -> CheapestChoice | None:
-        """The cheapest settings of a policy that meet the requirements, if a study selects them."""
+        """The cheapest settings of a policy that meet the requirements of the study."""
         manifest = self.store.manifest
         if not isinstance(manifest.selection, Cheapest):
             return None
@@ -92,7 +92,7 @@ class Results:
         return self.store.samples(parts_of(manifest, self.policies.index(policy)))
 
     def cell(self, policy: str, point: int) -> Cell:
-        """A policy at a design point; its key is a hash of all that its records depend on.
+        """The cell of a policy at a design point, with its key.
 
         Raises:
             InputError: If the study has no such policy or point.
@@ -110,7 +110,8 @@ def load_results(out: str | Path) -> Results:
     """Load the results of a study.
 
     Raises:
-        InputError: If the folder holds none, or they are incomplete, damaged or of another version.
+        InputError: If it is not a results folder, or the results are incomplete, damaged or of
+            another version.
     """
     return results_of(Store.read(out))
 
@@ -136,14 +137,14 @@ def results_of(store: Store) -> Results:
 
 
 def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """The tables of all policies as one, with ``policy`` in front."""
+    """The tables of all policies as one table, whose first column is ``policy``."""
     table = pd.concat(tables.values(), ignore_index=True)
     table.insert(0, "policy", np.repeat([*tables], [len(rows) for rows in tables.values()]))
     return table
 
 
 def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
-    """Missions of all policies, with what the design sets that no record has."""
+    """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
     for position, (field, values) in enumerate(_swept(manifest).items(), 2):
         table.insert(position, field, table["point"].map(dict(enumerate(values))))
@@ -153,7 +154,7 @@ def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.Da
 def _swept(manifest: Manifest) -> dict[str, list[Any]]:
     """The fields that the design sets and no record has, by design point.
 
-    As JSON text where some are lists; none where a design point does not set it.
+    Values are JSON text where some of them are lists, and None where a point does not set a field.
     """
     designs = [point.values for point in manifest.points]
     fields = dict.fromkeys(field for design in designs for field in design)

@@ -171,8 +171,8 @@ class Precision(StrictTable):
         enough = self.budget if stop is None else min(stop, self.budget)
         count = self.first
         while count < enough and count <= len(excess):
-            # It takes some count * excess^2 missions. Sums of squares can only grow, so that
-            # count * excess, less, does not lead past an absolute target.
+            # About count * excess^2 missions are needed. We ask for count * excess, which is less
+            # and never too many for an absolute target, because sums of squares can only grow.
             ahead = int(count * min(excess[count - 1], _GROWTH))
             certain = int(last_miss[count - 1]) + 1 + self.look_ahead
             count = min(max(ahead, certain), self.budget)

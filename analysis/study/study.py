@@ -142,7 +142,7 @@ class Study(StrictTable):
         for row in rows:
             if both := sorted(self.set.keys() & row.values.keys()):
                 raise InputError(f"design: {both[0]} is also in set; allowed: either")
-        if hasattr(self.design, "ranges"):  # drawn integers may well fall together
+        if hasattr(self.design, "ranges"):  # sampled integers may be equal by chance
             return
         for shown, count in Counter(_shown(row.values) for row in rows).items():
             if count > 1:

@@ -121,7 +121,7 @@ OTHERS = {
     "holds study trial, not other": {"name": "other"},
     "holds other scenarios": {"set": {"quota": 50}},
     "holds other scenarios than": {"design": grid(uavs=[1, 2])},
-    "holds policy random, which study trial has not": {"policies": ["greedy", "tour"]},
+    "holds policy random, which study trial does not have": {"policies": ["greedy", "tour"]},
 }
 
 
@@ -257,7 +257,7 @@ def test_a_run_that_was_killed_leaves_no_lock(tmp_path):
 RECORDS = {
     "other replications": ("replication", 3, "not of the replications"),
     "another seed": ("seed", 8, "not of seed 7"),
-    "no number": ("reward", float("nan"), "a reward that is no number"),
+    "no number": ("reward", float("nan"), "a reward that is not a number"),
 }
 
 
@@ -330,7 +330,7 @@ def test_a_manifest_that_makes_no_sense(field, out):
 def test_a_manifest_whose_study_makes_no_sense(part, out):
     study = json.loads((out / "manifest.json").read_text())["study"]
     _rewrite(out, study=study | {part: 3})
-    with pytest.raises(InputError, match=f"study: has a {part} that is none"):
+    with pytest.raises(InputError, match=f"study: has an invalid {part}"):
         load_results(out)
 
 
