@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 
 import typer.main
 from mkdocs.config.defaults import MkDocsConfig
-from mkdocs.structure.files import File, Files
+from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
@@ -113,7 +113,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             pending += new
     for path in sorted(seen):
         if not path.startswith("docs/"):
-            files.append(File.generated(config, place(path), content=shown(path)))
+            page = File.generated(
+                config, place(path), content=shown(path), inclusion=InclusionLevel.NOT_IN_NAV
+            )
+            files.append(page)
     return files
 
 

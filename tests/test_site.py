@@ -1,4 +1,4 @@
-"""The documentation as a site: it builds strictly, and a browser opens it from a folder, offline."""
+"""The documentation as a site: it builds strictly, and a browser opens it offline."""
 
 import shutil
 import subprocess
