@@ -49,6 +49,26 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
         _ends(shifted, uav, colour, ax)
 
 
+def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
+    """The grid and its zone, without nodes; y grows south."""
+    x, y, width, height = scenario.zone
+    zone = Rectangle(
+        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, zorder=1
+    )
+    ax.set_facecolor(style.SEA)
+    ax.grid(False)
+    ax.add_patch(zone)
+    ax.set(
+        aspect="equal",
+        xlim=(-0.5, scenario.grid - 0.5),
+        ylim=(scenario.grid - 0.5, -0.5),
+        xlabel=f"x, east [cells of {scenario.cell_size:g} m]",
+        ylabel="y, south [cells]",
+    )
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
+
+
 def battery(events: Events, scenario: Scenario, ax: Axes) -> None:
     """Battery [%] of every UAV over time, with the thresholds C_S and C_C of charging."""
     levels = battery_levels(events)
@@ -141,26 +161,11 @@ def _outcome(events: Events, scenario: Scenario) -> str:
 
 
 def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
-    """The grid, its zone and its nodes; y grows south."""
-    x, y, width, height = scenario.zone
-    zone = Rectangle(
-        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, zorder=1
-    )
-    ax.set_facecolor(style.SEA)
-    ax.grid(False)
-    ax.add_patch(zone)
+    """The grid, its zone and its nodes."""
+    chart(scenario, ax)
     nodes = np.array(scenario.nodes)
     ax.scatter(nodes[:, 0], nodes[:, 1], c=style.node_colours(len(nodes)), s=95,
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
-    ax.set(
-        aspect="equal",
-        xlim=(-0.5, scenario.grid - 0.5),
-        ylim=(scenario.grid - 0.5, -0.5),
-        xlabel=f"x, east [cells of {scenario.cell_size:g} m]",
-        ylabel="y, south [cells]",
-    )
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
 
 
 def _trail(slots: pd.DataFrame, colour: str, ax: Axes) -> None:

@@ -1,7 +1,9 @@
-"""``dess simulate``: one mission, its event log and its picture."""
+"""``dess simulate``: one mission, its event log, its picture and its animation."""
 
 import json
+from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,10 +14,13 @@ from reports.cli import console
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 
 if TYPE_CHECKING:
-    from dess import ScenarioSpace
-    from dess.record import EventLog, MissionRecord
+    import numpy as np
+
+    from dess.record import MissionRecord
+    from dess.scenario import Scenario
 
 FIGURES = (".png", ".pdf", ".svg")
+ANIMATIONS = (".gif", ".mp4", ".html")
 # Metrics of ``--json``, between the names and the UAVs.
 METRICS = (
     "slots",
@@ -46,27 +51,39 @@ def simulate(
     figure: Annotated[
         Path | None, typer.Option(metavar="FILE.png", help="Draw the mission.")
     ] = None,
+    animation: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.gif",
+            help="Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a page "
+            "with its player.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate one mission with the SimPy model."""
     from dess import simulate
     from dess.files import replacing
-    from dess.state import check_seed
+    from dess.state import check_seed, sample_scenario
     from policies import load_team
 
     space, team = load_space(scenario, settings), load_team(policy)
     check_seed(seed, replication)
-    if figure and figure.suffix not in FIGURES:
-        raise InputError(f"--figure: {figure} is no picture; allowed: {', '.join(FIGURES)}")
+    _check_suffix("--figure", figure, FIGURES, "picture")
+    _check_suffix("--animation", animation, ANIMATIONS, "animation")
+    if animation and animation.suffix == ".mp4":
+        from reports.player.animation import check_ffmpeg
+
+        check_ffmpeg()
+    writers = {events: _write_log, figure: _draw, animation: _animate}
+    title = f"{policy}, scenario {Path(scenario).stem}, replication {replication} of seed {seed}"
     with ExitStack() as files:
-        log_file = files.enter_context(replacing(events)) if events else None
-        figure_file = files.enter_context(replacing(figure)) if figure else None
+        written = {path: files.enter_context(replacing(path)) for path in writers if path}
         with console.compile_notice():
-            record = simulate(space, team, seed, replication, events=bool(log_file or figure_file))
-        if log_file and record.events:
-            _write_log(record.events, log_file)
-        if figure and figure_file and record.events:
-            _draw(record, space, figure_file, figure.suffix[1:])
+            record = simulate(space, team, seed, replication, events=bool(written))
+        mission = _Mission(record, sample_scenario(space, seed, replication), title)
+        for path, temporary in written.items():
+            writers[path](mission, temporary, path.suffix[1:])
     if as_json:
         names = {"policy": policy, "scenario": scenario, "seed": seed, "replication": replication}
         metrics = {key: getattr(record, key) for key in METRICS}
@@ -75,22 +92,58 @@ def simulate(
         _print_mission(record)
 
 
-def _write_log(log: "EventLog", path: Path) -> None:
+def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
+    if path and path.suffix not in allowed:
+        raise InputError(f"{option}: {path} is no {kind}; allowed: {', '.join(allowed)}")
+
+
+@dataclass(frozen=True)
+class _Mission:
+    """A simulated mission to write into files: its record with its event log, and its names."""
+
+    record: "MissionRecord"
+    scenario: "Scenario"
+    title: str
+
+    @property
+    def log(self) -> "dict[str, np.ndarray]":
+        assert self.record.events is not None
+        return self.record.events.columns()
+
+    @property
+    def outcome(self) -> str:
+        from analysis.numbers import percent
+
+        ends = [uav["end"] for uav in self.record.uav_rows()]
+        return (
+            f"{percent(self.record.collection_ratio)} of the data collected in "
+            f"{self.record.slots} mission slots; {ends.count('quota')} of {len(ends)} UAVs filled "
+            "their quota."
+        )
+
+
+def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    pq.write_table(pa.table(log.columns()), path)
+    pq.write_table(pa.table(mission.log), path)
 
 
-def _draw(record: "MissionRecord", space: "ScenarioSpace", path: Path, kind: str) -> None:
-    import pandas as pd
-
+def _draw(mission: _Mission, path: Path, kind: str) -> None:
     from analysis.figures.missions import mission_figure
-    from dess.state import sample_scenario
 
-    assert record.events is not None
-    scenario = sample_scenario(space, record.seed, record.replication)
-    mission_figure(pd.DataFrame(record.events.columns()), scenario).savefig(path, format=kind)
+    mission_figure(mission.log, mission.scenario).savefig(path, format=kind)
+
+
+def _animate(mission: _Mission, path: Path, kind: str) -> None:
+    from reports.pages.mission import mission_page
+    from reports.player.animation import write_animation
+
+    if kind == "html":
+        page = mission_page(mission.log, mission.scenario, mission.title, mission.outcome)
+        path.write_text(page, "utf-8")
+    else:
+        write_animation(mission.log, mission.scenario, path, kind, mission.title)
 
 
 def _print_mission(record: "MissionRecord") -> None:

@@ -108,7 +108,7 @@ def _uavs(playback: Playback) -> Moving:
 
 
 def _status(playback: Playback) -> Moving:
-    """A line of text above the map: residual data, and the pads in use."""
+    """A line of text above the map."""
     style = {
         **markers("status", STATUS, mode="text"),
         "x": [0],
@@ -116,12 +116,17 @@ def _status(playback: Playback) -> Moving:
         "textposition": "middle right",
         "textfont": {"size": 13},
     }
-    left, frames = playback.residual.sum(axis=1), []
+    return Moving(style, [{"text": [text]} for text in statuses(playback)])
+
+
+def statuses(playback: Playback) -> list[str]:
+    """Residual data and the pads in use after every slot, in words."""
+    left, texts = playback.residual.sum(axis=1), []
     for data, (charging, waiting) in zip(left, playback.rows("charging", "waiting"), strict=True):
         queue = f", {sum(waiting)} waiting" if any(waiting) else ""
         pads = f"{sum(charging)} of {counted(playback.pads, 'pad')} in use{queue}"
-        frames.append({"text": [f"{data:.0f} data units left · {pads}"]})
-    return Moving(style, frames)
+        texts.append(f"{data:.0f} data units left · {pads}")
+    return texts
 
 
 def counted(count: int, what: str) -> str:

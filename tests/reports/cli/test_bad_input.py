@@ -26,6 +26,8 @@ BAD = {
     "simulate --events none/log.parquet": ["none/log.parquet: cannot be written"],
     "simulate --events .": ["is a folder"],
     "simulate --figure mission.txt": ["mission.txt", ".png, .pdf, .svg"],
+    "simulate --animation mission.png": ["mission.png is no animation", ".gif, .mp4, .html"],
+    "simulate --animation none/mission.gif": ["none/mission.gif: cannot be written"],
     "simulate --replication one": ["--replication", "integer"],
     "evaluate": ["--policy"],
     "evaluate --policy greedy --missions 0": ["--missions", "1"],

@@ -66,6 +66,27 @@ def test_the_event_log_and_the_figure(dess, tmp_path):
     assert len(files_of(tmp_path)) == 4  # with the scenario and the study
 
 
+def test_animations_are_written_by_their_suffix(dess, tmp_path):
+    for name in ("mission.gif", "mission.html"):
+        command = ("simulate", "--scenario", "small.toml", "--animation")
+        assert dess(*command, name)[0] == dess(*command, f"again-{name}")[0] == 0
+        assert (tmp_path / name).read_bytes() == (tmp_path / f"again-{name}").read_bytes()
+    assert (tmp_path / "mission.gif").read_bytes().startswith(b"GIF89a")
+    page = (tmp_path / "mission.html").read_text("utf-8")
+    assert "<h1>greedy, scenario small, replication 0 of seed 0</h1>" in page
+    assert "% of the data collected in" in page and 'id="mission"' in page
+    assert len(files_of(tmp_path)) == 6  # with the scenario and the study
+
+
+def test_a_video_needs_ffmpeg(dess, tmp_path, monkeypatch):
+    monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
+    before = files_of(tmp_path)
+    code, out, err = dess("simulate", "--animation", "mission.mp4")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "animation: .mp4 needs the program ffmpeg, which is not installed; allowed" in err
+    assert files_of(tmp_path) == before
+
+
 def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt

@@ -1,0 +1,101 @@
+"""An animation shows the state of a mission after every slot, in few bytes, always the same."""
+
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.animation import FFMpegWriter
+from PIL import Image
+
+import dess
+import policies
+from analysis.figures import style
+from analysis.results.event_log import residual_data, uav_slots
+from dess import InputError
+from dess.scenario import Scenario
+from dess.state import sample_scenario
+from reports.player.animation import (
+    GIF,
+    LAST_SECONDS,
+    MP4,
+    SLOTS_PER_SECOND,
+    write_animation,
+)
+from reports.player.film import Film
+
+
+@pytest.fixture(scope="module")
+def mission() -> tuple[pd.DataFrame, Scenario]:
+    """Three UAVs that wait for one pad; the battery of one is depleted before the others end."""
+    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1])
+    record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
+    assert record.events is not None
+    return pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
+
+
+def test_every_slot_is_shown(mission: tuple[pd.DataFrame, Scenario]) -> None:
+    log, scenario = mission
+    slots, residual = uav_slots(log), residual_data(log)
+    with style.look():
+        film = Film(log, scenario)
+    seen = set()
+    for slot in range(film.end + 1):
+        film.show(slot)
+        now = slots[slots["slot"] == slot - 1]
+        places = _part(film, "UAVs").get_offsets()
+        assert np.array_equal(places[now["uav"]], now[["x", "y"]])
+        for state in ("charging", "waiting"):
+            of_state = now.loc[now[state], ["x", "y"]]
+            assert np.array_equal(_part(film, state).get_offsets(), of_state.to_numpy())
+            seen |= {state} if len(of_state) else set()
+        areas, data = _part(film, "nodes").get_sizes(), residual.iloc[slot].clip(lower=0)
+        assert np.allclose(areas / areas.max(), data / data.max())
+        text = _part(film, "status").get_text()
+        assert text.startswith(f"slot {slot} of {film.end} · {data.sum():.0f} data units left · ")
+    assert seen == {"charging", "waiting"}
+
+
+def _part(film: Film, name: str) -> Any:
+    (part,) = film.figure.findobj(lambda artist: artist.get_gid() == name)
+    return part
+
+
+def test_a_gif_has_a_frame_per_slot_and_holds_the_last(
+    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
+) -> None:
+    for name in "ab":
+        write_animation(*mission, tmp_path / name, GIF, "greedy")
+    content = (tmp_path / "a").read_bytes()
+    assert content == (tmp_path / "b").read_bytes()
+    assert len(content) < 1e6
+    times = []
+    with Image.open(tmp_path / "a", formats=["GIF"]) as picture:
+        for number in range(picture.n_frames):
+            picture.seek(number)
+            times.append(picture.info["duration"])
+    end = int(mission[0]["time"].max())
+    assert sum(times) == 1000 * (end + 1) / SLOTS_PER_SECOND + 1000 * LAST_SECONDS
+    assert times[-1] > 1000 * LAST_SECONDS
+
+
+def test_a_video_without_ffmpeg_is_refused(
+    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    with pytest.raises(InputError, match="needs the program ffmpeg, which is not installed"):
+        write_animation(*mission, tmp_path / "mission.mp4", MP4)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.skipif(not FFMpegWriter.isAvailable(), reason="no ffmpeg on this machine")
+def test_a_video_has_a_frame_per_slot(
+    mission: tuple[pd.DataFrame, Scenario], tmp_path: Path
+) -> None:
+    write_animation(*mission, tmp_path / "mission", MP4)
+    program = [FFMpegWriter.bin_path(), "-i", str(tmp_path / "mission"), "-f", "null", "-"]
+    told = subprocess.run(program, capture_output=True, text=True, check=True).stderr
+    frames = int(mission[0]["time"].max()) + 1 + LAST_SECONDS * SLOTS_PER_SECOND
+    assert f"frame={frames:5}" in told
