@@ -13,7 +13,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dess.errors import InputError
+from dess.errors import InputError, one_of
 
 
 class Shipped(NamedTuple):
@@ -57,8 +57,8 @@ class Shipped(NamedTuple):
         try:
             return text, parse_toml(Path(text).read_text("utf-8"), text)
         except FileNotFoundError:
-            allowed = f"{', '.join(self.names())}, or a TOML file"
-            raise InputError(f"{text}: no such {self.kind}; allowed: {allowed}") from None
+            allowed = one_of(text, self.names(), "a TOML file")
+            raise InputError(f"{text}: no such {self.kind}{allowed}") from None
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{text}: cannot be read: {error}") from None
 

@@ -19,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess.errors import InputError
+from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.sea import Cell, nodes_in
 
@@ -33,9 +33,6 @@ SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 
 # Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
 _CHANNEL_LIMIT = 2**30
-
-# Pydantic's error types for a malformed pair or list of cells; we print a clearer message instead.
-_WRONG_FORM = ("tuple_type", "missing", "too_long")
 
 # A strict integer: 2.0, true and "2" are refused.
 Integer = Annotated[int, Field(strict=True)]
@@ -265,8 +262,7 @@ class ScenarioSpace(_Constants):
             **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
         }
         if field not in self.numeric:
-            allowed = ", ".join(self.numeric)
-            raise InputError(f"field: {field!r} is no number; allowed: {allowed}")
+            raise InputError(f"field: {field!r} is no number{one_of(field, self.numeric)}")
         if field in bounded:
             return bounded[field]
         metadata = ScenarioSpace.model_fields[field].metadata
@@ -305,42 +301,11 @@ def scenario_names() -> list[str]:
     return _SCENARIOS.names()
 
 
-def validation_line(
-    error: ValidationError, where: str, model: type[BaseModel] | None = None
-) -> str:
-    """The first error of pydantic as one line: place, key, problem and allowed values.
-
-    Args:
-        error: The errors.
-        where: Name or path of the input.
-        model: The model whose fields are allowed; not needed for scenarios.
-    """
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    message = first["msg"].removeprefix("Value error, ")
-    models: dict[str, type[BaseModel]] = {"ScenarioSpace": ScenarioSpace, "Scenario": Scenario}
-    model = model or models.get(error.title)
-    fields = model.model_fields if model else {}
-    if first["type"] == "extra_forbidden":
-        allowed = f"; allowed: {', '.join(sorted(fields))}" if fields else ""
-        return f"{where}: {key}: unknown key{allowed}"
-    if first["type"] == "value_error":
-        return f"{where}: {key + ': ' if key else ''}{message}"
-    field = fields.get(key.partition(".")[0])
-    if field and first["type"] == "missing" and len(first["loc"]) == 1:
-        return f"{where}: {key}: is missing; allowed: {field.description}"
-    if field and first["type"] in _WRONG_FORM:
-        return (
-            f"{where}: {key}: {first['input']!r} has the wrong form; allowed: {field.description}"
-        )
-    return f"{where}: {key}: {message}, not {first['input']!r}"
-
-
 def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        raise InputError(validation_line(error, where)) from None
+        raise InputError(validation_line(error, where, model)) from None
 
 
 def _tuples(value: Any) -> Any:

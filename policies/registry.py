@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from dess.errors import InputError
+from dess.errors import InputError, one_of
 from policies.base import Policy
 
 GROUP = "dess.policies"
@@ -68,8 +68,7 @@ def load(name: str | Path) -> Policy:
     outside = _outside()
     if name not in outside:
         raise InputError(
-            f"policy: {name!r} is unknown; allowed: {', '.join(names())}, "
-            "or the folder of a trained policy"
+            f"policy: {name!r} is unknown{one_of(name, names(), 'the folder of a trained policy')}"
         )
     try:
         policy = outside[name].load()()

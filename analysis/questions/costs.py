@@ -23,7 +23,7 @@ from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import PARTS, Costs
-from dess import InputError
+from dess.errors import InputError, one_of
 
 MET, MISSED, OPEN = "met", "missed", "open"
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # in tables
@@ -84,7 +84,7 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
         InputError: If the study has no prices, or there is no such metric.
     """
     if metric not in METRICS:
-        raise InputError(f"metric: {metric!r} is unknown; allowed: {', '.join(METRICS)}")
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, METRICS)}")
     generator = np.random.default_rng(results.store.manifest.seed)
     tables = []
     for _, rows in priced(results).groupby("condition", sort=False):
@@ -318,7 +318,7 @@ def _checked(requirements: Mapping[str, float] | None) -> Mapping[str, float]:
         raise InputError("requirements: none are given; allowed: metric -> least mean")
     for metric, least in requirements.items():
         if metric not in METRICS:
-            raise InputError(f"requirements: {metric!r} is unknown; allowed: {', '.join(METRICS)}")
+            raise InputError(f"requirements: {metric!r} is unknown{one_of(metric, METRICS)}")
         if not 0 < least < 1:
             raise InputError(f"requirements: {metric}: {least}; allowed: between 0 and 1")
     return requirements

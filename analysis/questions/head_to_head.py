@@ -24,7 +24,7 @@ from analysis.stats.correction import for_choice
 from analysis.stats.intervals import wilson
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_by_test
-from dess import InputError
+from dess.errors import InputError, one_of
 
 AHEAD, BEHIND = "ahead", "behind"
 OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
@@ -64,8 +64,8 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     """
     for name, given in (("learned", learned), ("heuristic", heuristic)):
         if given is not None and given not in results.policies:
-            allowed = ", ".join(results.policies)
-            raise InputError(f"{name}: {given!r} is not in the study; allowed: {allowed}")
+            allowed = one_of(given, results.policies)
+            raise InputError(f"{name}: {given!r} is not in the study{allowed}")
     trained, baselines = _ranked(results)
     firsts = [trainings[0] for trainings in trained]
     if not firsts or not baselines:

@@ -21,7 +21,7 @@ from analysis.stats.correction import adjust
 from analysis.stats.differences import column_tests
 from analysis.stats.intervals import column_intervals
 from analysis.stats.screening import may_be_best
-from dess import InputError
+from dess.errors import InputError, one_of
 
 AS_IT_IS = "the scenario"  # a design point in words, where nothing is varied
 MOST_VALUES, BINS = 12, 5  # a field with more numbers than that has its main effect in bins
@@ -133,8 +133,8 @@ def averaged(
     """
     table = points(results)
     if unknown := [field for field in by if field not in table]:
-        allowed = ", ".join(map(str, table)) or "none"
-        raise InputError(f"{unknown[0]}: has not several values in the study; allowed: {allowed}")
+        allowed = one_of(unknown[0], map(str, table))
+        raise InputError(f"{unknown[0]}: has not several values in the study{allowed}")
     return _averaged(results, table[[*by]], metric, policy)
 
 
@@ -250,7 +250,7 @@ def check_metric(results: Results, metric: str) -> None:
     """Raise ``InputError`` if missions have no such metric."""
     known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in results.missions]
     if metric not in known:
-        raise InputError(f"metric: {metric!r} is unknown; allowed: {', '.join(known)}")
+        raise InputError(f"metric: {metric!r} is unknown{one_of(metric, known)}")
 
 
 def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame:
@@ -264,8 +264,8 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
     if policy is None:
         return missions
     if policy not in results.policies:
-        allowed = ", ".join(results.policies)
-        raise InputError(f"policy: {policy!r} is not in the study; allowed: {allowed}")
+        allowed = one_of(policy, results.policies)
+        raise InputError(f"policy: {policy!r} is not in the study{allowed}")
     return missions[missions["policy"] == policy]
 
 

@@ -7,8 +7,7 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 import dess
-from dess import InputError
-from dess.scenario import validation_line
+from dess.errors import InputError, validation_line
 
 _VERSIONS = ("version", "schema_version")
 
@@ -38,7 +37,8 @@ class Document(BaseModel):
         try:
             return cls.model_validate_json(text)
         except ValidationError as error:
-            raise InputError(f"{validation_line(error, where)}; {allowed}") from None
+            problem = validation_line(error, where, cls).partition("; allowed:")[0]
+            raise InputError(f"{problem}; {allowed}") from None
 
     @classmethod
     def load(cls, path: Path, schema: int, absent: str, allowed: str) -> Self:

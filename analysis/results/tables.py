@@ -15,7 +15,7 @@ from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
 from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.selection import Choice, Selection
-from dess import InputError
+from dess.errors import InputError, one_of
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
 
@@ -98,8 +98,9 @@ class Results:
             InputError: If the study has no such policy or point.
         """
         if policy not in self.policies:
-            allowed = ", ".join(self.policies)
-            raise InputError(f"policy: {policy!r} is not in the study; allowed: {allowed}")
+            raise InputError(
+                f"policy: {policy!r} is not in the study{one_of(policy, self.policies)}"
+            )
         points = len(self.store.manifest.points)
         if not 0 <= point < points:
             raise InputError(f"point: {point} is not in the study; allowed: 0..{points - 1}")

@@ -15,7 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis.names import MEANS, SHARES
-from dess import InputError
+from dess.errors import InputError, one_of
 
 LEVEL = 0.95
 
@@ -114,7 +114,7 @@ def check_columns(missions: pd.DataFrame, needed: Sequence[str]) -> None:
     """Raise ``InputError`` if a needed column is missing."""
     for name in needed:
         if name not in missions:
-            raise InputError(f"{name}: no such column; allowed: {', '.join(missions.columns)}")
+            raise InputError(f"{name}: no such column{one_of(name, missions.columns)}")
 
 
 def check_share(name: str, share: float) -> None:

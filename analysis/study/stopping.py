@@ -15,7 +15,8 @@ from pydantic import (
 )
 from scipy.special import ndtri, stdtrit
 
-from dess.scenario import Integer, Number, validation_line
+from dess.errors import one_of, validation_line
+from dess.scenario import Integer, Number
 
 Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
 
@@ -47,7 +48,7 @@ def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
             return value
         kind = value.get(key)
         if not isinstance(kind, str) or kind not in kinds:
-            raise ValueError(f"{key}: {kind!r} is unknown; allowed: {', '.join(kinds)}")
+            raise ValueError(f"{key}: {kind!r} is unknown{one_of(kind, kinds)}")
         try:
             return kinds[kind].model_validate(value)
         except ValidationError as error:

@@ -19,15 +19,9 @@ from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.stopping import MOST, Precision, StrictTable
-from dess import InputError
+from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
-from dess.scenario import (
-    Integer,
-    ScenarioSpace,
-    load_scenario,
-    scenario_names,
-    validation_line,
-)
+from dess.scenario import Integer, ScenarioSpace, load_scenario, scenario_names
 from dess.streams import MAX_SEED
 from policies import load_team
 
@@ -232,12 +226,13 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
         values["scenario"] = str(Path(text).parent / scenario)
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
-        allowed = ", ".join(Study.model_fields)
-        raise InputError(f"{where}: {unknown[0]}: unknown key; allowed: {allowed}")
+        raise InputError(
+            f"{where}: {unknown[0]}: unknown key{one_of(unknown[0], Study.model_fields)}"
+        )
     try:
         study = Study.model_validate(values)
     except ValidationError as error:
-        raise InputError(validation_line(error, where)) from None
+        raise InputError(validation_line(error, where, Study)) from None
     except InputError as error:  # of a design point's scenario
         raise InputError(f"{where}: {error}") from None
     study._origin = (text, overrides)

@@ -32,9 +32,9 @@ from analysis.study.cheapest import Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Grid
 from analysis.study.study import Study
-from dess import InputError
+from dess.errors import InputError, one_of, validation_line
 from dess.files import replacing, writable
-from dess.scenario import ScenarioSpace, load_scenario, scenario_names, validation_line
+from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 
 FOLDER = "sweeps"
 LONGEST = 60  # characters of the fields in a name
@@ -74,8 +74,9 @@ def question(
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
     """
     if unknown := [key for key in prices or () if key not in Costs.model_fields]:
-        allowed = ", ".join(Costs.model_fields)
-        raise InputError(f"prices: {unknown[0]!r} is unknown; allowed: {allowed}")
+        raise InputError(
+            f"prices: {unknown[0]!r} is unknown{one_of(unknown[0], Costs.model_fields)}"
+        )
     fixed = {field: of_field[0] for field, of_field in values.items() if len(of_field) == 1}
     swept = {field: of_field for field, of_field in values.items() if len(of_field) > 1}
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
@@ -192,8 +193,8 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
     for metric, share in requirements.items():
         full = ALIASES.get(metric, metric)
         if full not in METRICS:
-            allowed = ", ".join([*METRICS, *ALIASES])
-            raise InputError(f"requirements: {metric!r} is unknown; allowed: {allowed}")
+            allowed = one_of(metric, [*METRICS, *ALIASES])
+            raise InputError(f"requirements: {metric!r} is unknown{allowed}")
         least[full] = share
     spaces = _spaces(study)
     fleet = prices.uav * max(space.uavs[1] for space in spaces)

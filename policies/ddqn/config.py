@@ -18,9 +18,9 @@ from pydantic import (
     model_validator,
 )
 
-from dess.errors import InputError
+from dess.errors import InputError, validation_line
 from dess.files import Shipped
-from dess.scenario import load_scenario, validation_line
+from dess.scenario import load_scenario
 
 _CONFIGS = Shipped("config", "policies.ddqn", "configs")
 
@@ -167,10 +167,7 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
     try:
         return TrainingConfig.model_validate(values)
     except ValidationError as error:
-        nested = error.errors()[0]["loc"][:1] == ("phases",)
-        raise InputError(
-            validation_line(error, where, Phase if nested else TrainingConfig)
-        ) from None
+        raise InputError(validation_line(error, where, TrainingConfig)) from None
 
 
 def learner_of(config: TrainingConfig) -> str:

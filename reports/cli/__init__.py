@@ -12,8 +12,6 @@ from typer.exceptions import TyperException
 from dess import InputError
 from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
 
-INTERRUPTED = 130  # what typer returns after Ctrl-C
-
 app = typer.Typer(
     help="Discrete-event simulation of UAV data harvesting with charging at sea.",
     add_completion=False,
@@ -32,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arguments: Without the name of the program; those of the process by default.
 
     Returns:
-        The exit code: 0 done, 2 bad input, 1 anything else.
+        The exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else.
     """
     try:
         code = app(arguments, prog_name="dess", standalone_mode=False)
@@ -42,10 +40,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return console.fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
     except InputError as error:
         return console.fail(f"dess: error: {error}", 2)
+    except console.Interruption as interruption:
+        return console.fail(str(interruption), console.INTERRUPTED)
     except SystemError as error:
         from analysis.execution.jobs import was_interrupted
 
         if not was_interrupted(error):
             raise
-        return console.fail("interrupted", 1)
-    return console.fail("interrupted", 1) if code == INTERRUPTED else code or 0
+        code = console.INTERRUPTED
+    # Typer returns the same number for a Ctrl-C that no command has caught.
+    return console.fail("interrupted", code) if code == console.INTERRUPTED else code or 0

@@ -5,6 +5,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+INTERRUPTED = 130  # the exit code after Ctrl-C, as shells and typer have it: 128 + SIGINT
+
+
+class Interruption(Exception):  # noqa: N818 - nothing went wrong
+    """A command was stopped by Ctrl-C; the message says how to go on."""
+
 
 def fail(message: str, code: int) -> int:
     """Print one line on stderr that says why the command ends with this exit code."""

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
-from dess import InputError
-from reports.cli.settings import setting
+from dess.errors import InputError, one_of
+from reports.cli.settings import check_words, setting
 
 ALLOWED = (
     "a field of the scenario and its values: 2..5, 0.01..0.05:5 (five values), or 1,2,4 in TOML "
@@ -51,13 +51,15 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     field, equals, values = text.partition("=")
     field = field.strip()
     if equals and field not in ScenarioSpace.model_fields:
-        allowed = ", ".join(sorted(ScenarioSpace.model_fields))
-        raise InputError(f"--set: {field}: unknown key; allowed: {allowed}")
+        allowed = one_of(field, ScenarioSpace.model_fields)
+        raise InputError(f"--set: {field}: unknown key{allowed}")
     if found := _RANGE.fullmatch(values.strip()):
         return field, distinct(field, _range(field, text, **found.groupdict()))
     try:
         listed = setting(f"{field}=[{values}]" if equals else text)[1]
     except InputError:
+        for word in filter(str.isidentifier, map(str.strip, values.split(","))):
+            check_words(field, word)
         raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
     return field, distinct(field, listed)
 

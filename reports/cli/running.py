@@ -24,7 +24,7 @@ YesOption = Annotated[
 def complete(
     name: str, run: "Callable[[Progress, Announce], Results]", again: str = "the same command again"
 ) -> "Results":
-    """Run a study; an interruption or a failure ends the command with a line and exit code 1.
+    """Run a study; an interruption (exit code 130) or a failure (1) ends the command with a line.
 
     Args:
         name: The study.
@@ -32,7 +32,8 @@ def complete(
         again: What completes it after an interruption.
 
     Raises:
-        typer.Exit: If it was interrupted, or some of it could not be computed.
+        Interruption: If it was.
+        typer.Exit: If some of it could not be computed.
     """
     from analysis.execution.runner import ChunkError
 
@@ -41,7 +42,7 @@ def complete(
             return run(progress, announce)
     except KeyboardInterrupt:
         line = f"interrupted: run {again} to complete it"
-        raise typer.Exit(console.fail(line, 1)) from None
+        raise console.Interruption(line) from None
     except ChunkError as error:
         for path, failure in error.failures.items():
             console.fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)

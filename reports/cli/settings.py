@@ -10,14 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess import InputError
+from dess.errors import InputError, one_of
 
 if TYPE_CHECKING:
     from dess import ScenarioSpace
 
+SET = "--set"
 RESULTS, PAGES = Path("results"), Path("build/reports")
 FIELD = "a field of the scenario and a value in TOML syntax, e.g. uavs=2 or initial_data=[5, 20]"
-PARAMETER = "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500"
+PARAMETER = (
+    "a parameter of the notebooks and a value in TOML syntax, e.g. missions=500, "
+    """or text in quotes: 'scenario="bay"'"""
+)
 
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
@@ -25,7 +29,7 @@ ScenarioOption = Annotated[
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--set",
+        SET,
         metavar="KEY=VALUE",
         help="Set a field of the scenario, the value in TOML syntax; repeatable.",
     ),
@@ -46,7 +50,7 @@ def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":
     return load_scenario(name, **dict(setting(text) for text in settings or []))
 
 
-def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str, Any]:
+def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, Any]:
     """Parse ``KEY=VALUE``.
 
     Args:
@@ -63,8 +67,26 @@ def setting(text: str, option: str = "--set", allowed: str = FIELD) -> tuple[str
     except tomllib.TOMLDecodeError as error:
         parsed = {"error": error}
     if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
+        if option == SET and value.strip():
+            check_words(key.strip(), value.strip())
         raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
+
+
+def check_words(field: str, value: str) -> None:
+    """Refuse a value that is no TOML, such as ``lots``, in the words of the field of a scenario.
+
+    Raises:
+        InputError: If the scenario has such a field, and if it has not.
+    """
+    from dess import ScenarioSpace
+    from dess.errors import form_of, kind_of
+
+    if field not in ScenarioSpace.model_fields:
+        raise InputError(f"{SET}: {field}: unknown key{one_of(field, ScenarioSpace.model_fields)}")
+    known = ScenarioSpace.model_fields[field]
+    problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
+    raise InputError(f"{SET}: {field}: {value!r} {problem}; allowed: {form_of(known)}")
 
 
 def _is_plain(value: Any) -> bool:

@@ -43,9 +43,7 @@ def train(
         options = ["--out", str(out), *([] if seed is None else ["--seed", str(seed)])]
         options += [] if device == "auto" else ["--device", device]
         command = shlex.join(["dess", "train", name, *options, "--resume"])
-        raise typer.Exit(
-            console.fail(f"interrupted at tick {training.tick}: continue with {command}", 1)
-        )
+        raise console.Interruption(f"interrupted at tick {training.tick}: continue with {command}")
     print(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"

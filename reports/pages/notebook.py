@@ -20,7 +20,7 @@ import jupytext
 import nbformat
 from nbformat import NotebookNode
 
-from dess import InputError
+from dess.errors import InputError, one_of
 from reports.pages.parameters import values_of, with_paths, with_values
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
@@ -123,7 +123,7 @@ def read(name: str, folder: Path = SHIPPED) -> Report:
         InputError: If the folder has no report of that name.
     """
     if name not in (names := names_in(folder)):
-        raise InputError(f"report: {name!r} is unknown; allowed: {', '.join(names)}")
+        raise InputError(f"report: {name!r} is unknown{one_of(name, names)}")
     return report_of(name, parsed(name, folder))
 
 
@@ -156,8 +156,8 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
     for name in names:
         if name not in known:
             raise InputError(
-                f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}; "
-                f"allowed: {', '.join(sorted(known)) or 'none'}"
+                f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}"
+                f"{one_of(name, sorted(known))}"
             )
 
 

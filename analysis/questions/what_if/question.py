@@ -27,8 +27,9 @@ from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.study import Study
-from dess import InputError, simulate_batch
-from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, validation_line
+from dess import simulate_batch
+from dess.errors import InputError, one_of, validation_line
+from dess.scenario import SAMPLED, ScenarioSpace, load_scenario
 from policies import load_team
 
 NAME = "what-if"
@@ -103,8 +104,7 @@ def check_policy(study: Study, policy: str) -> None:
         InputError: If it is none of the study's.
     """
     if policy not in study.policies:
-        allowed = ", ".join(study.policies)
-        raise InputError(f"shown: {policy!r} is not asked about; allowed: {allowed}")
+        raise InputError(f"shown: {policy!r} is not asked about{one_of(policy, study.policies)}")
 
 
 def ask(

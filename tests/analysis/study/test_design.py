@@ -17,8 +17,9 @@ from analysis.study.design import (
     Table,
 )
 from dess import InputError
+from dess.errors import validation_line
 from dess.files import parse_toml
-from dess.scenario import load_scenario, validation_line
+from dess.scenario import load_scenario
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 
@@ -230,13 +231,15 @@ BAD = {
     "kind = 'table'\nrows = []": ["table: rows: ", "at least 1"],
     "kind = 'table'\nrows = [3]": ["table: rows.0: ", "not 3"],
     "kind = 'latin-hypercube'\nsize = 8\nranges = {}": ["latin-hypercube: ranges: ", "at least 1"],
-    HEAD + 'latin-hypercube"\nsize = true': ["latin-hypercube: size: ", "valid integer"],
-    HEAD + 'latin-hypercube"\nsize = 0': ["latin-hypercube: size: ", "equal to 1, not 0"],
-    HEAD + f'latin-hypercube"\nsize = {MAX_SIZE + 1}': ["size: ", f"equal to {MAX_SIZE}"],
-    HEAD + 'latin-hypercube"\nsize = 4\nseed = -1': ["seed: ", "equal to 0, not -1"],
-    HEAD + 'saltelli"\nbase = 1': ["saltelli: base: ", "equal to 2, not 1"],
+    HEAD + 'latin-hypercube"\nsize = true': ["latin-hypercube: size: True is not an integer"],
+    HEAD + 'latin-hypercube"\nsize = 0': ["latin-hypercube: size: 0", "1..1,048,576"],
+    HEAD + f'latin-hypercube"\nsize = {MAX_SIZE + 1}': ["size: ", f"1..{MAX_SIZE:,}"],
+    HEAD + 'latin-hypercube"\nsize = 4\nseed = -1': [
+        "seed: -1 is out of range; allowed: an integer 0.."
+    ],
+    HEAD + 'saltelli"\nbase = 1': ["saltelli: base: 1 is out of range; allowed: an integer 2.."],
     HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is no power of two; allowed: 1, 2, 4"],
-    HEAD + 'saltelli"\nbase = 4\nreplications = 0': ["replications: ", "equal to 1, not 0"],
+    HEAD + 'saltelli"\nbase = 4\nreplications = 0': ["replications: 0 is out of range"],
     HEAD + f'saltelli"\nbase = 4\nreplications = {MAX_REPLICATION + 2}': ["replications: "],
 }
 NO_RANGES = {
@@ -263,7 +266,7 @@ BAD |= {
 def test_a_bad_design_gets_one_line(text):
     with pytest.raises(ValidationError) as error:
         plan(text if "design" in text else f"[design]\n{text}")
-    line = validation_line(error.value, "plan")
+    line = validation_line(error.value, "plan", Plan)
     assert line.startswith("plan: design: ")
     assert "\n" not in line
     for part in BAD[text]:

@@ -88,11 +88,11 @@ def test_teams_are_written_alike(tmp_path):
 
 BAD = {
     "nonsense = 1": ["nonsense: unknown key", "policies", "missions"],
-    "missions = 0": ["missions", "greater than or equal to 1", "not 0"],
-    "missions = '9'": ["missions", "valid integer", "not '9'"],
-    "missions = true": ["missions", "valid integer"],
-    "seed = -1": ["seed", "greater than or equal to 0"],
-    "engine = 'fast'": ["engine", "'batch' or 'events'", "not 'fast'"],
+    "missions = 0": ["missions: 0 is out of range; allowed: an integer 1.."],
+    "missions = '9'": ["missions: '9' is not an integer"],
+    "missions = true": ["missions: True is not an integer"],
+    "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
+    "engine = 'fast'": ["engine: 'fast' is unknown; allowed: batch, events"],
     "logged = 2000": ["logged: 2000", "0..1000"],
     "name = 'a/b'": ["name", "not 'a/b'"],
     "policies = []": ["policies"],
@@ -101,7 +101,7 @@ BAD = {
     "policies = 'greedy'": ["policies"],
     "scenario = 'nope'": ["nope: no such scenario", "paper"],
     "set.uavs = 99": ["uavs: 99", "1..16"],
-    "set.uavz = 2": ["uavz: unknown key", "flying_time"],
+    "set.uavz = 2": ["uavz: unknown key (did you mean uavs?)"],
     "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
     "design = {kind = 'grid', values.uavs = []}": ["uavs has no values"],
     "design = {kind = 'grid', values.uavs = 2}": ["values.uavs"],
@@ -125,8 +125,7 @@ BAD = {
     "selection = {procedure = 'kn', indifference = 0.1}\n"
     "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
     "selection = {procedure = 'kn', indifference = -0.1}": [
-        "selection: kn: indifference",
-        "greater than 0",
+        "selection: kn: indifference: -0.1 is out of range; allowed: a number above 0",
     ],
     "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
         "selection.budget: 8",
@@ -148,7 +147,7 @@ BAD = {
         "selection: cheapest: requirements.speed",
         "'success', 'collection_ratio' or 'collection_ratio_and_communication'",
     ],
-    "costs.uav = -1": ["costs.uav", "greater than or equal to 0, not -1"],
+    "costs.uav = -1": ["costs.uav", "-1 is out of range; allowed: a number from 0"],
     "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
     "missions = 1\n[design": ["not valid TOML"],

@@ -94,5 +94,5 @@ def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
     monkeypatch.setattr("dess.mission.simulate", fail)
     (tmp_path / "log.parquet").write_text("old")
     before = files_of(tmp_path)
-    assert dess("simulate", "--events", "log.parquet") == (1, "", "interrupted\n")
+    assert dess("simulate", "--events", "log.parquet") == (130, "", "interrupted\n")
     assert files_of(tmp_path) == before

@@ -87,7 +87,7 @@ def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkey
     with monkeypatch.context() as patch:
         patch.setattr(runner.Here, "run", interrupted)
         code, out, err = dess(*ASKED, *FIELDS)
-    assert (code, out) == (1, "")
+    assert (code, out) == (130, "")
     command = re.search(r"interrupted: run (dess study run .*) to complete it", err)[1]
     code, _, err = dess(*shlex.split(command)[1:])
     assert code == 0
@@ -101,14 +101,14 @@ BAD = {
     "--set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "policy ddqn: has learned grid 32, not 8",
     "--policy gredy": "'gredy' is unknown",
     "--missions 0": "--missions",
-    "--price uav=-1": "costs.uav: Input should be greater than or equal to 0, not -1",
+    "--price uav=-1": "costs.uav: -1 is out of range; allowed: a number from 0",
     "--price uav": "--price: 'uav' is not KEY=VALUE; allowed: a price",
     "--price hour=3": "slot_seconds: is missing",
     "--price uav=1 --price uav=2": "--price: uav is given twice",
     "--require success=0.9": "requirements: need prices",
     "--price uav=1 --require speed=0.9": "requirements: 'speed' is unknown; allowed: success",
     "--price uav=1 --require success=2": "requirements.success: 2 is out of range",
-    "--price uavs=3": "prices: 'uavs' is unknown; allowed: currency, uav, pad",
+    "--price uavs=3": "prices: 'uavs' is unknown (did you mean uav?); allowed: currency, uav, pad",
     "--name a/b": "name: String should match pattern",
     "--name ": "name: String should match pattern",
     "--out small.toml": "small.toml: cannot be written",

@@ -148,7 +148,7 @@ def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_pat
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)
         out, err = running.communicate()
-    assert (running.returncode, out) == (1, "")
+    assert (running.returncode, out) == (130, "")
     stopped = load_training(tmp_path / "out" / "checkpoint.safetensors", load_config(config), CPU)
     assert 0 < stopped.tick < 340
     hint = f"interrupted at tick {stopped.tick}: continue with "

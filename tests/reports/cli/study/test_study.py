@@ -120,7 +120,7 @@ def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)
         out, err = running.communicate()
-    assert (running.returncode, out) == (1, "")
+    assert (running.returncode, out) == (130, "")
     assert err.endswith("interrupted: run the same command again to complete it\n")
     assert "Traceback" not in err
     assert not [name for name in files_of(tmp_path) if name.endswith(".tmp")]

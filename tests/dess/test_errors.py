@@ -1,0 +1,76 @@
+"""The words of messages: what is allowed, and what may have been meant."""
+
+from typing import Literal
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dess.errors import form_of, one_of, validation_line
+
+MANY = [f"field_{number:02}" for number in range(20)] + ["uavs"]
+
+
+@pytest.mark.parametrize(
+    ("name", "names", "also", "end"),
+    [
+        ("gredy", ["tour", "greedy"], "", " (did you mean greedy?); allowed: tour, greedy"),
+        ("GREEDY", ["tour", "Greedy"], "", " (did you mean Greedy?); allowed: tour, Greedy"),
+        ("other", ["tour"], "a file", "; allowed: tour, or a file"),
+        ("other", [], "a file", "; allowed: a file"),
+        ("other", [], "", "; allowed: none"),
+        (None, ["tour"], "", "; allowed: tour"),
+        ("uvs", MANY, "", " (did you mean uavs?); allowed: uavs and 20 others"),
+        ("speed", MANY, "", f"; allowed: {', '.join(MANY)}"),
+    ],
+)
+def test_a_close_name_comes_first(name: object, names: list[str], also: str, end: str) -> None:
+    assert one_of(name, names, also) == end
+
+
+class Part(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    price: float = Field(0.0, ge=0, description="price of a part")
+    kind: Literal["small", "large"] = "small"
+
+
+class Whole(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    name: str = Field(description="name of the whole")
+    count: int | None = Field(None, ge=1, le=1000)
+    ready: bool = False
+    size: tuple[int, int] = Field((1, 1), description="width and height")
+    part: Part | None = None
+    parts: tuple[Part, ...] = ()
+
+
+LINES = [
+    ({}, "name: is missing; allowed: name of the whole"),
+    ({"nam": "x"}, "nam: unknown key (did you mean name?); allowed: {}part, parts"),
+    ({"count": 0}, "count: 0 is out of range; allowed: an integer 1..1,000"),
+    ({"count": "few"}, "count: 'few' is not an integer; allowed: an integer 1..1,000"),
+    ({"ready": 1}, "ready: 1 is not a truth value; allowed: true or false"),
+    ({"size": (1,)}, "size.1: {} has the wrong form; allowed: width and height"),
+    ({"part": {"prize": 1}}, "part.prize: unknown key (did you mean price?); allowed: price, kind"),
+    ({"part": {"price": -1}}, "part.price: -1 is out of range; allowed: a number from 0"),
+    ({"part": {"kind": "smal"}}, "part.kind: 'smal' is unknown (did you mean small?); allowed: {}"),
+    ({"parts": ({"price": 1}, {"prize": 1})}, "parts.1.prize: unknown key (did you mean price?)"),
+]
+
+
+@pytest.mark.parametrize(("values", "line"), LINES)
+def test_an_error_is_a_line_about_the_innermost_field(values: dict, line: str) -> None:
+    with pytest.raises(ValidationError) as error:
+        Whole.model_validate({"name": "x"} | values if values else {})
+    found = validation_line(error.value, "plan", Whole)
+    start, _, end = f"plan: {line}".partition("{}")
+    assert found.startswith(start)
+    assert found.endswith(end)
+    assert "\n" not in found
+
+
+def test_the_form_of_a_field_is_told_in_words() -> None:
+    forms = {name: form_of(field) for name, field in Part.model_fields.items()}
+    assert forms == {"price": "a number from 0", "kind": "small, large"}
+    assert form_of(Whole.model_fields["size"]) == "width and height"
