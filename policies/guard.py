@@ -4,8 +4,9 @@
     actions = np.where(mask, values, -np.inf).argmax(1)
 
 A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
-charging zone, with a margin of some slots for detours around teammates. ``docs/concepts/return-guard.md``
-describes the rules. The functions below are compiled and work on the arrays of one mission.
+charging zone, with a margin of some slots for detours around teammates. The rules are described in
+``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
+mission.
 """
 
 import numpy as np

@@ -11,8 +11,8 @@
 # %% [markdown]
 # # Explorer
 #
-# Move the paper's parameters and see what becomes of a mission: the three metrics of every policy
-# at every setting of a grid, with their intervals, and their course along each parameter.
+# Change the parameters of the paper with sliders and see their effect: the three metrics of every
+# policy at every setting of a grid, with confidence intervals, and curves along each parameter.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of explorer
@@ -37,20 +37,21 @@ explorer(study)
 
 # %%
 html.say(
-    "A dot is a mean, with its {level} interval; the thin lines stand at 0, 50 and 100 %. At "
-    "every setting, each policy acts in the same {missions} realisations of all that is random: "
-    "arrivals, shadowing, the initial data within its range. So two settings, or two policies, "
-    "may differ clearly where their intervals overlap; a [what-if question](what-if.html) "
-    "compares them mission by mission.",
+    "A dot is a mean, and the bar is its {level} confidence interval. The thin lines are at 0, 50 "
+    "and 100 %. At every setting, each policy is simulated in the same {missions} replications, "
+    "with the same random initial data, arrivals and shadowing. Therefore two settings, or two "
+    "policies, may differ significantly although their intervals overlap. A "
+    "[what-if question](what-if.html) compares two settings mission by mission.",
     level=numbers.level(LEVEL),
     missions=numbers.span(start["n"]),
 )
 
 # %%
 html.say(
-    "Fixed are {nodes} sensor nodes on {s.grid} x {s.grid} cells, {s.charging_pads} charging "
-    "pads, a quota of {s.quota:,} communication slots for each UAV, {s.arrival_rate:g} data units "
-    "that arrive per node and mission slot, and all else of the scenario {name}.",
+    "All other fields are those of the scenario {name}, among them {nodes} sensor nodes on "
+    "{s.grid} x {s.grid} cells, {s.charging_pads} charging pads, a quota of {s.quota:,} "
+    "communication slots for each UAV, and on average {s.arrival_rate:g} data units that arrive "
+    "per node and mission slot.",
     s=study.scenario(),
     nodes=len(study.scenario().nodes),
     name=study.manifest["study"]["scenario"],
@@ -70,7 +71,7 @@ html.gallery(
 
 # %%
 table = numbers.wide(start, "policy").rename(columns=names.METRICS).reset_index(names="Policy")
-html.table(table, "The same in numbers. CSV: all settings of the grid", data=grid.table())
+html.table(table, "The same in numbers; the CSV file has all settings", data=grid.table())
 
 # %% [markdown]
 # ## Where the figures come from

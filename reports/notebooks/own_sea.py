@@ -11,20 +11,20 @@
 # %% [markdown]
 # # An own sea
 #
-# From the coordinates of sensor nodes to a decision: which fleet is the cheapest that serves this
-# sea, and why no cheaper one does.
+# This page leads from the coordinates of sensor nodes to a decision: which is the cheapest fleet
+# that meets the requirements at this sea, and why a cheaper fleet does not meet them.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the sweep is kept
 scenario = "bay"  # the sea: a TOML file, or this shipped example
-example = {"uavs": 3, "pads": 2}  # the fleet of the mission to look at
+example = {"uavs": 3, "pads": 2}  # the fleet of the example mission
 fields = {"uavs": [2, 3], "pads": [1, 2, 3], "arrival_rate": [0.01, 0.03]}
 policies = ["greedy"]
 prices = {"uav": 20_000, "pad": 3_000, "charge": 2, "hour": 100, "slot_seconds": 60}
-currency, flights = "EUR", 500  # of the prices; missions that the fleet is to fly
-requirements = {"success": 0.99, "collection_ratio": 0.68}  # the least means
-missions = 300  # further ones, that check the selected settings
-seed = 0  # of the missions
+currency, planned = "EUR", 500  # currency of the prices; number of missions planned for the fleet
+requirements = {"success": 0.99, "collection_ratio": 0.68}  # the lowest acceptable means
+missions = 300  # additional missions that check each selected setting
+seed = 0  # seed of the missions
 workers = 1  # processes
 
 # %%
@@ -38,7 +38,8 @@ from reports.pages import html
 # %% [markdown]
 # ## The sea
 #
-# A sea is a TOML file, and the coordinates of its sensor nodes are in a file beside it:
+# A sea is described by a TOML file. The coordinates of its sensor nodes are in a second file in the
+# same folder:
 #
 # ```toml
 # nodes = "bay.csv"
@@ -48,15 +49,15 @@ from reports.pages import html
 # quota = 600             # communication slots that every UAV must fill
 # ```
 #
-# The CSV file has columns `lon` and `lat` in degrees, or `x` and `y` in cells; a GeoJSON file of
-# points does as well. Degrees are projected, centred on the grid and rounded to cells. All fields
-# that the file does not set are those of the paper.
+# The CSV file has the columns `lon` and `lat` in degrees, or `x` and `y` in cells; a GeoJSON file
+# of points is also possible. Degrees are projected, centred on the grid and rounded to cells. All
+# fields that the TOML file does not set have the values of the paper.
 
 # %%
 sea = load_scenario(scenario)
 html.say(
-    "This one has {nodes} sensor nodes on {grid} x {grid} cells of {size:g} m, and a zone of "
-    "{pads} cells, each with room for a charging pad.",
+    "This sea has {nodes} sensor nodes on {grid} x {grid} cells with a side of {size:g} m. Its "
+    "zone has {pads} cells, each with room for one charging pad.",
     nodes=len(sea.nodes),
     grid=sea.grid,
     size=sea.cell_size,
@@ -64,13 +65,13 @@ html.say(
 )
 
 # %%
-caption = f"n = {len(sea.nodes)} sensor nodes, and the zone; y grows south."
+caption = f"The n = {len(sea.nodes)} sensor nodes and the zone. The y axis points south."
 html.figure(sea_figure(sea), "Map of the sea", caption)
 
 # %% [markdown]
-# ## A mission to look at
+# ## An example mission
 #
-# One example (n = 1), to see whether the sea is as it was meant.
+# A single mission (n = 1) helps to check that the sea is described as intended.
 
 # %%
 mission = mission_of(load_scenario(scenario, **example), policies[0], seed)
@@ -81,17 +82,18 @@ html.figure(drawing, "Map of the mission; battery, residual data and charging", 
 # %% [markdown]
 # ## The sweep
 #
-# Every fleet meets every condition. With prices and requirements, as many missions are simulated as
-# it takes to find the cheapest fleet that meets the requirements, with a stated confidence.
+# Every fleet is simulated under every condition. With prices and requirements, a procedure adds
+# missions until it has found the cheapest fleet that meets the requirements, with a stated
+# confidence.
 
 # %%
-priced = {**prices, "currency": currency, "missions": flights}
+priced = {**prices, "currency": currency, "missions": planned}
 about = (scenario, policies, missions, seed, results, workers, priced, requirements)
 answer = sweep(*about, **fields)
 
 # %%
 html.say(
-    "{settings} settings, {n:,} missions. The guarantee: {guarantee}.",
+    "The sweep has {settings} settings and simulated {n:,} missions. Its guarantee: {guarantee}.",
     settings=len(answer.table()),
     n=len(answer.results.missions),
     guarantee=answer.guarantee,
@@ -104,24 +106,25 @@ html.say(
 html.say("{answers}", answers="\n".join(f"- {line}" for line in answer.answers()))
 
 # %% [markdown]
-# The settings with their costs, the cheapest first. A setting *meets* the requirements, *misses*
-# them, or it is *open*, where no more missions were needed to decide.
+# The table lists the settings by cost, the cheapest first. The verdict on the
+# requirements is *met*, *missed*, or *open* where no decision was needed to find the cheapest
+# fleet.
 
 # %%
 columns = ["policy", *answer.fields, "success", "collection_ratio", "n", "cost", "verdict"]
 costs = answer.table("cost")
 shown = costs[columns].assign(cost=costs["cost"].map("{:,.0f}".format))
 shown[[*METRICS][:2]] = shown[[*METRICS][:2]].map(numbers.percent)
-html.table(shown, f"Mean cost over {flights:,} missions in {currency}", data=costs)
+html.table(shown, f"Mean cost of {planned:,} planned missions in {currency}", data=costs)
 
 # %%
-caption = "Success with 95 % intervals, of n missions as in the table: few, where ruled out early."
+caption = "Success with 95 % intervals. n is small for settings that were ruled out early."
 html.figure(answer.plot(metric="success"), "Success by field", caption)
 
 # %% [markdown]
 # ## On the command line
 #
-# This asks the same, and makes a page with more on it:
+# The following command runs the same sweep and makes a page with more details:
 
 # %%
 html.say("{lines}", lines=html.commands([answer.command]))

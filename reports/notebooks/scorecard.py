@@ -11,12 +11,12 @@
 # %% [markdown]
 # # Replication scorecard
 #
-# What the paper's Section V claims beside what the simulations here found, with a verdict that a
-# stated rule computes.
+# Each claim of the paper's Section V is compared with the simulations of this project. A stated
+# rule computes the verdict on the claim from the results.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folders of table4, fig4, fig5 and sweet-spot
-trained = None  # folder with the learning curves; None for those shipped
+trained = None  # folder with the learning curves; None for the shipped ones
 
 # %%
 import json

@@ -15,8 +15,8 @@
 
 # %% tags=["parameters"]
 results = "../../results/charge-limits"  # the results folder of the study
-metric = None  # what ranks the settings; None for that of the selection, or the product
-baseline = 0  # the number of the design point that all others are compared with
+metric = None  # the metric that ranks the settings; None: that of the selection, or the product
+baseline = 0  # the number of the design point with which all others are compared
 
 # %%
 from pathlib import Path
@@ -41,13 +41,13 @@ metrics, called = words.metrics_of(by), names.metric_name(by).lower()
 html.say("{simulated}", simulated=words.simulated(study))
 
 # %% [markdown] tags=["if-ranked"]
-# Every policy meets the same replications at every design point, which have the same realisation
-# of all random draws. So missions are compared one by one, and what they share drops out.
+# All policies and all design points are simulated with the same random numbers (common random
+# numbers). So they are compared mission by mission, and the randomness that they share cancels.
 
 # %% [markdown] tags=["if-cheapest"]
 # ## The cheapest fleet
 #
-# The fleet is what an operator decides on; the other fields are conditions that it has to meet.
+# An operator decides on the fleet. The other fields are conditions under which it has to work.
 
 # %% tags=["if-cheapest"]
 display(
@@ -57,8 +57,8 @@ display(
 )
 
 # %% [markdown] tags=["if-cheapest"]
-# The missions of the check had no part in the selection, so its means are not too good. The search
-# spends no more missions on a setting once a cheaper one is known to meet the requirements.
+# The selection was not based on the missions of the check, so their means are unbiased. A setting
+# gets no further missions once a cheaper one is known to meet the requirements.
 
 # %% tags=["if-ranked"]
 ranked = settings.ranked(study, by)
@@ -70,9 +70,9 @@ tables.ranked(study, ranked, by)
 
 # %% [markdown] tags=["if-settings"]
 # A *setting* is a policy at a design point. It *may be the best* if no other setting is
-# significantly better: the true best is among these with a probability of 95 % (subset selection
-# by paired t tests with Bonferroni's correction, Nelson and others 2001). The mean of the first
-# rank is a little too high, since chance helped to rank it first.
+# significantly better. With a probability of 95 %, the truly best setting is among these (subset
+# selection by paired t tests with Bonferroni's correction, Nelson and others 2001). The mean of the
+# setting in the first rank tends to be too high, since it was ranked first for its high mean.
 
 # %% tags=["if-settings"]
 tables.best_of_policies(study, by)
@@ -81,12 +81,12 @@ tables.best_of_policies(study, by)
 display(html.gallery(drawings.means(study, metrics)), tables.means(study))
 
 # %% [markdown] tags=["if-costs"]
-# ## What it costs
+# ## Costs
 #
 # The cost is that of the fleet and of all its missions. A setting is on the *Pareto front* if no
-# other one is at most as costly and at least as good. The probability that it truly is reckons
-# with the chance in the missions, by the Bayesian bootstrap over common replications. It is too
-# low where costlier settings are all better, by less than the missions can show.
+# other setting is at most as expensive and at least as good. The probability of being on the front
+# takes the randomness of the missions into account (Bayesian bootstrap over common replications).
+# It is too low where more expensive settings are better by less than the missions can show.
 
 # %% tags=["if-costs"]
 fronts = costs.fronts_of(study)
@@ -99,9 +99,9 @@ display(
 # %% [markdown] tags=["if-selection"]
 # ## The selection
 #
-# A rule of the study decided how many missions each setting was worth, until one was selected for
-# every policy. Settings with few missions were ruled out early. Its promise is the one below; what
-# *may be the best* above is judged by the replications that two settings have in common.
+# A ranking-and-selection procedure decided how many missions each setting gets, until one setting
+# was selected for every policy. Settings with few missions were ruled out early. The guarantee is
+# stated below. *May be the best* above uses the replications that two settings have in common.
 
 # %% tags=["if-selection"]
 display(
@@ -111,18 +111,18 @@ display(
 )
 
 # %% [markdown] tags=["if-selection"]
-# The missions of the check had no part in the selection, so its means are not too high.
+# The selection was not based on the missions of the check, so their means are unbiased.
 
 # %% [markdown] tags=["if-precision"]
 # ## The precision
 #
-# The study simulated missions until its estimates were as precise as wanted, or its budget ended.
+# The study simulated missions until its estimates were precise enough, or its budget was spent.
 
 # %% tags=["if-precision"]
 tables.precisions(study)
 
 # %% [markdown] tags=["if-fields"]
-# ## What the fields do
+# ## Effects of the fields
 
 # %% tags=["if-one-field"]
 html.gallery(drawings.curves(study, metrics))
@@ -143,16 +143,16 @@ html.gallery(drawings.scatter(study, metrics))
 display(html.gallery(drawings.sensitivity(study, by)), tables.sensitivity(study))
 
 # %% [markdown] tags=["if-sensitivity"]
-# A Sobol index is the share of a metric's variance that a field accounts for: *alone*, or *with
-# all interactions*. The replication is a field too: what it accounts for, no setting removes.
+# A Sobol index is the share of a metric's variance that a field explains: *alone*, or *with all
+# interactions*. The replication counts as a field: its share is noise that no setting removes.
 
 # %% tags=["if-effects"]
 display(html.gallery(drawings.main_effects(study, metrics)), tables.main_effects(study, by))
 
 # %% tags=["if-settings"]
 html.say(
-    "## Compared with a baseline\n\nThe baseline is design point {point}: {words}. Every policy is "
-    "compared with itself there. The parameter `baseline` names another point.",
+    "## Comparison with a baseline\n\nThe baseline is design point {point}: {words}. Every policy "
+    "is compared with itself there. The parameter `baseline` of this page names another point.",
     point=baseline,
     words=words.setting(study, baseline),
 )
@@ -161,9 +161,9 @@ html.say(
 tables.against(study, baseline, by)
 
 # %% [markdown] tags=["if-policies"]
-# ## Policy against policy
+# ## Comparison of the policies
 #
-# Over all design points, replication by replication.
+# The differences are means over all design points, computed replication by replication.
 
 # %% tags=["if-policies"]
 tables.comparisons(study)
@@ -178,7 +178,7 @@ tables.learners(study)
 missions = settings.at_best(study, ranked)
 spread = distribution(missions, by, np.random.default_rng(study.store.manifest.seed))
 display(
-    html.say("Every policy at its best setting by {metric}:", metric=called),
+    html.say("These figures show every policy at its best setting by {metric}:", metric=called),
     html.gallery(drawings.distribution(missions, by)),
     tables.spread(spread, by),
 )
@@ -190,7 +190,7 @@ worst = summary.worst(study, summary.best_policy(study.missions))
 # %%
 display(
     tables.worst(study, worst),
-    html.say("These simulate them again:\n\n{lines}", lines=html.commands(worst["command"])),
+    html.say("To simulate them again:\n\n{lines}", lines=html.commands(worst["command"])),
 )
 
 # %% [markdown]

@@ -11,17 +11,17 @@
 # %% [markdown]
 # # Sweep
 #
-# Every combination of values of some fields of the scenario, simulated now for every policy: the
-# best settings, and what each field does.
+# This page simulates every combination of values of some fields of the scenario, for every policy.
+# It shows the best settings and the effect of each field.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the sweep is kept
 scenario = "paper"  # a shipped scenario, or a TOML file
-fields = {"uavs": [1, 2, 3, 4], "pads": [1, 2, 4]}  # one value is fixed, several are swept
+fields = {"uavs": [1, 2, 3, 4], "pads": [1, 2, 4]}  # a field with one value is fixed
 policies = ["greedy", "nearest"]
-missions = 200  # of every policy and setting
-seed = 0  # of the missions
-workers = 1  # processes; more take seconds to start, and pay from thousands of missions on
+missions = 200  # number of missions of every setting
+seed = 0  # seed of the missions
+workers = 1  # processes; more than one is worth its start time from thousands of missions on
 
 # %%
 from analysis import sweep
@@ -35,9 +35,8 @@ answer = sweep(scenario, policies, missions, seed, results, workers, **fields)
 # %% [markdown]
 # ## What was simulated
 #
-# A *setting* is a policy with a value of every field that is swept. All settings meet the same
-# replications, which have the same realisations of all random draws, so they are compared mission
-# by mission.
+# A *setting* is a policy together with one value of every swept field. All settings are simulated
+# with the same random numbers (common random numbers), so they are compared mission by mission.
 
 # %%
 html.say("{simulated}", simulated=words.simulated(answer.results))
@@ -51,16 +50,16 @@ html.say("{simulated}", simulated=words.simulated(answer.results))
 tables.ranked(answer.results, answer.table(), PRODUCT)
 
 # %% [markdown]
-# Of every policy:
+# The best setting of every policy is:
 
 # %%
 tables.best_of_policies(answer.results, PRODUCT)
 
 # %% [markdown]
-# ## What the fields do
+# ## Effects of the fields
 #
-# The curves are over the first field that is swept, one for each value of the second; all others
-# are averaged. Bars are 95 % intervals.
+# The horizontal axis is the first swept field, and there is a curve for each value of the second
+# one. Means are taken over the other fields. Bars are 95 % intervals.
 
 # %%
 of_fields, each = " and ".join(answer.fields[:2]), f"n = {missions:,} missions per setting"
@@ -72,19 +71,19 @@ html.gallery(
 )
 
 # %% [markdown]
-# ## Ask again, ask more
+# ## Change the question
 #
-# In Jupyter, change the first cell and run all cells. What was simulated is kept: the same sweep is
-# answered at once, and with more missions or other values only what is new is simulated. On the
-# command line, this asks the same, and makes a page with more on it:
+# In Jupyter, change the first cell and run all cells. All missions are stored, so the same sweep is
+# answered at once, and with more missions or other values only the new missions are simulated. On
+# the command line, the following command runs the same sweep and makes a page with more details:
 
 # %%
 html.say("{lines}", lines=html.commands([answer.command]))
 
 # %% [markdown]
-# With `prices` and `requirements`, as in the report `own-sea`, a sweep looks for the cheapest
-# fleet. `answer.table()` has all settings with their intervals, and `answer.results.missions` all
-# missions, as tidy tables:
+# With `prices` and `requirements`, as in the report `own-sea`, a sweep searches for the cheapest
+# fleet. `answer.table()` is a tidy table of all settings with their intervals, and
+# `answer.results.missions` is a tidy table of all missions:
 
 # %%
 html.table(answer.table().iloc[:3, :8], "The first rows and columns of answer.table()")

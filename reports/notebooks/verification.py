@@ -11,13 +11,13 @@
 # %% [markdown]
 # # Verification
 #
-# The simulator beside what is known of it in closed form: the draws, the channel, the conservation
-# of data, the batteries, both engines, and what the intervals of all pages promise. Then the model,
-# described after the STRESS-DES checklist.
+# This page compares the simulator with exact theory: the random draws, the channel, the
+# conservation of data, the batteries, both engines, and the coverage of the confidence intervals on
+# all pages. It also describes the model according to the STRESS-DES checklist.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder of the results folder verification and of those beside it
-block = 100  # missions of a block, whose interval is to hold the mean of all
+block = 100  # missions of a block, for the coverage of confidence intervals
 
 # %%
 from IPython.display import Markdown, display
@@ -34,30 +34,32 @@ from reports.pages import html, stress_des
 suite = Suite.load(results)
 space, level = suite.space, numbers.level(LEVEL)
 judged = checks.judge(suite.checks(block))
-band = f"the band below, which holds all dots of {level} of such figures."
+band = f"the band below, which contains all dots in {level} of such figures."
 
 # %% [markdown]
 # ## What was checked
 #
-# An exact check fails if its error is above its bound, which is zero or what rounding can do. A
-# check of chance has a p-value, corrected by Holm for the number of these checks.
+# There are two kinds of checks. An exact check fails if an error is above its bound, which is zero
+# or the largest possible rounding error. A statistical check fails if its p-value, corrected for
+# the number of these checks (Holm), is too small.
 
 # %%
 display(Markdown(checks.overall(judged)))
-caption = "Every check: what is known, what was seen, and what follows"
+caption = "Every check: the value known from theory, the value observed, and the verdict"
 html.table(checks.as_text(judged), caption, wrap=True)
 
 # %% [markdown]
 # ## Arrivals
 #
-# Every node receives Poisson packets, independently of the others and of all before. Counts of a
-# node in a slot tell the distribution; counts of a slot over all nodes also whether nodes depend on
-# each other, and counts of a node over many slots whether slots do. They come from event logs, one
-# per replication, since policies share its arrivals.
+# The data units that arrive at a node in a slot are Poisson distributed, and independent of other
+# nodes and slots. Three counts are compared with this distribution: of a node in a slot, of all
+# nodes in a slot (which would show dependence between nodes), and of a node over many slots (which
+# would show dependence between slots). The counts come from one event log per replication, since
+# all policies meet the same arrivals.
 
 # %%
 html.say(
-    "{verdicts} There are {n:,} logs, and {rate:g} packets per node and slot on average.",
+    "{verdicts} There are {n:,} logs; the mean is {rate:g} data units per node and slot.",
     verdicts=checks.on_topics(judged, checks.ARRIVALS),
     rate=space.arrival_rate,
     n=len(suite.realisations),
@@ -79,11 +81,12 @@ html.gallery(figures)
 # %% [markdown]
 # ## The channel
 #
-# UAVs choose the node that they hear best, so what they collect is no fair sample of the channel.
-# Two ways lead around that. A lone UAV that hovers within reach of a single node has no choice: its
-# mean rate must be the integral of δ log<sub>2</sub>(1 + SNR) over all shadowing. And each of the
-# communications in the logs can be computed once more from the formula, with the shadowing that was
-# drawn in that communication slot for every node: which one is heard best, and what it gives.
+# A UAV serves the node with the highest SNR, so the data that it collects are not a random sample
+# of the channel. Two kinds of checks avoid this problem. First, a single UAV hovers near a single
+# node and has no choice; its mean rate must equal the integral of δ log<sub>2</sub>(1 + SNR) over
+# the distribution of shadowing. Second, every communication in the event logs is computed again
+# from the formula, with the shadowing of that communication slot for every node: which node has the
+# highest SNR, and how much data it sends.
 
 # %%
 html.say(
@@ -103,9 +106,9 @@ html.figure(
 # %% [markdown]
 # ## Conservation, batteries and engines
 #
-# Data are neither made nor lost. Event logs also hold every battery to its rules, slot by slot, and
-# add up to the records. Policies share the realisation of a replication. And missions of every
-# policy, spread over the study, were simulated again with SimPy.
+# These checks show that data are neither created nor lost, that every battery follows its rules in
+# every slot of the event logs, that the logs add up to the records, that all policies meet the same
+# random draws in a replication, and that missions simulated again with SimPy give the same records.
 
 # %%
 verdicts = checks.on_topics(judged, *checks.BOOKKEEPING)
@@ -114,8 +117,8 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 # %% [markdown]
 # ## The draws of a mission
 #
-# Every mission draws its parameters, uniformly and independently, and the initial data of every
-# node.
+# Every mission draws its parameters, and the initial data of every node, independently from uniform
+# distributions.
 
 # %%
 Markdown(checks.on_topics(judged, checks.DRAWS))
@@ -125,8 +128,8 @@ figures = [
     (
         drawings.fit(fit, parameter(field).label, "value"),
         f"How often each value of the {parameter(field).within} was drawn",
-        f"All values should be drawn equally often, and dots lie inside {band} n = {fit.n:,} "
-        "missions.",
+        f"All values should be drawn equally often, so the dots should lie inside {band} "
+        f"n = {fit.n:,} missions.",
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
 ]
@@ -141,17 +144,17 @@ if space.initial_data[0] < space.initial_data[1]:
 html.gallery(figures)
 
 # %% [markdown]
-# ## What intervals promise
+# ## Coverage of the confidence intervals
 #
-# Of intervals that are each computed from a block of missions, about as many as their level says
-# should hold the mean of all. For Student's t it is a little more, since a block is itself a part
-# of all. Wilson's interval, for success, cannot keep to a level: a block has a whole number of
-# successes, so what its interval holds jumps with their share. How often it does is known exactly,
-# from the hypergeometric distribution, and that is what it is held to.
+# The missions are divided into blocks, and an interval is computed from each block. The share of
+# intervals that contain the mean of all missions is their coverage. For Student's t it should be a
+# little above the level, because a block is itself a part of all missions. For Wilson's interval,
+# used for success, the coverage differs from the level because a block has a whole number of
+# successes; the exact coverage is known from the hypergeometric distribution, and is compared here.
 
 # %%
 verdicts = checks.on_topics(judged, checks.COVERAGE)
-html.say("{verdicts} Blocks are those of {best}.", verdicts=verdicts, best=suite.best)
+html.say("{verdicts} The blocks have missions of {best}.", verdicts=verdicts, best=suite.best)
 
 # %%
 figures = [
@@ -159,7 +162,7 @@ figures = [
         drawings.caterpillar(rows, name),
         f"{name}: intervals of blocks of missions",
         f"The first {min(len(rows), drawings.SHOWN)} of {len(rows):,} blocks; the line is the mean "
-        f"of all missions. Of all blocks {rows['holds'].sum():,} of {len(rows):,} hold it. "
+        f"of all missions, which {rows['holds'].sum():,} of the {len(rows):,} intervals contain. "
         f"n = {block:,} missions per interval, at {level}.",
     )
     for metric, name in METRICS.items()
@@ -168,7 +171,7 @@ figures = [
 html.gallery(figures)
 
 # %% [markdown]
-# ## The model, after the STRESS-DES checklist
+# ## The model, described by the STRESS-DES checklist
 #
 # Monks, Currie, Onggo, Robinson, Kunc and Taylor (2019), *Strengthening the reporting of empirical
 # simulation studies: Introducing the STRESS guidelines*, Journal of Simulation 13(1), 55–67. Every

@@ -11,19 +11,19 @@
 # %% [markdown]
 # # What if
 #
-# A question to the simulator, answered now: a baseline of the scenario and a variation of it,
-# simulated in the same realisations and compared mission by mission, with a typical and a bad
-# mission to look at.
+# This page answers one question: what changes if some settings of the scenario change? A baseline
+# and a variation of it are simulated with the same random numbers and compared mission by mission.
+# A typical mission and a bad mission are shown in detail.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the results of the question are kept
 settings = {"uavs": 5}  # fields of the scenario that the variation sets
 baseline = {"uavs": 3}  # fields that are set in both, where the variation does not set its own
 scenario = "paper"  # a shipped scenario, or a TOML file
-policies = ["ddqn", "greedy"]  # each is compared with itself
-missions = 500  # of every policy, in the baseline and in the variation
-seed = 0  # of the missions
-workers = 1  # processes; more take seconds to start, and pay from thousands of missions on
+policies = ["ddqn", "greedy"]  # each policy is compared with itself
+missions = 500  # number of missions of every policy, in the baseline and in the variation
+seed = 0  # seed of the missions
+workers = 1  # processes; more than one is worth its start time from thousands of missions on
 shown = None  # the policy whose missions are drawn; None for the best in the variation
 
 # %%
@@ -38,11 +38,12 @@ asked = what_if(settings, baseline, scenario, policies, missions, seed, results,
 # %% [markdown]
 # ## The question
 #
-# What if a mission had the settings of the variation in place of those of the baseline? The table
-# has the fields of the scenario that the variation changes; then those that are set in both, and
-# those that every mission draws for itself, in both alike. Every policy acts in as many missions of
-# the baseline as of the variation. Replication by replication, all that the variation does not set
-# is equal: initial data, arrivals and shadowing.
+# What changes if missions have the settings of the variation instead of those of the baseline? The
+# table first lists the fields that the variation changes, then the fields that are set to the same
+# value in both, and the fields whose values every mission draws at random. Every policy acts in the
+# same number of missions of the baseline and of the variation. In each replication, both have the
+# same initial data, arrivals and shadowing, and the same values of all fields that the variation
+# does not set.
 
 # %%
 html.table(asked.fields(), f"Scenario {asked.scenario}, {asked.missions:,} missions of each policy")
@@ -54,11 +55,13 @@ html.table(asked.fields(), f"Scenario {asked.scenario}, {asked.missions:,} missi
 html.say("{answer}", answer=asked.answer())
 
 # %% [markdown]
-# These are paired differences, each with its 95 % interval; what is inconclusive has 0 in it. A
-# learned policy acts as it was trained: in a setting unlike that of its training, which its model
-# card describes, a new training may do better.
+# These are paired differences with their 95 % confidence intervals. A difference is
+# inconclusive if its interval contains 0. A learned policy is used as it was trained. In a setting
+# that differs from that of its training, which its model card describes, a newly trained policy may
+# do better.
 #
-# Means of the two sides may have overlapping intervals where their paired difference is clear:
+# The figures below show the means of both sides. Their intervals may overlap although the paired
+# difference is clearly not zero:
 
 # %%
 caption = f"n = {asked.missions:,} missions per dot, bars are 95 % intervals of the means."
@@ -70,12 +73,13 @@ html.gallery(
 )
 
 # %% [markdown]
-# The answer, and what single missions gain or lose in collection ratio and communication. A mission
-# that fails counts 0: pairs of which one failed lie far out.
+# The next figures show the paired differences, and how they are distributed over the
+# single missions (collection ratio and communication). A failed mission counts 0, so a pair with
+# one failed mission has a large difference.
 
 # %%
 pairs = f"n = {asked.missions:,} pairs per policy"
-spread = f"{pairs}: {asked.winners()}. Below: between the quantiles of 5 % and 95 %."
+spread = f"{pairs}: {asked.winners()}. The lower panel is limited to the 5 % and 95 % quantiles."
 html.gallery(
     [
         (asked.plot(), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
@@ -86,10 +90,10 @@ html.gallery(
 # %% [markdown]
 # ### In absolute terms
 #
-# Means per mission, data in data units, and the mean paired differences with their 95 % intervals,
-# each by itself: ▲ the whole interval is above 0, ▼ below it, ≈ around it. A UAV waits while it
-# asks for a charging pad and none is free. Its battery is depleted if it is empty before the quota
-# is filled.
+# The tables have means per mission and mean paired differences with their 95 % intervals. Data are
+# in data units. The signs mean: ▲ the whole interval is above 0, ▼ it is below 0, ≈ it contains 0.
+# A UAV waits while it requests a charging pad and none is free. Its battery counts as depleted if
+# it becomes empty before the quota is filled.
 
 # %%
 for policy in asked.policies:
@@ -98,11 +102,12 @@ for policy in asked.policies:
 # %% [markdown]
 # ### What common random numbers gained
 #
-# Baseline and variation meet the same realisations, so what a realisation gives or takes from both
-# drops out of the difference. A failed mission counts 0 in collection ratio and communication:
-# where failures come in different realisations, there is little to drop out. The table sets the
-# pairs beside independent missions: the variance as a share of theirs, by how much the interval is
-# narrower, and how many of them the pairs are worth.
+# The baseline and the variation use the same random numbers in each replication (common random
+# numbers). What a replication adds to both of them cancels in the difference, so the interval is
+# narrower. Little cancels where a mission fails on one side only, since it then counts 0 in
+# collection ratio and communication. The table compares the pairs with independent missions: the
+# variance of the difference as a share of that of independent missions, how much narrower the
+# interval is, and how many independent missions would give the same precision.
 
 # %%
 html.table(asked.pairing(), f"Differences of n = {asked.missions:,} pairs")
@@ -110,13 +115,14 @@ html.table(asked.pairing(), f"Differences of n = {asked.missions:,} pairs")
 # %% [markdown]
 # ## Two missions to look at
 #
-# They are of the best policy in the variation, unless the parameter `shown` names another. Each is
-# one example (n = 1), simulated in the same realisation of the baseline and of the variation.
+# The missions are those of the policy that is best in the variation, unless the parameter `shown`
+# names another policy. Each is a single example (n = 1): one replication, simulated in the baseline
+# and in the variation.
 
 # %% [markdown]
-# ### A typical one
+# ### A typical mission
 #
-# Of all differences in collection ratio and communication, that of this replication is the median.
+# This replication has the median of all differences in collection ratio and communication.
 
 # %%
 typical = asked.typical()
@@ -126,10 +132,10 @@ html.say("{effect}\n\n{lines}", effect=typical.effect(), lines=html.commands(typ
 html.gallery(typical.drawings())
 
 # %% [markdown]
-# ### A bad one
+# ### A bad mission
 #
-# Of all missions of the variation, this is the worst by collection ratio and communication, of
-# those alike by collection ratio.
+# This is the worst mission of the variation by collection ratio and communication; if several are
+# equally bad, the one with the lowest collection ratio.
 
 # %%
 worst = asked.worst()
@@ -139,23 +145,24 @@ html.say("{effect}\n\n{lines}", effect=worst.effect(), lines=html.commands(worst
 html.gallery(worst.drawings())
 
 # %% [markdown]
-# **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
-# in the colour of the node that was served in most of its communication slots; grey where none was.
-# A cross is a slot of hovering, a star a slot of charging. A numbered diamond is where a UAV
-# starts, a dot where its mission ends. UAVs that share a path are drawn side by side. y grows
-# south.
+# **How to read the map.** Every sensor node has a colour. An arrow is the move of a
+# UAV in one mission slot; it has the colour of the node that was served in most communication slots
+# of that slot, and is grey if no node was served. A cross is a slot in which the UAV hovered, a
+# star a slot in which it charged. A UAV starts at a numbered diamond, and its mission ends at a
+# dot. UAVs on the same path are drawn side by side. The y axis points south.
 
 # %% [markdown]
-# ## Ask again, ask more
+# ## Change the question
 #
-# The first lines make this page. The same question asked again reuses its missions; with more
-# `missions` only the others are simulated. `--set` and the parameter `baseline` take every field of
-# the scenario, in TOML syntax. In Jupyter, the page's notebook asks what its first cell says.
+# The first command below makes this page again. Missions that were simulated before are reused, so
+# with more `missions` only the additional ones are simulated. `--set` and the parameter `baseline`
+# accept every field of the scenario, in TOML syntax. You can also open the notebook of this page in
+# Jupyter, change its first cell and run all cells.
 #
-# To turn the question into a sweep, save the other lines as `my-sweep.toml`, add rows (each is a
-# variation; the first is the baseline) and run `dess study run my-sweep.toml --out
-# results/my-sweep`. With `kind = "grid"` and a table `values` of lists in place of the rows it
-# visits every combination.
+# To compare more than one variation, save the TOML lines as `my-sweep.toml` and add rows: the first
+# row is the baseline, every other row a variation. Then run `dess study run my-sweep.toml --out
+# results/my-sweep`. With `kind = "grid"` and a table `values` of lists in place of the rows, the
+# study simulates every combination of the values.
 
 # %%
 command = html.commands([asked.command()])
@@ -170,8 +177,8 @@ html.provenance([asked.results])
 # %% [markdown] tags=["jupyter"]
 # ## Sliders
 #
-# Move the sliders, choose policies, and press *Simulate*. A side that stays where the scenario has
-# it is not set; a range is drawn from, mission by mission.
+# Move the sliders, choose policies, and press *Simulate*. A field whose slider you do not move
+# keeps the value of the scenario. If that is a range, every mission draws its own value from it.
 
 # %% tags=["jupyter"]
 from reports.widgets import what_if_panel

@@ -255,7 +255,7 @@ def test_a_run_that_was_killed_leaves_no_lock(tmp_path):
 
 
 RECORDS = {
-    "other replications": ("replication", 3, "not of the replications"),
+    "other replications": ("replication", 3, "not those of the requested replications"),
     "another seed": ("seed", 8, "not of seed 7"),
     "no number": ("reward", float("nan"), "a reward that is not a number"),
 }

@@ -86,7 +86,11 @@ def test_it_states_the_answer_first(page, folder):
         f"number of charging pads {best['pads']}"
     ) in text
     assert text.index("What was simulated") < text.index("The best setting is")
-    for heading in ("What the fields do", "Compared with a baseline", "Policy against policy"):
+    for heading in (
+        "Effects of the fields",
+        "Comparison with a baseline",
+        "Comparison of the policies",
+    ):
         assert heading in text
     for heading in ("The selection", "The precision", "Sobol"):
         assert heading not in text

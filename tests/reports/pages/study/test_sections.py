@@ -22,11 +22,11 @@ STUDIES = {
     "a single point": (
         {},
         ["The best policy is", "The other policy", "Means with 95 % intervals", "Single missions"],
-        ["What the fields do", "baseline", "Sobol", "The selection"],
+        ["Effects of the fields", "baseline", "Sobol", "The selection"],
     ),
     "a field": (
         {"design": grid(uavs=[1, 2])},
-        ["What the fields do", "n = 10 missions per point; bars", "Compared with a baseline"],
+        ["Effects of the fields", "n = 10 missions per point; bars", "Comparison with a baseline"],
         ["Orange frames", "One panel for each"],
     ),
     "a list": (
@@ -37,7 +37,7 @@ STUDIES = {
     "two fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2]), "policies": ["greedy"]},
         ["Orange frames: cells that are not significantly worse", "n = 10 missions per cell"],
-        ["Policy against policy", "replications per cell"],
+        ["Comparison of the policies", "replications per cell"],
     ),
     "four fields": (
         {"design": grid(uavs=[1, 2], pads=[1, 2], quota=[20, 60], charge_start=[10, 15])},
@@ -58,17 +58,17 @@ STUDIES = {
         {"design": {"kind": "saltelli", "base": 8, "ranges": {"uavs": [1, 3], "quota": [20, 60]}},
          "missions": 1},
         ["A Sobol index is the share", "A dot is the mean over the missions with the value"],
-        ["The best setting", "Compared with a baseline", "Every policy meets the same"],
+        ["The best setting", "Comparison with a baseline", "All policies and all design points"],
     ),
     "a selection": (
         {"design": grid(uavs=[1, 3]), "selection": SELECTION},
         ["The selection", "The setting that was selected", "The check of the selected settings"],
-        ["Policy against policy"],
+        ["Comparison of the policies"],
     ),
     "a precision": (
         {"precision": PRECISION, "policies": ["greedy"]},
         ["The precision", "Half-widths of 95 % intervals", "The best policy is greedy"],
-        ["Policy against policy", "All others"],
+        ["Comparison of the policies", "All others"],
     ),
 }  # fmt: skip
 
