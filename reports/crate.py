@@ -55,7 +55,9 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
         InputError: If there is no such licence, or a file of the results is damaged.
     """
     for damaged in results.store.damaged:
-        raise InputError(f"{damaged}: is not what was written; allowed: results without damage")
+        raise InputError(
+            f"{damaged}: has been changed since it was written; allowed: results without damage"
+        )
     crate, study = ROCrate(version="1.1"), results.manifest["study"]
     root, software = crate.root_dataset, _software(crate, results)
     root["name"], root["description"] = f"Study {study['name']}", _description(results)

@@ -1,1 +1,1 @@
-"""Rendered pages: notebooks run in kernels, made into HTML files that can be verified."""
+"""Pages: notebooks are run and rendered as HTML files, which ``dess verify`` can check."""

@@ -1,4 +1,4 @@
-"""Parts of a page as HTML or Markdown: sentences, tables, figures, and where results come from.
+"""Parts of a page as HTML or Markdown: sentences, tables, figures, and the origin of results.
 
 html.say("{n:,} missions per policy.", n=300)
 html.table(frame, "Means with 95 % intervals")
@@ -24,13 +24,13 @@ from analysis.results.tables import Results
 from analysis.study.study import budget_of
 
 SHORT = 12  # characters of a hash that are shown
-STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that hold evidence
+STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contain evidence
 
-# A figure, its alternative text and its caption; its data, if it has links to them.
+# A figure, its alternative text, its caption and, if the page links to them, its data.
 Drawing = tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
 
-DIGITS = "%.6g"  # of numbers in files with data
-# What LaTeX has no letter for.
+DIGITS = "%.6g"  # format of numbers in files with data
+# Characters that LaTeX cannot print directly.
 _IN_LATEX = str.maketrans(
     {"−": "$-$", "–": "--", "▲": r"$\triangle$", "▼": r"$\nabla$", "≈": r"$\approx$", "±": r"$\pm$"}
 )
@@ -48,16 +48,16 @@ def commands(lines: Iterable[str]) -> str:
 
 
 def provenance(studies: Iterable[Results]) -> HTML:
-    """A table of what the studies of a page were made with, and the evidence to verify it."""
+    """A table of what the studies of a page were made with, with the evidence to verify them."""
     return carrying([Evidence.of(results) for results in studies])
 
 
 def carrying(evidence: Sequence[Evidence], files: Iterable[str] = ()) -> HTML:
-    """A table of what studies were made with, a column each, and the evidence in hidden elements.
+    """A table of what studies were made with, a column for each, and hidden elements with evidence.
 
     Args:
-        evidence: Of the studies.
-        files: Lists of files, as JSON, to hide in the page as well.
+        evidence: The evidence of the studies.
+        files: Lists of files, as JSON, which become hidden elements as well.
     """
     hidden = [_embedded(STUDY, json.dumps(of_study.data)) for of_study in evidence]
     hidden += [_embedded(FILES, text) for text in files]
@@ -100,18 +100,18 @@ def weights(folder: Path) -> HTML:
 
 
 def embedded(kind: str, html: str) -> list[str]:
-    """The JSON texts of a kind, ``STUDY`` or ``FILES``, that are hidden in a page; each once."""
+    """The distinct JSON texts of a kind, ``STUDY`` or ``FILES``, that are hidden in a page."""
     texts = re.findall(f'<script class="{kind}" [^>]*>(.*?)</script>', html, re.S)
     return list(dict.fromkeys(texts))
 
 
 def _embedded(kind: str, text: str) -> str:
-    inert = text.replace("<", "\\u003c")  # nothing in it ends the element
+    inert = text.replace("<", "\\u003c")  # so that the text cannot end the element
     return f'<script class="{kind}" type="application/json">{inert}</script>'
 
 
 def _weights(evidence: Evidence) -> Iterator[str]:
-    """The name and the hash of the weights of every learned policy of a study, each once."""
+    """The names of the learned policies of a study with the hashes of their weights."""
     for name, digest in dict.fromkeys(
         (team.policy if len(team.members) == 1 else member.name, member.weights)
         for team in evidence.policies
@@ -124,14 +124,14 @@ def _weights(evidence: Evidence) -> Iterator[str]:
 def table(
     frame: pd.DataFrame, caption: str = "", wrap: bool = False, data: pd.DataFrame | None = None
 ) -> HTML:
-    """A table without its index, under its caption; a wide one scrolls.
+    """A table below its caption, without its index; a wide table scrolls.
 
     Args:
         frame: The table.
-        caption: The text above it.
-        wrap: Whether long cells take several lines.
-        data: Its numbers, all of them: then links below save these as CSV, and what is shown as
-            LaTeX.
+        caption: The text above the table.
+        wrap: Whether long cells are broken into several lines.
+        data: The complete numbers of the table. If given, links below the table save them as CSV
+            and the shown table as LaTeX.
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
@@ -145,20 +145,20 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
 
     Args:
         drawing: The figure.
-        alt: What it shows, for those who do not see it.
-        caption: The text below it.
-        data: What is drawn: then links in the caption save it as CSV and as LaTeX.
+        alt: What the figure shows, for readers who cannot see it.
+        caption: The text below the figure.
+        data: The data of the figure. If given, links in the caption save them as CSV and as LaTeX.
     """
     return HTML(_figure(drawing, alt, caption, data))
 
 
 def gallery(drawings: Sequence[Drawing]) -> HTML:
-    """Figures with the arguments of ``figure``, side by side as far as there is room."""
+    """Several figures side by side where there is room; each has the arguments of ``figure``."""
     return HTML(f'<div class="gallery">{"".join(_figure(*parts) for parts in drawings)}</div>')
 
 
 def svg(drawing: Figure) -> bytes:
-    """A figure as SVG, the same bytes on each rendering."""
+    """A figure as SVG; the same figure gives the same bytes."""
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -177,7 +177,7 @@ def _figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None =
 
 
 def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
-    """Links that save data as CSV, and a table as LaTeX; they hold the files."""
+    """Links that save data as CSV and a table as LaTeX; the links contain the files."""
     name = re.sub(r"[^a-z0-9]+", "-", title.partition(":")[0].lower())[:80].strip("-")
     files = {
         "CSV": ("csv", "text/csv", data.to_csv(index=False, float_format=DIGITS.__mod__)),
@@ -192,6 +192,6 @@ def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
 
 
 def latex(frame: pd.DataFrame) -> str:
-    """A table in LaTeX, for the package booktabs."""
+    """A table in LaTeX; it needs the package booktabs."""
     text = frame.to_latex(index=False, escape=True, float_format=DIGITS.__mod__, na_rep="")
     return re.sub(r"\bC\\_([SC])\b", r"$C_\1$", text).translate(_IN_LATEX)

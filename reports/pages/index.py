@@ -27,7 +27,7 @@ _SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
 
 @dataclass(frozen=True)
 class Card:
-    """What the index shows of a page."""
+    """What the index shows about a page."""
 
     page: str
     title: str
@@ -60,7 +60,7 @@ def index_of(pages: Mapping[str, str], reports: Sequence[Report]) -> str:
 
 
 def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
-    """The pages in a folder, by file name; altered ones are left out, with a warning.
+    """The pages in a folder, by file name; pages that were altered are left out, with a warning.
 
     Args:
         out: The folder.
@@ -85,7 +85,7 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
 
 
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
-    """The evidence that pages carry of their studies, without duplicates."""
+    """The evidence of all studies in the pages, without duplicates."""
     texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
     return [
         Evidence.parse(text, "page", "allowed: a page of dess report")
@@ -100,6 +100,6 @@ def _card_of_study(name: str, content: str) -> Card:
 
 
 def _thumbnail(content: str, number: int) -> Markup:
-    """An image of a page: of a report the last, which shows the most; none without any."""
+    """An image of a page (of a report the last one, which shows most), or nothing without one."""
     images = _IMAGE.findall(content)
     return Markup(images[number] if images else "")

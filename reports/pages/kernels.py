@@ -1,7 +1,7 @@
-"""Runs notebooks in Jupyter kernels, two at a time.
+"""Run notebooks in Jupyter kernels, two at a time.
 
-A kernel imports what this process imports, computes in one thread and writes nothing to the user's
-home. A kernel that dies before its first cell is started once more.
+A kernel imports the same modules as this process, computes in one thread and writes nothing into
+the user's home folder. A kernel that dies before its first cell is started a second time.
 """
 
 import atexit
@@ -25,7 +25,7 @@ from nbformat import NotebookNode
 from dess import InputError
 from reports.pages.notebook import Report
 
-# Called after a cell with the cells run and the cells in all, of all reports, and the report.
+# Called after every cell, with the number of cells run so far and of all cells, and the report.
 Progress = Callable[[int, int, str], None]
 
 AT_ONCE = 2
@@ -33,7 +33,7 @@ LONGEST_SOCKET_PATH = 90  # characters; systems allow about 100
 
 
 class Kernels:
-    """Runs reports in the folder that holds their results."""
+    """Runs reports in the folder that contains their results."""
 
     def __init__(self, results: Path, progress: Progress | None = None):
         self.results, self.progress = results, progress
@@ -41,7 +41,7 @@ class Kernels:
         self._lock, self._stopped = Lock(), False
 
     def run(self, reports: Sequence[Report]) -> None:
-        """Run reports; the failure of one is noted in it, and the others are still run.
+        """Run reports. If one fails, the error is stored in it and the others are still run.
 
         Raises:
             InputError: If a notebook refuses its parameters or results.
@@ -69,7 +69,7 @@ class Kernels:
             wait(futures, timeout=0.2)
 
     def _execute(self, report: Report, reports: Sequence[Report]) -> None:
-        """Run a report, in a second kernel if the first dies before the first cell."""
+        """Run a report; start a second kernel if the first one dies before the first cell."""
         for is_last in (False, True):
             try:
                 with TemporaryDirectory() as home:
@@ -92,7 +92,7 @@ class Kernels:
     def _client(
         self, report: Report, reports: Sequence[Report], folder: Path, home: Path
     ) -> NotebookClient:
-        """A client that runs a report in a folder, and notes in the report how far it is."""
+        """A client that runs a report in a folder and stores its progress in the report."""
 
         def begin(cell: NotebookNode, **_: Any) -> None:
             report.begun = cell.id
@@ -117,7 +117,7 @@ class Kernels:
 
 
 def _cell(report: Report) -> str:
-    """The cell that was begun last, by its number among the cells with code, and its first line."""
+    """The cell that was begun last: its number among the cells with code, and its first line."""
     number = [cell.id for cell in report.cells].index(report.begun) if report.begun else 0
     first_line = report.cells[number].source.strip().partition("\n")[0]
     return f"report {report.name}: cell {number + 1} of {len(report.cells)} ({first_line})"
@@ -131,7 +131,7 @@ def _run(client: NotebookClient, environment: dict[str, str]) -> None:
 
 
 def _manager(home: Path) -> AsyncKernelManager:
-    """Starts a kernel of this interpreter; an installed "python3" may be another one's."""
+    """A manager of kernels of this interpreter; a kernel "python3" may use another interpreter."""
     manager = AsyncKernelManager(
         kernel_name=NATIVE_KERNEL_NAME,
         kernel_spec_manager=KernelSpecManager(kernel_dirs=[]),
@@ -152,7 +152,7 @@ def _environment(home: Path) -> dict[str, str]:
         **dict.fromkeys(folders, str(home)),
         "PYTHONPATH": path,
         "OMP_NUM_THREADS": "1",
-        "TQDM_DISABLE": "1",  # a page has no bar
+        "TQDM_DISABLE": "1",  # a page shows no progress bar
         "MPLBACKEND": "agg",
         "MPLCONFIGDIR": mpl.get_cachedir(),
     }

@@ -1,7 +1,8 @@
-"""Missions that pages show beside the records of their studies.
+"""Missions that pages need in addition to the results of their studies.
 
-Notebooks do not simulate: before they run, these missions are simulated again and kept in the
-folder ``cross-check`` beside the results. What is there of the same results stays::
+The notebooks of these pages do not simulate. Before they run, some missions are simulated again and
+stored in the folder ``cross-check`` beside the results. Missions that are already there and belong
+to the same results are not simulated again::
 
     make(["verification"], Path("results"), {})
 """
@@ -16,7 +17,7 @@ from analysis.results.tables import load_results
 from analysis.verification import cross_check
 from reports.pages.kernels import Progress
 
-COMPARISON, VERIFICATION = "comparison", "verification"  # the pages, and the studies of them
+COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
 
 
 def make(
@@ -29,7 +30,7 @@ def make(
 
     Args:
         pages: Names of reports; those that need no missions are ignored.
-        results: The folder that holds a results folder per study.
+        results: The folder that contains a results folder per study.
         parameters: Values for the parameters of the notebooks.
         progress: Called after every mission.
 

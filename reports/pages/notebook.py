@@ -1,9 +1,9 @@
-"""The notebooks of reports, read from their files, with values for their parameters.
+"""The notebooks of reports: read from their files, with values for their parameters.
 
-A notebook is a Python file in jupytext's percent format. Its heading and the paragraph below are
-the title and the description of its page, its metadata name the studies that it reads, and one of
-its cells is tagged ``parameters``. Cells tagged ``jupyter`` are in the notebook beside the page,
-and neither run for the page nor shown on it:
+A notebook is a Python file in jupytext's percent format. Its heading and first paragraph are the
+title and the description of the page. Its metadata name the studies that it reads. One of its cells
+is tagged ``parameters``. Cells tagged ``jupyter`` are only for the notebook that opens in Jupyter;
+they are neither run for the page nor shown on it:
 
     report = read("what-if")
     report.set({"missions": 500})
@@ -24,7 +24,7 @@ from dess.errors import InputError, one_of
 from reports.pages.parameters import values_of, with_paths, with_values
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
-SCORECARD = "scorecard"  # the index shows all of it
+SCORECARD = "scorecard"  # the index shows the complete scorecard
 NAMES = (  # in the order of the index
     "mission",
     "performance",
@@ -38,7 +38,7 @@ NAMES = (  # in the order of the index
     "verification",
     SCORECARD,
 )
-# Tags of cells: the parameters, and what only Jupyter shows.
+# Tags of cells: the parameters, and cells that are only for Jupyter.
 PARAMETERS, IN_JUPYTER = "parameters", "jupyter"
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
@@ -46,15 +46,15 @@ _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
 @dataclass
 class Report:
-    """A notebook, and how far it has been run.
+    """A notebook and its progress.
 
     Attributes:
         name: Its name on the command line.
         title: Its heading.
         description: The paragraph below the heading.
         studies: Names of the results folders that it reads.
-        original: All that is in its file.
-        notebook: The cells of the page, with values for parameters.
+        original: The complete notebook, as in its file.
+        notebook: The cells of the page, with values for the parameters.
         begun: Id of the cell that was begun last.
         done: Number of cells that have been run.
         failure: The cell that failed and its error, if one did.
@@ -74,7 +74,7 @@ class Report:
 
     @property
     def page(self) -> str:
-        """File name of the page; a failed report has another one, so the complete page stays."""
+        """File name of the page; a failed report gets another name, to keep an older page."""
         return f"{self.name}{'.partial' if self.failure else ''}.html"
 
     @property
@@ -89,7 +89,7 @@ class Report:
 
     @property
     def code(self) -> list[str]:
-        """The code of every cell; of a path of this machine it has the last name only."""
+        """The code of every cell; absolute paths are shortened to their last part."""
         names = {name: with_paths(v, os.path.basename) for name, v in self.parameters.items()}
         changed = _parameters_cell(self.notebook)
         return [with_values(c.source, names) if c is changed else c.source for c in self.cells]

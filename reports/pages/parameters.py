@@ -1,7 +1,7 @@
 """The parameters of a notebook: the assignments of plain values in one of its cells.
 
 values_of('missions = 500  # of every policy')                     # {'missions': 500}
-with_values('missions = 500  # of every policy', {"missions": 40})  # comments stay
+with_values('missions = 500  # of every policy', {"missions": 40})  # keeps the comment
 """
 
 import ast
@@ -16,11 +16,11 @@ def values_of(source: str) -> dict[str, Any]:
 
 
 def with_values(source: str, values: Mapping[str, Any]) -> str:
-    """The source of a cell that assigns other values to its parameters; all else stays.
+    """The source of a cell with other values for its parameters; comments and layout are kept.
 
     Args:
-        source: The cell.
-        values: By name; those of other cells are ignored.
+        source: The source of the cell.
+        values: Values by name; names that the cell does not assign are ignored.
     """
     before = values_of(source)
     lines = source.encode().split(b"\n")  # columns of a syntax tree count bytes
@@ -33,10 +33,10 @@ def with_values(source: str, values: Mapping[str, Any]) -> str:
 
 
 def with_paths(value: Any, write: Callable[[str], str]) -> Any:
-    """The value of a parameter with its paths written in another way.
+    """The value of a parameter with its paths replaced, such as relative by absolute ones.
 
-    A path is a word with a path separator, or one that ends with ``.toml``, also inside a team:
-    with ``os.path.abspath``, ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
+    A path is a word with a path separator, or one that ends with ``.toml``. It may be a part of a
+    team: with ``os.path.abspath``, ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
     """
     if isinstance(value, list):
         return [with_paths(item, write) for item in value]
@@ -49,7 +49,7 @@ def with_paths(value: Any, write: Callable[[str], str]) -> Any:
 
 
 def _assignments(source: str) -> Iterator[tuple[str, ast.expr]]:
-    """The name and the value of every assignment, in their order."""
+    """The name and the value of every assignment, in the order of the source."""
     for node in ast.parse(source).body:
         if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
             yield node.targets[0].id, node.value

@@ -1,6 +1,6 @@
-"""Renders reports: runs notebooks on results and writes a self-contained page for each.
+"""Render reports: run notebooks on results and write a self-contained page for each.
 
-Same results, same bytes: pages hold no time and no path of this machine.
+The same results give the same bytes, since a page contains no time and no path of this machine.
 """
 
 import logging
@@ -35,12 +35,12 @@ log = logging.getLogger(__name__)
 
 _WIDGET = "application/vnd.jupyter.widget-view+json"  # type of an output, such as a progress bar
 
-# ``C_S`` in the text of a page, or a piece of it that is no text.
+# ``C_S`` in the text of a page, or a piece of the page that is not text.
 _INDEX_OR_NO_TEXT = re.compile(r"<(code|pre|script|style)\b.*?</\1>|<[^>]*>|\bC_([SC])\b", re.S)
 
 
 class ReportError(RuntimeError):
-    """Notebooks failed: the cell of each, its error, and the path of the partial page."""
+    """One or more notebooks failed; the message has each cell, its error and the partial page."""
 
 
 def render(
@@ -147,7 +147,7 @@ def _write(
 
 @contextmanager
 def _folders(folders: Iterable[Path]) -> Iterator[None]:
-    """Make folders; remove those that are still empty if the body fails."""
+    """Make folders; if the body of the ``with`` block fails, remove those that are still empty."""
     made: list[Path] = []
     try:
         for folder in folders:
@@ -187,7 +187,7 @@ def _page(report: Report) -> str:
 def html_of(notebook: NotebookNode) -> str:
     """The outputs and the text of a notebook as HTML, without widgets, which only Jupyter shows.
 
-    Its stderr goes to the log instead.
+    What the notebook wrote to stderr is logged instead.
     """
     notebook.metadata.pop("widgets", None)
     for cell in notebook.cells:
@@ -207,5 +207,5 @@ def html_of(notebook: NotebookNode) -> str:
 
 
 def with_indices(content: str) -> str:
-    """HTML with ``C_S`` in its text as a C with an index; code and attributes stay."""
+    """HTML in which ``C_S`` is a C with an index, except in code and attributes."""
     return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], content)

@@ -18,7 +18,7 @@ from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from reports.pages.template import template
 
-# Verdict -> class and sign, so that colour is not all that tells them apart.
+# The class and the sign of each verdict; the sign helps readers who cannot see the colours.
 LOOKS = {
     HOLDS: ("holds", "✓"),
     IN_PART: ("in-part", "◐"),
@@ -32,8 +32,8 @@ def as_html(rows: Sequence[Row], departures: Sequence[str] = ()) -> HTML:
     """The scorecard.
 
     Args:
-        rows: As of ``analysis.replication.scorecard.scorecard``.
-        departures: What of the policy with the paper's network is not the paper's.
+        rows: The result of ``analysis.replication.scorecard.scorecard``.
+        departures: In what the policy with the paper's network departs from the paper.
     """
     columns = [*zip(*(row.findings for row in rows), strict=True)]
     page = template("scorecard.html", figure=figure, percent=numbers.percent)
@@ -78,7 +78,7 @@ def _usual_policy(findings: Iterable[Finding]) -> str:
 
 
 def _counts(findings: Iterable[Finding]) -> dict[str, int]:
-    """How often every verdict is given."""
+    """The number of findings with each verdict."""
     given = Counter(finding.verdict for finding in findings)
     return {verdict: given[verdict] for verdict in VERDICTS if given[verdict]}
 

@@ -1,7 +1,7 @@
-"""The model described after the STRESS-DES checklist, filled in from what studies were run with.
+"""The description of the model by the STRESS-DES checklist, with the values of the studies.
 
-All words stand in the template ``stress_des.md``, a heading per section of the checklist; this
-module passes it numbers and lists:
+All sentences stand in the template ``stress_des.md``, with a heading per section of the checklist;
+this module passes numbers and lists to it:
 
     description = describe(results.manifest)
     Markdown(description.sections["4"])
@@ -30,11 +30,12 @@ _HEADING = re.compile(r"^(?=### )", re.M)
 
 
 class Description(NamedTuple):
-    """A model after the checklist.
+    """The description of a model by the checklist.
 
     Attributes:
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
-        overview: The order of events (III-C, item 2.1): what ``figures.verification.slot`` draws.
+        overview: The order of events in a slot (Section III-C of the paper, item 2.1 of the
+            checklist), which ``figures.verification.slot`` draws.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 
@@ -47,8 +48,8 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
     """Describe the model that studies were run with.
 
     Args:
-        manifest: Of the study whose scenario is the base model.
-        others: Of further studies with the model.
+        manifest: The manifest of the study whose scenario is the base model.
+        others: The manifests of other studies that use the model.
     """
     space = ScenarioSpace.of(**manifest["scenario"])
     x, y, width, height = space.zone
@@ -118,7 +119,7 @@ def _value(space: ScenarioSpace, field: str) -> str:
 
 
 def _cells(nodes: Sequence[tuple[int, int]]) -> str:
-    """Cells, in short where they are all combinations of columns and rows."""
+    """Cells as text; short if they are all combinations of some columns and rows."""
     columns, rows = (sorted({node[axis] for node in nodes}) for axis in (0, 1))
     if len(columns) * len(rows) == len(nodes):
         return f"x in {{{', '.join(map(str, columns))}}}, y in {{{', '.join(map(str, rows))}}}"
@@ -130,7 +131,7 @@ def _number(value: float) -> str:
 
 
 def _span(values: Sequence[float]) -> str:
-    """From the least to the greatest: ``80``, or ``70 to 80``."""
+    """The smallest and the largest value as text: ``70 to 80``, or ``80`` if they are equal."""
     return " to ".join(dict.fromkeys(map(_number, (min(values), max(values)))))
 
 

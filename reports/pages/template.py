@@ -1,4 +1,4 @@
-"""Fills the templates of pages, and seals them: a page holds the checksum of its own text."""
+"""Fill the templates of pages, and seal the pages: a page contains a checksum of its own text."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,11 +12,11 @@ from reports.pages.verify import sealed
 
 
 def template(name: str, **filters: Callable[..., str]) -> Template:
-    """A template; it escapes values if it is HTML, and refuses undefined ones.
+    """Load a template, which escapes values if it is HTML and raises an error if one is undefined.
 
     Args:
         name: File name in ``reports/templates``.
-        **filters: Its filters beside those of Jinja.
+        **filters: Filters in addition to those of Jinja.
     """
     environment = Environment(
         loader=PackageLoader("reports", "templates"),
@@ -29,6 +29,6 @@ def template(name: str, **filters: Callable[..., str]) -> Template:
 
 
 def fill(name: str, **values: Any) -> str:
-    """A sealed page: a template with its values."""
+    """Fill a template with values, and seal the page."""
     style = Markup(HtmlFormatter().get_style_defs(".highlight"))
     return sealed(template(name).render(code_style=style, version=dess.__version__, **values))

@@ -1,8 +1,9 @@
-"""Checks of pages and results: their bytes, and the records of missions simulated again.
+"""Check pages and results: their bytes, and the records of missions that are simulated again.
 
-A page has a checksum of the rest of it, and the evidence of its studies (``Evidence``): what they
-were made with, and some of their missions. Results have all missions, and a hash in every file's
-name. Whoever forges both is found by simulating missions again.
+A page contains a checksum of its text and the evidence of its studies (``Evidence``): what they
+were made with, and a sample of their missions. A results folder contains all missions, and every
+file name has a hash of the file. If somebody changes both the content and the hash, simulating
+missions again still shows the difference.
 """
 
 import re
@@ -21,19 +22,19 @@ from dess import InputError, simulate
 from policies import load_team
 from reports.pages.html import FILES, STUDY, embedded
 
-# Where a page carries the checksum of all the rest of it.
+# The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
 _ALLOWED = "allowed: a page of dess report, or a results folder"
 
 
 @dataclass(frozen=True)
 class Check:
-    """What came of a check.
+    """The result of a check.
 
     Attributes:
-        what: Was checked: a study, by its name, or something else that goes with pages.
-        compared: The number of missions, or files.
-        differing: A line for every one that differs.
+        what: What was checked: the name of a study, or another part of a page.
+        compared: The number of missions or files that were compared.
+        differing: A line for every mission or file that differs.
         notes: How the code and libraries differ from those that made the results.
     """
 
@@ -44,13 +45,13 @@ class Check:
 
 
 def sealed(html: str) -> str:
-    """A page with its checksum filled in."""
+    """The page with its checksum filled in."""
     checksum = sha256(_SEAL.sub(r"\g<1>\g<3>", html, count=1).encode()).hexdigest()
     return _SEAL.sub(rf"\g<1>{checksum}\g<3>", html, count=1)
 
 
 def is_sealed(html: str) -> bool:
-    """Whether a page has a checksum, and it is that of the page."""
+    """Whether the checksum in a page is the checksum of its text."""
     return _SEAL.search(html) is not None and sealed(html) == html
 
 
@@ -59,42 +60,43 @@ def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
 
     Args:
         path: The page.
-        missions: How many to simulate again, at most, of every study that it shows.
-        seed: Of their choice.
+        missions: The largest number of missions to simulate again, for every study on the page.
+        seed: Seed of the random choice of these missions.
 
     Raises:
-        InputError: If it is no page of dess, or a policy is not there.
+        InputError: If the file is not a page of dess, or a policy cannot be loaded.
     """
     try:
         html = path.read_bytes().decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read: {error}; {_ALLOWED}") from None
     if not _SEAL.search(html):
-        raise InputError(f"{path}: is no page of dess; {_ALLOWED}")
+        raise InputError(f"{path}: is not a page of dess; {_ALLOWED}")
     altered = [] if is_sealed(html) else ["the page has been altered"]
     files = [_check_files(text, path) for text in embedded(FILES, html)]
     studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
-    notes = [] if studies else ["carries no missions to simulate again"]
+    notes = [] if studies else ["contains no missions to simulate again"]
     records = [check_records(evidence, missions, seed) for evidence in studies]
     return [Check("page", 1, altered, notes), *files, *records]
 
 
 def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
-    """Check results: the bytes of all files, and missions drawn at random, with logs and without.
+    """Check results: the bytes of all files, and the records and event logs of random missions.
 
-    Of several folders, one that cannot be read differs, and an incomplete one is noted.
+    If there are several results folders, one that cannot be read counts as differing, and an
+    incomplete one is mentioned in a note.
 
     Args:
-        folder: A results folder, or one that holds such.
-        missions: How many to simulate again, at most, of every study.
-        seed: Of their choice.
+        folder: A results folder, or a folder with results folders.
+        missions: The largest number of missions to simulate again, for every study.
+        seed: Seed of the random choice of these missions.
 
     Raises:
-        InputError: If there are no results, they are incomplete, or a policy is not there.
+        InputError: If there are no results, they are incomplete, or a policy cannot be loaded.
     """
     folders = sorted(path.parent for path in folder.rglob(MANIFEST))
     if not folders:
-        raise InputError(f"{folder}: holds no results and is no page; {_ALLOWED}")
+        raise InputError(f"{folder}: contains no results and is not a page; {_ALLOWED}")
     if folders == [folder]:
         return _check_study(Store.read(folder), missions, seed)
     checks = []
@@ -111,7 +113,7 @@ def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
 
 def _check_study(store: Store, missions: int, seed: int) -> list[Check]:
     if store.damaged:
-        lines = [f"{path}: is not what was written" for path in store.damaged]
+        lines = [f"{path}: has been changed since it was written" for path in store.damaged]
         return [Check(store.manifest.study["name"], 0, lines)]
     records = check_records(Evidence.of(results_of(store), missions, seed), missions, seed)
     return [records, _check_logs(store, missions, seed)] if store.logged else [records]
@@ -121,9 +123,9 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
     """Simulate a random part of the sample again, with the SimPy engine, and compare the records.
 
     Args:
-        evidence: Of the study.
-        missions: How many, at most.
-        seed: Of the choice.
+        evidence: The evidence of the study.
+        missions: The largest number of missions.
+        seed: Seed of the random choice.
 
     Raises:
         InputError: If a policy does not exist, or a scenario is not valid.
@@ -139,7 +141,7 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
 
 
 def _check_logs(store: Store, missions: int, seed: int) -> Check:
-    """Simulate some of the missions again whose event logs are kept, and compare the logs."""
+    """Simulate some missions with a stored event log again, and compare the logs."""
     manifest, logged, lines = store.manifest, store.logged, []
     numbers = chosen(len(logged), missions, seed)
     for cell, replication in (logged[number] for number in numbers):
@@ -150,7 +152,7 @@ def _check_logs(store: Store, missions: int, seed: int) -> Check:
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
             command = manifest.command(cell, replication)
-            lines.append(f"the event log is another one when simulated again; command: {command}")
+            lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(numbers), lines)
 
 
@@ -159,9 +161,9 @@ def _check_files(text: str, path: Path) -> Check:
     try:
         files = TypeAdapter(dict[str, str]).validate_json(text)
     except ValidationError:
-        raise InputError(f"{path}: its list of files is none; {_ALLOWED}") from None
+        raise InputError(f"{path}: its list of files is not valid; {_ALLOWED}") from None
     shipped = learned_files()
     others = [name for name, digest in files.items() if shipped.get(name) != digest]
     return Check(
-        "learned policies", len(files), [f"{name}: is another one here" for name in others]
+        "learned policies", len(files), [f"{name}: differs from the file here" for name in others]
     )

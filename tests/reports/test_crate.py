@@ -181,6 +181,6 @@ def test_damaged_results_are_not_exported(tmp_path):
     results = results_of(tmp_path)
     log = next((tmp_path / "out" / "events").rglob("*.parquet"))
     log.write_bytes(log.read_bytes()[:-1])
-    with pytest.raises(InputError, match="is not what was written"):
+    with pytest.raises(InputError, match="has been changed since it was written"):
         exported(tmp_path, load_results(tmp_path / "out"))
     assert results.store.damaged == []

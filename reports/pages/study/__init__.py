@@ -1,1 +1,1 @@
-"""The page of any study: its sections, its sentences and tables, its drawings."""
+"""The page of any study: its sections, sentences, tables and figures."""

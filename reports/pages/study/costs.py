@@ -1,4 +1,4 @@
-"""What the settings of a study cost, on its page: the fronts, their tables, the cheapest settings.
+"""The costs of a study's settings on its page: Pareto fronts, tables, the cheapest settings.
 
 fronts = costs.fronts_of(study)
 html.gallery(costs.drawn(study, fronts))
@@ -20,16 +20,16 @@ from reports.pages import html
 from reports.pages.html import Drawing
 from reports.pages.study.words import MOST_ROWS
 
-MOST_CONDITIONS = 9  # that have a figure; the table has all
-CERTAIN = 0.01  # a setting that is less probably on a front is not in the table
-MARKS = "The larger and darker a mark, the more probable is it that the setting is on the front."
+MOST_CONDITIONS = 9  # the largest number of conditions with a figure; the table has all
+CERTAIN = 0.01  # settings with a lower probability of being on a front are not in the table
+MARKS = "The larger and darker a mark, the higher the probability that the setting is on the front."
 
 
-Fronts = Mapping[str, pd.DataFrame]  # by metric, as of ``questions.costs.front``
+Fronts = Mapping[str, pd.DataFrame]  # for each metric, the result of ``questions.costs.front``
 
 
 def fronts_of(results: Results) -> Fronts:
-    """The fronts of the page: by the metrics that are required, or by success and the product."""
+    """The fronts on the page: for the required metrics, or for success and the product."""
     metrics = [*required(results)] or [SUCCESS, PRODUCT]
     return {metric: questions.front(results, metric) for metric in metrics}
 
@@ -42,7 +42,7 @@ def required(results: Results) -> Mapping[str, float]:
 
 
 def drawn(results: Results, fronts: Fronts) -> list[Drawing]:
-    """Cost against the metrics of the fronts under every condition."""
+    """Figures of the cost against the metrics of the fronts, for every condition."""
     drawings: list[Drawing] = []
     for metric, front in fronts.items():
         for condition, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
@@ -72,7 +72,7 @@ def front_table(results: Results, fronts: Fronts) -> HTML:
 
 
 def parts_table(results: Results) -> HTML:
-    """What makes up the costs of the settings."""
+    """A table of the parts of the settings' costs."""
     rows = questions.priced(results)
     rows = rows.merge(questions.parts(results).drop(columns=COST), on=["policy", "point"])
     top = rows.head(MOST_ROWS)
@@ -84,16 +84,16 @@ def parts_table(results: Results) -> HTML:
 
 
 def cheapest(results: Results) -> str:
-    """The cheapest settings that meet the requirements, and why, as a list; with the guarantee."""
+    """The cheapest settings that meet the requirements, with reasons and guarantee, as a list."""
     table = questions.judged(results)
     lines = [f"- {text}" for text in questions.answers(results, table)]
     said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
-    sure = "\n\n".join(f"What is known of it: {text}." for text in sorted(said))
+    sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
     return "\n".join(lines) + f"\n\n{sure}"
 
 
 def judged_table(results: Results) -> HTML:
-    """Whether the settings meet the requirements."""
+    """A table of the settings and whether they meet the requirements."""
     table = questions.judged(results)
     top = table.head(MOST_ROWS)
     shown = _settings(top, [*required(results)])
@@ -105,7 +105,7 @@ def judged_table(results: Results) -> HTML:
 
 
 def checked_table(results: Results) -> HTML:
-    """The check of the selected settings on missions that did not select them."""
+    """A table of the check of the selected settings on independent missions."""
     if results.checks.empty:
         return HTML("<p>No setting was checked.</p>")
     rows = questions.checks(results)

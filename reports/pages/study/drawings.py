@@ -1,4 +1,4 @@
-"""Drawings of a study for ``html.gallery``, each with its caption and its data.
+"""Figures of a study for ``html.gallery``, each with its caption and its data.
 
 html.gallery(drawings.curves(study, metrics))
 """
@@ -40,7 +40,7 @@ def means(results: Results, metrics: Iterable[str]) -> list[Drawing]:
 
 
 def curves(results: Results, metrics: Iterable[str]) -> list[Drawing]:
-    """Every metric against the only field that the design varies: a curve per policy."""
+    """Every metric against the only field that the design varies, with a curve per policy."""
     (field,) = settings.varied(results)
     drawings: list[Drawing] = []
     for metric in metrics:
@@ -66,7 +66,7 @@ def heat_maps(results: Results, metrics: Iterable[str]) -> list[Drawing]:
 
 
 def small_multiples(results: Results, metric: str = PRODUCT) -> list[Drawing]:
-    """A metric of every policy over the three fields that move it most: a panel per value."""
+    """A metric of every policy over the three fields with the largest effect, in several panels."""
     fields = settings.by_influence(settings.main_effects(results, metric))
     x, y, facet = fields[:3]
     values = settings.varied(results)[facet]
@@ -91,7 +91,7 @@ def main_effects(results: Results, metrics: Iterable[str]) -> list[Drawing]:
     for metric in metrics:
         data = settings.main_effects(results, metric)
         caption = (
-            "One panel for each field, the one that moves the metric most first. A dot is the mean "
+            "One panel for each field, the one with the largest effect first. A dot is the mean "
             f"over {_MEANT[is_sample]}; n = {_counted(data)}; bars are {_LEVEL} intervals."
         )
         drawings.append(
@@ -121,7 +121,7 @@ def scatter(results: Results, metrics: Iterable[str]) -> list[Drawing]:
 
 
 def one_at_a_time(results: Results) -> list[Drawing]:
-    """The three metrics against every field, all other fields as the scenario has them."""
+    """The three metrics against every field, with all other fields as in the scenario."""
     table = one_by_one.effects(results)
     changes = one_by_one.changes_by_field(results, table)
     return [
@@ -129,8 +129,8 @@ def one_at_a_time(results: Results) -> list[Drawing]:
             parameters.effect(table, field, pairs, results.policies),
             f"The metrics against the {parameter(field).within}",
             f"n = {_counted(table[table['field'] == field])} missions per point; bars are {_LEVEL} "
-            "intervals. The lowest panel has the change from the first value on, mission by "
-            "mission, on an axis of its own.",
+            "intervals. The lowest panel shows the paired difference from the first value, with an "
+            "axis of its own.",
             table[table["field"] == field],
         )
         for field, pairs in changes.items()
@@ -146,7 +146,7 @@ def sensitivity(results: Results, metric: str = PRODUCT) -> list[Drawing]:
             parameters.sensitivity(part, str(policy)),
             f"Sobol indices of {metric_name(metric).lower()} for {policy}",
             f"{policy}: n = {part['n'].min():,} missions; lines are {_LEVEL} intervals by "
-            "bootstrap. Below the dotted line: noise, which no setting removes.",
+            "bootstrap. Below the dotted line is the noise, which no setting removes.",
             part,
         )
         for policy, part in rows.groupby("policy", sort=False)
@@ -162,14 +162,14 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> list[Drawing]
             figures.distribution(missions, metric),
             f"Distribution of {metric_name(metric).lower()} over the missions",
             f"The height of a curve is the share of the missions (n = {numbers.span(counts)} per "
-            "policy) with at most the value below it. A step at 0 are missions that failed.",
+            "policy) with at most the value on the axis. A step at 0 shows missions that failed.",
             missions[columns].sort_values(columns[:3], kind="stable"),
         )
     ]
 
 
 _LEVEL = numbers.level(LEVEL)
-# What a main effect is the mean over, by whether the design is a sample of single missions.
+# What the mean of a main effect is taken over, if the design is a sample of single missions or not.
 _MEANT = {
     False: "all design points with the value, so over the other fields as the design has them, "
     "replication by replication",
@@ -194,7 +194,7 @@ def _listed(fields: Sequence[str]) -> str:
 
 
 def _left_out(values: Sequence[object]) -> str:
-    """Which values have a panel, if not all have."""
+    """Which values have a panel, if some have none."""
     panels = figures.shown(values)
     if len(panels) == len(values):
         return ""

@@ -61,7 +61,7 @@ def _has(section: str) -> Callable[[Results], bool]:
     return lambda results: results.manifest["study"][section] is not None
 
 
-# Tag -> whether a study has the cells with this tag.
+# For each tag, a function that tells whether the page of a study has the cells with this tag.
 TAGS: dict[str, Callable[[Results], bool]] = {
     # Several design points whose missions share their replications: settings to rank.
     "if-settings": _has_settings,

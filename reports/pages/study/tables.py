@@ -1,4 +1,4 @@
-"""Tables of the page of a study, each with its caption and its data, in their order on the page.
+"""The tables on the page of a study, each with its caption and its data, in the order of the page.
 
 tables.ranked(study, settings.ranked(study, metric), metric)
 """
@@ -48,7 +48,7 @@ def best_of_policies(results: Results, metric: str) -> HTML:
 
 
 def main_effects(results: Results, metric: str) -> HTML:
-    """By how much every field moves a metric."""
+    """The size of the effect of every field on a metric."""
     effects = settings.main_effects(results, metric)
     write = numbers.percent if metric in METRICS else numbers.quantity
     rows = []
@@ -57,8 +57,8 @@ def main_effects(results: Results, metric: str) -> HTML:
         ends = [f"{write(row['mean'])} at {row['value']}" for row in (low, high)]
         span = write(high["mean"] - low["mean"]).replace(" %", " points")
         rows.append((parameter(str(field)).name, policy, *ends, span))
-    columns = ["Field", "Policy", "Lowest mean", "Highest mean", "Apart"]
-    caption = f"How far each field moves {metric_name(metric).lower()}, the other fields averaged"
+    columns = ["Field", "Policy", "Lowest mean", "Highest mean", "Difference"]
+    caption = f"The effect of each field on {metric_name(metric).lower()}, averaged over the others"
     data = effects.drop(columns="tied")
     return html.table(pd.DataFrame(rows, columns=columns), caption, data=data)
 
@@ -71,7 +71,7 @@ def sensitivity(results: Results) -> HTML:
 
 
 def selected(results: Results) -> HTML:
-    """What was selected for every policy."""
+    """The setting that was selected for every policy."""
     data = summary.selections(results)
     words = settings.in_words(results)
     columns = {
@@ -85,7 +85,7 @@ def selected(results: Results) -> HTML:
 
 
 def checked(results: Results) -> HTML:
-    """The check of what was selected."""
+    """The check of the selected settings on independent missions."""
     caption = f"The check of the selected settings: means with {_LEVEL} intervals"
     return _means(summary.checks(results), caption)
 
@@ -96,7 +96,7 @@ def means(results: Results) -> HTML:
 
 
 def precisions(results: Results) -> HTML:
-    """The precisions that a study was to reach."""
+    """The precision that a study had to reach, and whether it did."""
     data = summary.precisions(results)
     top = data.head(MOST_ROWS)
     columns = {
@@ -114,7 +114,7 @@ def precisions(results: Results) -> HTML:
 
 
 def against(results: Results, baseline: int, metric: str) -> HTML:
-    """Every design point against a baseline."""
+    """Every design point compared with a baseline."""
     data = settings.against(results, baseline, metrics_of(metric))
     rows = data[data["metric"] == metric]
     order = rows["difference"].abs().sort_values(ascending=False, kind="stable").index
@@ -126,31 +126,31 @@ def against(results: Results, baseline: int, metric: str) -> HTML:
     columns["Pairs"] = top["n"].map("{:,}".format)
     unit = " in percentage points" if metric in METRICS else ""
     caption = (
-        f"{metric_name(metric)}: difference to the baseline{unit}, mission by mission, with "
-        f"{_LEVEL} intervals; {len(top):,} of {len(rows):,}, those that differ most"
+        f"{metric_name(metric)}: paired difference from the baseline{unit} with "
+        f"{_LEVEL} intervals; the {len(top):,} largest of {len(rows):,} differences"
     )
     return html.table(pd.DataFrame(columns), caption, data=data)
 
 
 def comparisons(results: Results) -> HTML:
-    """Every policy against the best one."""
+    """Every policy compared with the best one."""
     data = summary.comparisons(results)
-    return _compared(data, "policy", f"Differences to {data['baseline'].iloc[0]}")
+    return _compared(data, "policy", f"Differences from {data['baseline'].iloc[0]}")
 
 
 def learners(results: Results) -> HTML:
-    """Every learner against the best heuristic."""
+    """Every learner compared with the best heuristic."""
     data = summary.learned_against_heuristic(results)
-    caption = f"Learned policies: differences to {data['baseline'].iloc[0]}, the best heuristic"
+    caption = f"Learned policies: differences from {data['baseline'].iloc[0]}, the best heuristic"
     return _compared(data, "learner", caption)
 
 
 def worst(results: Results, rows: pd.DataFrame) -> HTML:
-    """Missions that went worst; ``html.commands`` has the commands that simulate them again.
+    """The worst missions.
 
     Args:
         results: The study.
-        rows: Of ``summary.worst``.
+        rows: The result of ``summary.worst``.
     """
     columns = {
         "Replication": rows["replication"],
@@ -165,7 +165,7 @@ def worst(results: Results, rows: pd.DataFrame) -> HTML:
 
 
 def spread(distributions: pd.DataFrame, metric: str) -> HTML:
-    """How a metric spreads over missions.
+    """The quantiles of a metric over missions.
 
     Args:
         distributions: Rows of ``analysis.distribution``.
@@ -193,7 +193,7 @@ def _settings(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame
 
 
 def _fields(results: Results, rows: pd.DataFrame) -> dict[str, pd.Series]:
-    """The columns of the varied fields, as text, under their names."""
+    """The columns of the varied fields as text, with the names of the fields as headers."""
     return {parameter(f).name: rows[f].map(value_text) for f in settings.varied(results)}
 
 

@@ -11,12 +11,12 @@ from analysis.questions import settings, summary
 from analysis.results.tables import Results
 from dess import InputError
 
-MOST_ROWS = 25  # of a table on the page; its data have all
-_MOST_VALUES = 12  # of a field in a list
+MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
+_MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
 def metric_of(results: Results, metric: str | None = None) -> str:
-    """The metric that ranks the settings: the one given, that of the selection, or the product.
+    """The metric that ranks the settings: the given one, the one of the selection, or the product.
 
     Raises:
         InputError: If there is no such metric.
@@ -28,24 +28,26 @@ def metric_of(results: Results, metric: str | None = None) -> str:
 
 
 def setting(results: Results, point: int) -> str:
-    """The design point that all others are compared with.
+    """The design point with which all others are compared, in words.
 
     Raises:
         InputError: If there is no such design point.
     """
     points = settings.in_words(results)
     if point not in range(len(points)):
-        raise InputError(f"baseline: {point!r} is no design point; allowed: 0..{len(points) - 1}")
+        raise InputError(
+            f"baseline: {point!r} is not a design point; allowed: 0..{len(points) - 1}"
+        )
     return points[point]
 
 
 def metrics_of(metric: str) -> list[str]:
-    """The metrics that the page shows: the one that ranks, and those of the paper."""
+    """The metrics on the page: the metric that ranks the settings, and those of the paper."""
     return [*dict.fromkeys((metric, *METRICS))]
 
 
 def written(metric: str) -> Callable[[float, float, float], str]:
-    """How an estimate of a metric and its interval are written."""
+    """The function that writes an estimate of a metric and its interval."""
     return numbers.interval if metric in METRICS else numbers.quantities
 
 
@@ -70,7 +72,7 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
 
     Args:
         results: The study.
-        ranked: ``settings.ranked`` by the metric.
+        ranked: The result of ``settings.ranked`` for the metric.
         metric: The metric.
     """
     best, others, tied = ranked.iloc[0], len(ranked) - 1, int(ranked["tied"].sum()) - 1
@@ -90,7 +92,7 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
 
 
 def guarantees(results: Results) -> str:
-    """What is known of the selections, as a list."""
+    """What is guaranteed about the selections, as a list."""
     rows = summary.selections(results).itertuples()
     return "\n".join(f"- {row.policy}: {row.guarantee}" for row in rows)
 
@@ -107,7 +109,7 @@ def _design(results: Results) -> Iterator[str]:
 
 
 def _values(values: Sequence[Any]) -> str:
-    """The values of a field, or their ends if they are many."""
+    """The values of a field as text; only the first and the last if there are many."""
     texts = [value_text(value) for value in values]
     if len(texts) <= _MOST_VALUES:
         return ", ".join(texts)
@@ -115,7 +117,7 @@ def _values(values: Sequence[Any]) -> str:
 
 
 def _set(value: Any) -> str:
-    """A value of the study's table ``set``; many cells are counted."""
+    """A value of the study's table ``set`` as text; of a list of cells, only their number."""
     if isinstance(value, list | tuple) and any(isinstance(item, list | tuple) for item in value):
         return f"of {len(value)} cells"
     return value_text(value)

@@ -70,8 +70,8 @@ BAD = {
     "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
     "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
     "verify nope": ["nope: cannot be read"],
-    "verify small.toml": ["small.toml: is no page of dess"],
-    "verify .": [".: holds no results and is no page"],
+    "verify small.toml": ["small.toml: is not a page of dess"],
+    "verify .": [".: contains no results and is not a page"],
 }
 
 

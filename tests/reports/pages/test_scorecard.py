@@ -106,10 +106,10 @@ def test_every_row_is_told(html: str) -> None:
         "Collection ratio <over> missions",
         "79.8 % (n = 1,000)",
         "85.9 % [85.0, 86.7] (n = 1,000)",
-        "wholly above the paper's figure",
+        "interval above the paper's number",
         "75.8 % [75.1, 76.5] (n = 1,000)",
-        "wholly below the paper's figure",
-        "no figure",
+        "interval below the paper's number",
+        "no number",
         "change: 0.0 [−0.9, +0.9] points (n = 300)",
         "crossing: 800,000 steps",
         "−13 [−46, +21] (n = 3)",
@@ -124,7 +124,7 @@ def test_verdicts_are_words_and_signs_and_are_counted(html: str) -> None:
     text = text_of(html)
     counts = "1 ✓ holds 1 ? inconclusive 1 ✗ does not hold"
     assert f"The best learned policy (ddqn) , of 3 claims: {counts}" in text
-    other = "The paper's network and algorithm, with means of ours (plain)"
+    other = "The paper's network and algorithm, with our additions (plain)"
     assert f"{other} , of 3 claims: 1 ◐ holds in part 2 – no results" in text
     for verdict in VERDICTS:
         assert re.search(rf'<span class="verdict [a-z-]+">. {verdict}</span>', html)
@@ -159,11 +159,17 @@ def test_it_says_how_to_read_it() -> None:
     rows = [replace(ROWS[0], claim=replace(ROWS[0].claim, printed=success)), *ROWS[1:]]
     text = text_of(as_html(rows, departures=["a guard", "5-step returns"]).data)
     spread = numbers.interval(*success.interval).partition(" % ")[2]
-    assert f"At 95 % (Wilson) they are {spread} for a success in 90.1 % of 1,000 missions" in text
-    assert f"not of all {len(rows)} rows at once" in text
-    assert "The counts are no score." in text and "chosen on the missions that judge it" in text
+    assert (
+        f"At 95 % (Wilson) the intervals are {spread} for a success in 90.1 % of 1,000 missions"
+        in text
+    )
+    assert f"does not hold for all {len(rows)} rows together" in text
+    assert (
+        "The counts of verdicts are not a score" in text
+        and "the same missions that judge it" in text
+    )
     assert "plain has the paper's observation, network and Algorithm 1." in text
-    assert "Not the paper's, but ours, are a guard and 5-step returns." in text
+    assert "It differs from the paper in a guard and 5-step returns." in text
 
 
 def test_it_says_no_more_than_it_knows(html: str) -> None:

@@ -135,7 +135,7 @@ def test_missions_are_those_of_the_manifests() -> None:
 def test_scarce_pads_make_a_queue() -> None:
     queue = items(manifest(set={"pads": 1}))["2.5.4"]
     assert "With 1 pad for 1 to 3 UAVs, UAVs in excess wait" in queue
-    assert "nobody ever waits" in items(manifest())["2.5.4"]
+    assert "no UAV ever waits" in items(manifest())["2.5.4"]
 
 
 def test_no_text_of_the_diagram_leaves_its_box() -> None:

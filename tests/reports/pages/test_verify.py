@@ -94,7 +94,7 @@ def test_a_file_of_results_that_was_altered_is_found(results: Path, tmp_path: Pa
         path = sorted((folder / kind).rglob("*.parquet"))[0]
         whole = path.read_bytes()
         path.write_bytes(whole[:-20] + bytes([whole[-20] ^ 1]) + whole[-19:])
-        assert lines_of(folder) == [f"{path}: is not what was written"]
+        assert lines_of(folder) == [f"{path}: has been changed since it was written"]
         path.write_bytes(whole)
     assert lines_of(folder) == []
 
@@ -146,7 +146,7 @@ def test_two_files_that_tell_two_things_are_both_damaged(results: Path, tmp_path
     pq.write_table(table.set_column(number, table.schema.field(number), [other]), second)
     resealed(second, path.stem)
     lines = lines_of(folder)
-    assert len(lines) == 2 and f"{path}: is not what was written" in lines
+    assert len(lines) == 2 and f"{path}: has been changed since it was written" in lines
     with pytest.raises(InputError, match="incomplete"):
         load_results(folder)
 
@@ -155,7 +155,7 @@ def test_a_page_without_missions_or_with_few_fields_says_so(page: Path, tmp_path
     bare = tmp_path / "bare.html"
     bare.write_text(sealed('<meta name="dess-checksum" content="">'))
     (verdict,) = verify_page(bare, ALL, 0)
-    assert verdict.notes == ["carries no missions to simulate again"]
+    assert verdict.notes == ["contains no missions to simulate again"]
     text = embedded(STUDY, page.read_text("utf-8"))[0]
     for field, value in (("sample", []), ("policies", json.loads(text)["policies"][1:])):
         evidence = json.loads(text) | {field: value}
@@ -206,7 +206,7 @@ def test_other_weights_are_found(tmp_path: Path, capsys: pytest.CaptureFixture) 
     weights.write_bytes(weights.read_bytes() + b" ")
     assert learned_files(folder) != learned_files()
     path.write_text(sealed(content.replace(*_digests(folder))), "utf-8")
-    assert lines_of(path) == ["ddqn/model.safetensors: is another one here"]
+    assert lines_of(path) == ["ddqn/model.safetensors: differs from the file here"]
 
 
 def _digests(folder: Path) -> tuple[str, str]:
@@ -274,9 +274,9 @@ def test_what_is_neither_a_page_nor_results_is_refused(
     for path in (broken / "missions").rglob("*.parquet"):
         path.unlink()
     for name, message in {
-        "text": "is no page of dess",
+        "text": "is not a page of dess",
         "absent": "cannot be read",
-        "empty": "holds no results and is no page",
+        "empty": "contains no results and is not a page",
         "broken": "incomplete",
     }.items():
         assert main(["verify", str(tmp_path / name)]) == 2
