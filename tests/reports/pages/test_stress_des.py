@@ -122,7 +122,7 @@ def test_studies_say_what_they_are_about() -> None:
     assert "by `kn-bounded`" in texts["1.3"]
     assert "`initial_data`" in texts["2.3"] and "`uavs`" in texts["2.3"]
     assert "`ddqn`" in texts["2.4"] and "another package" not in texts["2.4"]
-    assert "as a rule asked for, in `sweet-spot`" in texts["4.3"]
+    assert "as decided by a stopping rule, in `sweet-spot`" in texts["4.3"]
 
 
 def test_missions_are_those_of_the_manifests() -> None:
@@ -134,7 +134,7 @@ def test_missions_are_those_of_the_manifests() -> None:
 
 def test_scarce_pads_make_a_queue() -> None:
     queue = items(manifest(set={"pads": 1}))["2.5.4"]
-    assert "With 1 pad for 1 to 3 UAVs, UAVs in excess wait" in queue
+    assert "With 1 pad for 1 to 3 UAVs, UAVs may have to wait" in queue
     assert "no UAV ever waits" in items(manifest())["2.5.4"]
 
 
