@@ -13,7 +13,7 @@ class Interruption(Exception):  # noqa: N818 - nothing went wrong
 
 
 def fail(message: str, code: int) -> int:
-    """Print one line on stderr that says why the command ends with this exit code."""
+    """Print one line on stderr that says why the command fails, and return the exit code."""
     print(" ".join(message.split()), file=sys.stderr)
     return code
 

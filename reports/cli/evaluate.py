@@ -24,19 +24,26 @@ app = typer.Typer()
 @app.command()
 def evaluate(
     policy: Annotated[
-        list[str], typer.Option(metavar="P[,P...]", help="A policy or a team; repeatable.")
+        list[str],
+        typer.Option(
+            metavar="P[,P...]",
+            help="A policy, or several that the UAVs follow in turn; repeatable.",
+        ),
     ],
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
-    missions: Annotated[int, typer.Option(min=1, help="Replications 0, 1, ... to run.")] = 1000,
+    missions: Annotated[
+        int, typer.Option(min=1, help="Number of missions (replications 0, 1, ...).")
+    ] = 1000,
     seed: SeedOption = 0,
     engine: Annotated[
-        Literal["batch", "events"], typer.Option(help="Both engines give the same records.")
+        Literal["batch", "events"],
+        typer.Option(help="batch is faster; both engines give the same records."),
     ] = "batch",
     workers: WorkersOption = 1,
     as_json: JsonOption = False,
 ) -> None:
-    """Metrics of many missions, with 95 % intervals."""
+    """Simulate many missions and print the means of their metrics with 95 % intervals."""
     from analysis.execution.runner import evaluate
     from dess.state import check_seed
     from policies import load_team

@@ -72,13 +72,13 @@ def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any
     if first > last:
         number = "" if count is None else f":{count}"
         turned = f"{field}={high.strip()}..{low.strip()}{number}"
-        raise _refused(text, "is the wrong way round", turned)
+        raise _refused(text, "begins with the larger number", turned)
     if count is not None:
         return _spaced(text, first, last, count, field in INTEGERS)
     if field not in INTEGERS:
         raise _refused(text, "has no number of values", f"{text}:5, for five of them")
     if first % 1 or last % 1:
-        raise _refused(text, "has an end that is no integer", f"integers, as {field} has")
+        raise _refused(text, "has an end that is not an integer", f"integers, as {field} has")
     return range(int(first), int(last) + 1)
 
 
@@ -92,7 +92,7 @@ def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bo
     values = [first + (last - first) * place / (number - 1) for place in range(number)]
     if is_integer:
         if any(value % 1 for value in values):
-            raise _refused(text, f"has {number} values that are no integers", "another number")
+            raise _refused(text, f"has {number} values that are not integers", "another number")
         return [int(value) for value in values]
     return [float(value) for value in values]
 
@@ -104,7 +104,7 @@ def _number(text: str, end: str) -> Decimal:
             return number
     except InvalidOperation:
         pass
-    raise _refused(text, f"has an end {end.strip()!r} that is no number", ALLOWED)
+    raise _refused(text, f"has an end {end.strip()!r} that is not a number", ALLOWED)
 
 
 def _refused(text: str, problem: str, allowed: str) -> InputError:

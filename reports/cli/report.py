@@ -33,7 +33,7 @@ def report(
         ),
     ] = None,
     results: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder with a results folder per study.")
+        Path, typer.Option(metavar="DIR", help="Folder that contains a results folder per study.")
     ] = RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = PAGES,
     settings: Annotated[
@@ -55,14 +55,14 @@ def report(
         ),
     ] = None,
 ) -> None:
-    """Render pages of results, and an index: reports on the paper, pages of any studies.
+    """Render results as HTML pages with an index: reports on the paper, and pages of any study.
 
-    A results folder that is called like a report is named with a path separator: ./learning.
+    If a results folder has the same name as a report, write it with a path separator: ./learning.
     """
     values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
         if names and WHAT_IF not in names:
-            raise InputError(f"--set: {' '.join(names)} has nothing to set; allowed: {WHAT_IF}")
+            raise InputError(f"--set: {' '.join(names)} takes no --set; allowed: {WHAT_IF}")
         values["settings"] = dict(setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
     from reports.pages.notebook import NAMES
@@ -95,10 +95,12 @@ def verify(
         Path, typer.Argument(metavar="PAGE|DIR", help="A page of dess report, or results.")
     ],
     missions: Annotated[
-        int, typer.Option(min=1, help="Missions of every study to simulate again, at most.")
+        int,
+        typer.Option(min=1, help="Largest number of missions to simulate again, for every study."),
     ] = 20,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the sample.  [default: a random one]")
+        int | None,
+        typer.Option(min=0, help="Seed of the random sample.  [default: a random number]"),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -138,12 +140,13 @@ def timing(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="P[,P...]", help="Repeatable.  [default: those of the study comparison]"
+            metavar="P[,P...]",
+            help="Policies to measure; repeatable.  [default: those of the study comparison]",
         ),
     ] = None,
     missions: Annotated[int, typer.Option(min=1, help="Missions per policy.")] = 30,
 ) -> None:
-    """Measure the time of a decision; measurements of this machine and code are kept."""
+    """Measure how long a policy takes to decide; measurements of this machine and code are kept."""
     from analysis.execution.decision_time import is_current, measure, read, writing
     from analysis.study.study import load_study
 

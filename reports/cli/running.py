@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     Announce = Callable[[Round], object]
 
 YesOption = Annotated[
-    bool, typer.Option("--yes", help="Run it, however many missions it has and however long.")
+    bool, typer.Option("--yes", help="Run it even if it has very many missions or takes long.")
 ]
 
 
@@ -47,7 +47,7 @@ def complete(
         for path, failure in error.failures.items():
             console.fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)
         count = len(error.failures)
-        line = f"dess: error: {count} of the chunks of study {name} failed, the rest is done"
+        line = f"dess: error: {count} of the chunks of study {name} failed, all others are complete"
         raise typer.Exit(console.fail(line, 1)) from None
 
 

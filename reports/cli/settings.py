@@ -24,17 +24,20 @@ PARAMETER = (
 )
 
 ScenarioOption = Annotated[
-    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
+    str,
+    typer.Option(
+        "--scenario", metavar="NAME|FILE", help="The name of a shipped scenario, or a TOML file."
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         SET,
         metavar="KEY=VALUE",
-        help="Set a field of the scenario, the value in TOML syntax; repeatable.",
+        help="Set a field of the scenario to a value in TOML syntax; repeatable.",
     ),
 ]
-SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all randomness.")]
+SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random draws.")]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
 

@@ -41,15 +41,21 @@ def simulate(
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
     policy: Annotated[
-        str, typer.Option(metavar="P[,P...]", help="A policy, or one for each UAV in turn.")
+        str,
+        typer.Option(metavar="P[,P...]", help="A policy, or several that the UAVs follow in turn."),
     ] = "greedy",
     seed: SeedOption = 0,
-    replication: Annotated[int, typer.Option(help="Number of the replication.")] = 0,
+    replication: Annotated[
+        int, typer.Option(help="Number of the replication, which selects the random draws.")
+    ] = 0,
     events: Annotated[
-        Path | None, typer.Option(metavar="FILE.parquet", help="Write the event log.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.parquet", help="Write the event log of the mission into this file."
+        ),
     ] = None,
     figure: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw the mission.")
+        Path | None, typer.Option(metavar="FILE.png", help="Draw the mission into this file.")
     ] = None,
     animation: Annotated[
         Path | None,
@@ -94,7 +100,7 @@ def simulate(
 
 def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
     if path and path.suffix not in allowed:
-        raise InputError(f"{option}: {path} is no {kind}; allowed: {', '.join(allowed)}")
+        raise InputError(f"{option}: {path} is not a {kind}; allowed: {', '.join(allowed)}")
 
 
 @dataclass(frozen=True)

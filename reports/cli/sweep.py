@@ -37,8 +37,8 @@ def sweep(
         typer.Option(
             "--set",
             metavar="KEY=VALUES",
-            help="The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. One value is "
-            "fixed, several are swept; repeatable.",
+            help="The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with "
+            "one value is fixed; repeatable.",
         ),
     ] = None,
     policy: Annotated[
@@ -49,8 +49,8 @@ def sweep(
         int,
         typer.Option(
             min=1,
-            help="Missions per policy and setting; with --require, those that check the selected "
-            "settings.",
+            help="Missions per setting; with --require, additional missions that check each "
+            "selected setting.",
         ),
     ] = 300,
     scenario: ScenarioOption = "paper",
@@ -60,15 +60,15 @@ def sweep(
         list[str] | None,
         typer.Option(
             metavar="KEY=AMOUNT",
-            help="A price: uav, pad, charge, hour or lost_uav; also currency, missions (that the "
-            "fleet is to fly) and slot_seconds; repeatable.",
+            help="A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned "
+            "for the fleet) and slot_seconds; repeatable.",
         ),
     ] = None,
     require: Annotated[
         list[str] | None,
         typer.Option(
             metavar="METRIC=SHARE",
-            help="Look for the cheapest setting whose mean of a metric (success, ratio, product) "
+            help="Search for the cheapest setting whose mean of a metric (success, ratio, product) "
             "is at least this; repeatable.",
         ),
     ] = None,
@@ -76,7 +76,8 @@ def sweep(
         str | None, typer.Option(help="Name of the sweep.  [default: its fields and a hash]")
     ] = None,
     results: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder of the results, in sweeps/NAME.")
+        Path,
+        typer.Option(metavar="DIR", help="Folder in which the results are stored, as sweeps/NAME."),
     ] = RESULTS,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the page.")] = PAGES,
     yes: YesOption = False,

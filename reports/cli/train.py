@@ -19,15 +19,21 @@ app = typer.Typer()
 
 @app.command()
 def train(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A config or a TOML file.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME|FILE", help="The name of a shipped config, or a TOML file."),
+    ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the training.")],
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the training in the folder.")
     ] = False,
     device: Annotated[
-        Literal["auto", "cpu", "cuda"], typer.Option(help="auto takes CUDA if there is a device.")
+        Literal["auto", "cpu", "cuda"],
+        typer.Option(help="auto uses CUDA if a device is available."),
     ] = "auto",
-    seed: Annotated[int | None, typer.Option(help="Seed, in place of that of the config.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Seed in place of the seed of the config.")
+    ] = None,
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly."""
     from policies.ddqn.config import load_config

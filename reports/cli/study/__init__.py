@@ -4,7 +4,9 @@ import typer
 
 from reports.cli.study import diff, export, run, show
 
-app = typer.Typer(help="Studies: policies x design points x replications.")
+app = typer.Typer(
+    help="Run studies (policies x design points x replications), show and compare results."
+)
 app.command("run")(run.run)
 app.command("show")(show.show)
 app.command("diff")(diff.diff)

@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 def diff(
     a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.")],
     b: Annotated[Path, typer.Argument(metavar="B", help="Another results folder.")],
-    most: Annotated[int, typer.Option(min=0, help="How many of the most changed missions.")] = 5,
+    most: Annotated[int, typer.Option(min=0, help="Number of most changed missions to show.")] = 5,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two results folders mission by mission, on the same random draws."""
+    """Compare two results folders mission by mission, with the same random draws."""
     from analysis.questions import diff
     from analysis.results.tables import load_results
     from reports.cli.study.diff_tables import print_diff

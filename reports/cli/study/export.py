@@ -16,13 +16,18 @@ def export(
     crate: Annotated[Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write.")],
     page: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Its page.  [default: it is rendered for the crate]"),
+        typer.Option(
+            metavar="FILE", help="The page of the results.  [default: it is rendered for the crate]"
+        ),
     ] = None,
     licence: Annotated[
-        str, typer.Option("--license", metavar="ID", help="Of the results, as SPDX names it.")
+        str,
+        typer.Option(
+            "--license", metavar="ID", help="Licence of the results, by its SPDX identifier."
+        ),
     ] = "MIT",
 ) -> None:
-    """Bundle results, page, study and scenario as a research object (RO-Crate)."""
+    """Write results, page, study and scenario into one file, a research object (RO-Crate)."""
     from analysis.results.tables import load_results
     from reports.crate import check_page, licence_of, write_crate
     from reports.pages.render import render_study

@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 
 def run(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME|FILE", help="The name of a shipped study, or a TOML file."),
+    ],
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help=f"Results folder.  [default: {RESULTS}/NAME]"),
@@ -25,27 +28,34 @@ def run(
     workers: WorkersOption = 1,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="Run on this dask.distributed scheduler."),
+        typer.Option(
+            metavar="ADDRESS", help="Run on the cluster of this dask.distributed scheduler."
+        ),
     ] = None,
     missions: Annotated[
         int | None, typer.Option(min=1, help="Missions per design point and policy.")
     ] = None,
     policy: Annotated[
-        list[str] | None, typer.Option(metavar="P[,P...]", help="Policies instead; repeatable.")
+        list[str] | None,
+        typer.Option(
+            metavar="P[,P...]", help="Policies in place of those of the study; repeatable."
+        ),
     ] = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the plan and the estimated time, run nothing.")
+        bool, typer.Option("--dry-run", help="Only print the plan and the estimated time.")
     ] = False,
     accept_code: Annotated[
         bool,
-        typer.Option("--accept-code", help="Keep missions simulated by other code, and note it."),
+        typer.Option(
+            "--accept-code", help="Keep missions that other code has simulated; the results say so."
+        ),
     ] = False,
     page: Annotated[
-        bool, typer.Option("--report", help=f"Render the page of the study into {PAGES} as well.")
+        bool, typer.Option("--report", help=f"Also render the page of the study into {PAGES}.")
     ] = False,
     yes: YesOption = False,
 ) -> None:
-    """Run a study into a results folder; run again to resume or to top up."""
+    """Run a study into a results folder; run it again to resume it or to add missions."""
     from analysis.execution.dry_run import check_effort, check_policies, plan_study
     from analysis.execution.runner import run_study
     from analysis.study.study import load_study

@@ -15,10 +15,11 @@ def show(
     policy: Annotated[
         str | None,
         typer.Option(
-            metavar="P[,P...]", help="Policy of the worst missions.  [default: the best policy]"
+            metavar="P[,P...]",
+            help="Policy whose worst missions are shown.  [default: the best policy]",
         ),
     ] = None,
-    worst: Annotated[int, typer.Option(min=0, help="How many of the worst missions.")] = 5,
+    worst: Annotated[int, typer.Option(min=0, help="Number of worst missions to show.")] = 5,
     as_json: JsonOption = False,
 ) -> None:
     """Show the results of a study: means, comparisons, selections, the worst missions."""

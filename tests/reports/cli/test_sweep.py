@@ -95,7 +95,7 @@ def test_an_interruption_names_the_command_that_goes_on(dess, unrendered, monkey
 
 
 BAD = {
-    "--set uavs=5..2": "is the wrong way round",
+    "--set uavs=5..2": "begins with the larger number",
     "--set uavs=2 --set uavs=3": "--set: uavs is given twice; allowed: once",
     "--set uavs=2,7": "uavs: 7 is not within 1..6",
     "--set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "policy ddqn: has learned grid 32, not 8",

@@ -74,7 +74,7 @@ def test_a_failed_chunk_is_an_exit_code_and_a_command(dess, tmp_path, monkeypatc
     assert first.startswith(
         "failed: ZeroDivisionError: nothing to divide by (results/trial/failures/"
     )
-    assert last == "dess: error: 1 of the chunks of study trial failed, the rest is done"
+    assert last == "dess: error: 1 of the chunks of study trial failed, all others are complete"
     command = shlex.split(first.partition("command: ")[2])
     assert command[:2] == ["dess", "simulate"]
     with pytest.raises(ZeroDivisionError):
