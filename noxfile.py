@@ -71,7 +71,7 @@ def reports(session: nox.Session) -> None:
     full = "--full" in session.posargs
     if session.posargs not in ([], ["--full"]):
         session.error(f"reports: {' '.join(session.posargs)} is unknown; allowed: --full")
-    install(session)
+    install(session, "[learning,reports]")
     results, reports = (folder / "full" if full else folder for folder in (RESULTS, REPORTS))
     for study, few in STUDIES.items():
         policies = [word for policy in few if not full for word in ("--policy", policy)]

@@ -9,6 +9,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
+from dess.code.libraries import needs
 from dess.errors import InputError, one_of
 from policies.base import Policy
 
@@ -59,6 +60,7 @@ def load(name: str | Path) -> Policy:
         folder = TRAINED / name
     # An empty name would be the working folder.
     if name and os.path.exists(folder / CONFIG):
+        needs("learning", f"policy {name}")
         from policies.ddqn.checkpoint import load_policy  # imports torch
 
         policy = load_policy(folder)

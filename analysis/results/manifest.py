@@ -123,7 +123,8 @@ class Origin(Document):
         if weights := [t.policy for t in self.policies if t.weights != team_of(t.policy).weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
         versions = library_versions()
-        if others := [n for n in versions if self.libraries.get(n) != versions[n]]:
+        known = self.libraries  # torch may be absent, here or where the results were made
+        if others := [n for n in versions if n in known and known[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
 

@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
 
@@ -110,8 +111,12 @@ def differing(old: Mapping[str, str], new: Mapping[str, str]) -> dict[str, tuple
 
 
 def library_versions() -> dict[str, str]:
-    """The versions of Python and of the libraries on which records may depend."""
-    return {"python": python_version()} | {name: metadata.version(name) for name in LIBRARIES}
+    """The versions of Python and of the libraries on which records may depend.
+
+    A library that is not installed is left out.
+    """
+    installed = [name for name in LIBRARIES if find_spec(name)]
+    return {"python": python_version()} | {name: metadata.version(name) for name in installed}
 
 
 def commit_of_source() -> str | None:

@@ -10,14 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round
-from analysis.figures import settings as figures
 from analysis.names import PRODUCT
 from analysis.questions import costs, settings
 from analysis.results.tables import Results
@@ -25,6 +23,9 @@ from analysis.study.study import Study
 from analysis.sweeps.question import ask, command, folder_of, question
 from analysis.sweeps.values import values_of
 from dess import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,7 @@ class Sweep:
         """The command that asks the same."""
         return command(self.study)
 
-    def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> Figure:
+    def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.
 
         Args:
@@ -109,6 +110,8 @@ class Sweep:
         Raises:
             InputError: If a field is not swept, or there is no such metric.
         """
+        from analysis.figures import settings as figures  # the extra reports
+
         if x is None:
             if not self.fields:
                 raise InputError("x: no field is swept; allowed: a sweep of one field or more")

@@ -1,0 +1,60 @@
+"""Optional libraries: the extra of the distribution that installs each, and a line if one is absent.
+
+    pip install dess               the simulator, the heuristics, evaluations, studies and sweeps
+    pip install 'dess[learning]'   trained policies and trainings
+    pip install 'dess[reports]'    figures, pages, and studies of sensitivities
+    pip install 'dess[all]'        everything
+
+An optional library is imported where it is used. The command line turns an import that fails into
+the line of ``absence``; who would find out only after long work asks ``needs`` first.
+"""
+
+from importlib.util import find_spec
+
+from dess.errors import InputError
+
+# The extras, by the names under which their libraries are imported.
+EXTRAS = {
+    "learning": ("torch", "safetensors"),
+    "reports": (
+        *("matplotlib", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
+        *("ipywidgets", "jinja2", "jupyter_client", "jupyter", "jupytext", "markupsafe"),
+        *("nbclient", "nbconvert", "nbformat", "packaging", "pygments", "rocrate"),
+    ),
+    "distributed": ("distributed",),
+    "tensorboard": ("tensorboard",),
+}
+_TITLES = {"torch": "PyTorch", "sklearn": "scikit-learn", "tensorboard": "TensorBoard"}
+
+
+class MissingLibraryError(InputError):
+    """An optional library is not installed: one line with the command that installs it."""
+
+
+def needs(extra: str, what: str) -> None:
+    """Raise an error if a library of an extra is not installed; nothing is imported.
+
+    Args:
+        extra: The extra.
+        what: What needs it, for the message.
+
+    Raises:
+        MissingLibraryError: If one of its libraries is not installed.
+    """
+    for library in EXTRAS[extra]:
+        if find_spec(library) is None:
+            raise MissingLibraryError(_line(what, library, extra))
+
+
+def absence(error: ModuleNotFoundError, what: str) -> MissingLibraryError | None:
+    """The error in the words of ``needs``, if the module that was not found is an optional one."""
+    library = (error.name or "").partition(".")[0]
+    for extra, libraries in EXTRAS.items():
+        if library in libraries:
+            return MissingLibraryError(_line(what, library, extra))
+    return None
+
+
+def _line(what: str, library: str, extra: str) -> str:
+    title = _TITLES.get(library, library)
+    return f"{what} needs {title}, which is not installed: pip install 'dess[{extra}]'"
