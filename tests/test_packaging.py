@@ -4,51 +4,19 @@ import ast
 import re
 import subprocess
 import sys
-import tomllib
-from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
 import yaml
-from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from policies.registry import TRAINED, trained_names
+from tests.distributions import EXTRAS, PROJECT, ROOT, asked, closure, homes, requirements
 
-ROOT = Path(__file__).parents[1]
 PACKAGES = ("dess", "policies", "analysis", "reports")
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-EXTRAS = PROJECT["optional-dependencies"]
-ASKED = [*PROJECT["dependencies"], *EXTRAS["test"], *EXTRAS["lint"], *EXTRAS["docs"]]
-# What no system in particular needs, all do.
-SYSTEM = dict.fromkeys(("os_name", "sys_platform", "platform_system", "platform_machine"), "other")
-
-
-def requirements(*lines: str) -> dict[str, Requirement]:
-    """Requirements by the canonical name of the distribution."""
-    return {canonicalize_name(Requirement(line).name): Requirement(line) for line in lines}
-
-
-def closure(*lines: str) -> set[str]:
-    """What requirements and their requirements ask for, as far as they are installed."""
-    pending, seen = [Requirement(line) for line in lines], set()
-    while pending:
-        asked = pending.pop()
-        for wanted in {(canonicalize_name(asked.name), extra) for extra in {"", *asked.extras}}:
-            if wanted not in seen:
-                seen.add(wanted)
-                pending += needed(*wanted)
-    return {name for name, _ in seen}
-
-
-def needed(name: str, extra: str) -> list[Requirement]:
-    """What an installed distribution asks for with an extra; of another one it is not known."""
-    try:
-        asked = [Requirement(line) for line in requires(name) or ()]
-    except PackageNotFoundError:
-        return []
-    return [r for r in asked if not r.marker or r.marker.evaluate({**SYSTEM, "extra": extra})]
+ASKED = asked("test", "lint", "docs")
+DEVELOPMENT = {"test", "lint", "docs"}
 
 
 def pins() -> dict[str, str]:
@@ -111,16 +79,16 @@ def test_every_library_that_is_imported_is_asked_for() -> None:
         for alias in node.names
     }
     outside = imported - set(sys.stdlib_module_names) - set(PACKAGES)
-    homes = packages_distributions()
-    wanted = {canonicalize_name(home) for name in outside for home in homes.get(name, [name])}
-    assert not wanted - set(requirements(*PROJECT["dependencies"], *EXTRAS["distributed"]))
+    found = homes()
+    wanted = {home for name in outside for home in found.get(name, {canonicalize_name(name)})}
+    assert not wanted - set(requirements(*asked("all")))
 
 
 def test_every_requirement_of_the_sessions_is_pinned_within_its_range() -> None:
     pinned = pins()
-    asked = requirements(*ASKED)
-    assert set(asked) <= set(pinned)
-    for name, requirement in asked.items():
+    wanted = requirements(*ASKED)
+    assert set(wanted) <= set(pinned)
+    for name, requirement in wanted.items():
         assert requirement.specifier.contains(pinned[name]), name
 
 
@@ -130,8 +98,10 @@ def test_what_the_requirements_require_is_pinned_too() -> None:
     assert not needed_by_all - set(pins())
 
 
-def test_the_tests_need_every_extra() -> None:
-    assert {*EXTRAS["distributed"], *EXTRAS["tensorboard"]} <= set(EXTRAS["test"])
+def test_all_and_the_tests_have_every_extra_that_adds_something() -> None:
+    everything = {line for extra in EXTRAS.keys() - DEVELOPMENT for line in asked(extra)}
+    assert set(asked("all")) == everything
+    assert everything <= set(asked("test"))
 
 
 def test_the_citation_names_this_version_and_the_paper() -> None:

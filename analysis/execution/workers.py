@@ -18,6 +18,7 @@ from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.results.chunks import Part
 from analysis.results.provenance import Member, engine_code, members_of
 from dess import InputError
+from dess.code.libraries import needs
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 DEATHS = 2  # of workers that a job was alone with, after which it is given up
@@ -148,13 +149,10 @@ class Cluster(Pool):
     """A dask.distributed cluster, whose workers must have this code."""
 
     def __init__(self, address: str):
-        try:
-            from distributed import Client
-            from distributed.comm import get_address_host_port
-        except ModuleNotFoundError:
-            raise InputError(
-                "scheduler: needs the package distributed: pip install dess[distributed]"
-            ) from None
+        needs("distributed", "a scheduler")
+        from distributed import Client
+        from distributed.comm import get_address_host_port
+
         try:
             get_address_host_port(address)  # a Client that fails on it would hang when it is closed
             self.client = Client(address, timeout="10s", set_as_default=False)

@@ -252,6 +252,11 @@ def study_names() -> list[str]:
     return _STUDIES.names()
 
 
+def study_descriptions() -> dict[str, str]:
+    """The descriptions of the shipped studies by their names; no study is made or checked."""
+    return {name: _STUDIES.load(name)[1].get("description", "") for name in study_names()}
+
+
 def budget_of(study: Mapping[str, Any]) -> str:
     """In words, how a study differs from the shipped study of the same name."""
     if study["name"] not in study_names():

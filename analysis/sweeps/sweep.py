@@ -24,7 +24,7 @@ from analysis.sweeps.question import ask, command, folder_of, question
 from analysis.sweeps.values import values_of
 from dess import InputError
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # figures need the extra reports
     from matplotlib.figure import Figure
 
 
@@ -110,7 +110,7 @@ class Sweep:
         Raises:
             InputError: If a field is not swept, or there is no such metric.
         """
-        from analysis.figures import settings as figures  # the extra reports
+        from analysis.figures import settings as figures
 
         if x is None:
             if not self.fields:

@@ -10,19 +10,19 @@ asked.typical().drawings()  # a mission in the baseline and in the variation
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from analysis.execution.jobs import Progress
-from analysis.figures import what_if as figures
-from analysis.figures.missions import mission_figure
 from analysis.names import PRODUCT
 from analysis.questions.what_if import answer, question
 from analysis.questions.what_if.question import BASELINE, VARIATION
 from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
+
+if TYPE_CHECKING:  # figures need the extra reports
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,13 @@ class Example:
         """The commands that simulate both missions again."""
         return answer.commands(self.results, self.policy, self.replication)
 
-    def drawings(self) -> list[tuple[Figure, str, str]]:
+    def drawings(self) -> "list[tuple[Figure, str, str]]":
         """The two missions, simulated again: a figure, its alternative text and its caption."""
         return [self._drawing(point) for point in (BASELINE, VARIATION)]
 
-    def _drawing(self, point: int) -> tuple[Figure, str, str]:
+    def _drawing(self, point: int) -> "tuple[Figure, str, str]":
+        from analysis.figures.missions import mission_figure
+
         mission = resimulate(self.results, self.policy, point, self.replication)
         figure = mission_figure(mission.events, mission.scenario)
         outcome = answer.outcome(self.results, self.policy, point, self.replication)
@@ -113,21 +115,27 @@ class WhatIf:
         """What common random numbers gained, as a table to print."""
         return answer.pairing(self.table())
 
-    def plot(self) -> Figure:
+    def plot(self) -> "Figure":
         """The paired differences of the metrics, with intervals."""
+        from analysis.figures import what_if as figures
+
         return figures.gains(self.table())
 
-    def plot_means(self, metric: str = PRODUCT) -> Figure:
+    def plot_means(self, metric: str = PRODUCT) -> "Figure":
         """A metric of every policy in the baseline and in the variation, with intervals.
 
         Args:
             metric: One of the paper's metrics.
         """
+        from analysis.figures import what_if as figures
+
         sides = question.settings_of(self.results)
         return figures.means(answer.means(self.results), metric, sides)
 
-    def plot_spread(self) -> Figure:
+    def plot_spread(self) -> "Figure":
         """The distribution of the paired differences in collection ratio and communication."""
+        from analysis.figures import what_if as figures
+
         return figures.spread(self._differences())
 
     def winners(self) -> str:

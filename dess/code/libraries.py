@@ -1,4 +1,4 @@
-"""Optional libraries: the extra of the distribution that installs each, and a line if one is absent.
+"""Optional libraries: which extra installs each, and one line that says so where it is absent.
 
     pip install dess               the simulator, the heuristics, evaluations, studies and sweeps
     pip install 'dess[learning]'   trained policies and trainings
@@ -18,7 +18,7 @@ EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
         *("matplotlib", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
-        *("ipywidgets", "jinja2", "jupyter_client", "jupyter", "jupytext", "markupsafe"),
+        *("ipywidgets", "jinja2", "jupyter_client", "jupytext", "markupsafe"),
         *("nbclient", "nbconvert", "nbformat", "packaging", "pygments", "rocrate"),
     ),
     "distributed": ("distributed",),

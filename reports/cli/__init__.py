@@ -4,12 +4,14 @@
 imports the simulator, pandas or torch when it runs.
 """
 
+import sys
 from collections.abc import Sequence
 
 import typer
 from typer.exceptions import TyperException
 
 from dess import InputError
+from dess.code.libraries import absence
 from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
 
 app = typer.Typer(
@@ -42,6 +44,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return console.fail(f"dess: error: {error}", 2)
     except console.Interruption as interruption:
         return console.fail(str(interruption), console.INTERRUPTED)
+    except ModuleNotFoundError as error:
+        command = [*(sys.argv[1:] if arguments is None else arguments)][:1]
+        missing = absence(error, " ".join(["dess", *command]))
+        if missing is None:
+            raise
+        return console.fail(f"dess: error: {missing}", 2)
     except SystemError as error:
         from analysis.execution.jobs import was_interrupted
 

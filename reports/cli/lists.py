@@ -26,6 +26,6 @@ def scenarios() -> None:
 @app.command()
 def studies() -> None:
     """List the shipped studies."""
-    from analysis.study.study import load_study, study_names
+    from analysis.study.study import study_descriptions
 
-    console.print_list((name, load_study(name).description) for name in study_names())
+    console.print_list(study_descriptions().items())

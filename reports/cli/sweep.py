@@ -1,11 +1,13 @@
 """``dess sweep``: every combination of values of some fields, from one line to a page."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dess.code.libraries import MissingLibraryError, needs
 from dess.files import check_folder
 from reports.cli import console
 from reports.cli.ranges import all_settings, all_values
@@ -86,7 +88,6 @@ def sweep(
     """Simulate every combination of values, write a page, and print the ranked settings."""
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
-    from reports.pages.render import render_study
 
     study = question.question(
         all_values(settings or []),
@@ -109,12 +110,24 @@ def sweep(
     if not as_json:  # the answer comes before the page, which takes longer
         _print(answer)
         print(f"study: {file}", flush=True)
-    with rendering() as steps:
-        page = render_study(folder, out, steps)
+    page = _render(folder, out)
     if as_json:
         _print_json(answer, page, file)
-    else:
+    elif page:
         print(f"page: {page}")
+
+
+def _render(folder: Path, out: Path) -> Path | None:
+    """Write the page; a line says so where the libraries of pages are not installed."""
+    try:
+        needs("reports", "the page of a sweep")
+    except MissingLibraryError as missing:
+        print(f"no page: {missing}", file=sys.stderr)
+        return None
+    from reports.pages.render import render_study
+
+    with rendering() as steps:
+        return render_study(folder, out, steps)
 
 
 def _print(answer: "Sweep") -> None:
@@ -140,9 +153,9 @@ def _print(answer: "Sweep") -> None:
         print(line)
 
 
-def _print_json(answer: "Sweep", page: Path, file: Path) -> None:
+def _print_json(answer: "Sweep", page: Path | None, file: Path) -> None:
     """Print all settings and where all of it is, as JSON."""
-    places = {"results": str(answer.path), "study_file": str(file), "page": str(page)}
+    places = {"results": str(answer.path), "study_file": str(file), "page": page and str(page)}
     answers, rows = answer.answers(), json.loads(answer.table().to_json(orient="records"))
     about = {"study": answer.study.name, **places, "answers": answers, "table": rows}
     print(json.dumps(about, indent=2))

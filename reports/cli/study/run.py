@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from dess.code.libraries import needs
 from dess.files import check_folder
 from reports.cli import console
 from reports.cli.report import rendering
@@ -70,6 +71,7 @@ def run(
             _print_plan(plan, study, out, workers)
         return
     if page:
+        needs("reports", "--report")
         check_folder(PAGES)
     with console.compile_notice():
         if check_effort(study, out, workers, accept_code=accept_code, yes=yes):

@@ -1,0 +1,149 @@
+"""The extras: what works without them, and the line that names the one that is missing."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dess.code import libraries
+from policies.registry import trained_names
+from tests.analysis.small import environment, small_study
+from tests.distributions import EXTRAS, absent, homes, requirements
+
+# Runs command lines in a new interpreter in which some packages are not installed.
+RUN = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from tests.hiding import hide
+hidden, lines = json.loads(sys.argv[1])
+hide(hidden)
+from reports.cli import main
+done = {}
+for line in lines:
+    with redirect_stdout(io.StringIO()) as out, redirect_stderr(io.StringIO()) as err:
+        code = main(line.split())
+    done[line] = (code, out.getvalue().strip(), err.getvalue().strip())
+print(json.dumps(done))
+"""
+
+
+def python(folder: Path, script: str, *arguments: str) -> str:
+    """What a script prints in a new interpreter that works in a folder."""
+    command = [sys.executable, "-c", script, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment())
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def runs(folder: Path, extras: set[str], *lines: str) -> dict[str, tuple[int, str, str]]:
+    """Exit code, stdout and stderr of command lines in an installation with some extras."""
+    hidden = sorted(absent(*extras))
+    return json.loads(python(folder, RUN, json.dumps([hidden, lines])))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a small study."""
+    folder = tmp_path_factory.mktemp("plain")
+    small_study(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plain(folder: Path) -> dict[str, tuple[int, str, str]]:
+    """What commands answer in an installation without any extra."""
+    return runs(
+        folder,
+        set(),
+        "policies",
+        "scenarios",
+        "studies",
+        "simulate --scenario small.toml --events log.parquet",
+        "evaluate --scenario small.toml --policy tour --missions 3",
+        "study run trial.toml --out trial",
+        "study show trial",
+        "sweep --scenario small.toml --set uavs=1,2 --missions 3",
+        "train quick --out run",
+        "simulate --policy ddqn",
+        "study run fig5 --out fig5",
+        "study run sensitivity --policy greedy --out sensitivity",
+        "study run trial.toml --out trial --scheduler tcp://127.0.0.1:1",
+        "study run trial.toml --out new --report",
+        "study export trial --crate trial.zip",
+        "simulate --figure mission.png",
+        "report ./trial",
+    )
+
+
+def test_a_plain_installation_has_the_simulator_and_its_commands(folder, plain) -> None:
+    for line in [*plain][:8]:
+        code, out, err = plain[line]
+        assert code == 0, (line, err)
+        assert out, line
+    listed = {line.split()[0] for line in plain["policies"][1].splitlines()}
+    assert set(trained_names()) < listed
+    assert (folder / "log.parquet").exists()
+
+
+def test_a_sweep_answers_without_its_page(plain) -> None:
+    _, out, err = next(answer for line, answer in plain.items() if line.startswith("sweep"))
+    assert "rank" in out
+    assert "page: " not in out
+    assert err.splitlines()[-1].startswith("no page: the page of a sweep needs ")
+    assert err.endswith(": pip install 'dess[reports]'")
+
+
+def test_what_an_extra_adds_is_missed_in_one_line(folder, plain) -> None:
+    missed = {
+        "train": ("dess train needs PyTorch", "learning"),
+        "simulate --policy": ("policy ddqn needs PyTorch", "learning"),
+        "study run fig5": ("study fig5: policies: policy ddqn needs PyTorch", "learning"),
+        "study run sensitivity": ("dess study needs SALib", "reports"),
+        "study run trial.toml --out trial --sch": ("a scheduler needs distributed", "distributed"),
+        "study run trial.toml --out new": ("--report needs ", "reports"),
+        "study export": ("dess study needs ", "reports"),
+        "simulate --figure": ("dess simulate needs matplotlib", "reports"),
+        "report": ("dess report needs ", "reports"),
+    }
+    for beginning, (what, extra) in missed.items():
+        [(code, out, err)] = [plain[line] for line in plain if line.startswith(beginning)]
+        assert (code, out) == (2, ""), beginning
+        assert len(err.splitlines()) == 1, err
+        assert err.startswith(f"dess: error: {what}"), err
+        assert err.endswith(f", which is not installed: pip install 'dess[{extra}]'"), err
+    assert not {"run", "fig5", "new", "mission.png"} & {path.name for path in folder.iterdir()}
+
+
+def test_with_the_extra_learning_trained_policies_act(folder) -> None:
+    [(code, out, err)] = runs(folder, {"learning"}, "simulate --policy ddqn").values()
+    assert code == 0, err
+    assert "success" in out
+
+
+def test_packages_are_imported_without_any_extra(folder) -> None:
+    script = (
+        "import json, sys; from tests.hiding import hide; hide(json.loads(sys.argv[1]))\n"
+        "import dess, policies, analysis\n"
+        "for package in (dess, policies, analysis):\n"
+        "    for name in package.__all__: getattr(package, name)\n"
+        "try: policies.load('ddqn')\n"
+        "except dess.InputError as error: print(error)\n"
+    )
+    assert python(folder, script, json.dumps(sorted(absent()))).startswith("policy ddqn needs ")
+
+
+def test_the_packages_of_an_extra_are_those_of_its_libraries() -> None:
+    found = homes()
+    for extra, packages in libraries.EXTRAS.items():
+        of_packages = {home for package in packages for home in found[package]}
+        unused = {"jupyter"}  # opens notebooks; nothing imports it
+        assert of_packages == set(requirements(*EXTRAS[extra])) - unused, extra
+
+
+def test_what_is_no_library_of_ours_is_no_library_that_is_missed() -> None:
+    assert libraries.absence(ModuleNotFoundError(name="my_policies"), "dess") is None
+    assert libraries.absence(ModuleNotFoundError(), "dess") is None
+    line = str(libraries.absence(ModuleNotFoundError(name="torch.nn"), "a policy"))
+    assert line == "a policy needs PyTorch, which is not installed: pip install 'dess[learning]'"
