@@ -51,7 +51,7 @@ def verify(session: nox.Session) -> None:
 @nox.session
 def lint(session: nox.Session) -> None:
     """Check style, format and types."""
-    install(session, "[lint]")
+    install(session, "[all,lint]")  # types of the optional libraries are checked too
     session.run("ruff", "check")
     session.run("ruff", "format", "--check")
     session.run("mypy")
