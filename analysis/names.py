@@ -20,6 +20,7 @@ SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "produc
 # All metrics of a mission: shares of missions, and means over missions.
 SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)
+BOUNDED = (RATIO, PRODUCT)  # those of the means whose values lie between 0 and 1
 COST = "cost"  # of a study with prices
 LESS_IS_BETTER = (COST,)
 

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import PRODUCT, SHARES, parameter, value_text
+from analysis.names import PRODUCT, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
@@ -97,7 +97,7 @@ def changes(
     rows = []
     for first, second in couples:
         samples = values[second].to_numpy(), values[first].to_numpy()
-        pair, wide = (paired(*samples, level, metric in SHARES) for level in (LEVEL, at_once))
+        pair, wide = (paired(*samples, level, metric) for level in (LEVEL, at_once))
         ends = pair.low, pair.high, wide.low, wide.high
         rows.append((first, second, pair.difference, *ends, pair.p, pair.n))
     columns = ["first", "second", "difference", "low", "high", "wide_low", "wide_high", "p", "n"]

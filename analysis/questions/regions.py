@@ -229,7 +229,7 @@ def _compared(
         if missions.empty:
             continue
         of_policy, of_baseline = missions[PRODUCT], missions[PRODUCT + OF_BASELINE]
-        pair = paired(of_policy.to_numpy(), of_baseline.to_numpy())
+        pair = paired(of_policy.to_numpy(), of_baseline.to_numpy(), metric=PRODUCT)
         behind = wilson(int((missions["difference"] < 0).sum()), len(missions))
         rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(missions), *behind))
     names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]

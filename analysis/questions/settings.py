@@ -19,7 +19,7 @@ from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, SHARES, para
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
 from analysis.stats.differences import column_tests
-from analysis.stats.intervals import column_intervals
+from analysis.stats.intervals import Interval, column_intervals, stratified
 from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
 
@@ -98,7 +98,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     for name in (*others, metric):
         wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[["policy", "point"]]))
-        ends = column_intervals(wide, name in SHARES)
+        ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     table["tied"] = _tied(wide, metric)  # of the metric that ranks, the last of all
     sign = 1 if metric in LESS_IS_BETTER else -1
@@ -113,9 +113,9 @@ def averaged(
     """Means of every policy at each combination of values of some fields.
 
     Where several design points have the values, the mean is over these points: the partial
-    dependence on the fields, over the design. All points share the replications, so a replication's
-    mean over the points is the unit of the intervals, which hold for the design as it is. Counted
-    are the replications that all these points have.
+    dependence on the fields, over the design. The intervals hold for the design as it is: its
+    points are strata, as of ``stats.intervals.stratified``. Counted are the replications that all
+    these points have.
 
     Args:
         results: The study.
@@ -210,7 +210,7 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
         for policy in results.policies:
             missions = _missions(results, metric, policy)
             wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
-            tests = column_tests(wide.drop(columns=point), wide[point], metric in SHARES)
+            tests = column_tests(wide.drop(columns=point), wide[point], metric)
             parts.append(tests[tests["n"] > 0].reset_index().assign(metric=metric, policy=policy))
         table = pd.concat(parts, ignore_index=True)
         tables.append(table.assign(p_adjusted=adjust(table["p"].to_numpy(float), "holm")))
@@ -239,11 +239,33 @@ def _averaged(
         if not sampled:  # replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
-        table = pd.concat([cells, column_intervals(wide, metric in SHARES)], axis=1)
+        if sampled:
+            ends = column_intervals(wide, metric)
+        else:
+            at_points = part.pivot(index="replication", columns="point", values=metric)
+            ends = _over_points(at_points.reindex(columns=range(len(cell_of))), cell_of, metric)
+        table = pd.concat([cells, ends], axis=1)
         table = table.assign(points=sizes, tied=_tied(wide, metric))
         table.insert(0, "policy", name)
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.DataFrame:
+    """``mean``, ``low``, ``high``, ``n`` of every cell, over its points as strata; nan without any.
+
+    Args:
+        values: (R, K) a row per replication, a column per design point.
+        cell_of: (K,) the cell that every point is in.
+        metric: The metric.
+    """
+    samples, rows = values.to_numpy(float), []
+    for cell in range(cell_of.max() + 1):
+        sample = samples[:, cell_of == cell]
+        complete = sample[~np.isnan(sample).any(axis=1)]
+        ends = stratified(complete, metric) if len(complete) else Interval(*[np.nan] * 3)
+        rows.append((*ends, len(complete)))
+    return pd.DataFrame(rows, columns=[*Interval._fields, "n"])
 
 
 def check_metric(results: Results, metric: str) -> None:

@@ -21,7 +21,7 @@ from analysis.replication.evidence_of_policy import (
     negated,
 )
 from analysis.replication.verdict_rules import MARGIN
-from analysis.stats.intervals import Interval, mean_interval, summary, wilson
+from analysis.stats.intervals import Interval, bounded_interval, mean_interval, summary, wilson
 
 Unit = Literal["share", "points", "reward", "steps", "number"]
 
@@ -267,9 +267,8 @@ def _share_of(occurs: np.ndarray, name: str) -> Quantity:
 
 
 def _mean_share(values: np.ndarray, name: str) -> Quantity:
-    """The mean of a share per mission; its interval ends where shares do."""
-    middle, low, high = mean_interval(values)
-    return Quantity(middle, max(low, 0.0), min(high, 1.0), len(values), name=name)
+    """The mean of a share per mission."""
+    return Quantity(*bounded_interval(values), n=len(values), name=name)
 
 
 def _points(row: pd.Series, name: str = "") -> Quantity:

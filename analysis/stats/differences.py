@@ -1,9 +1,16 @@
-"""Tests of paired differences: Student's t, for shares with McNemar's, and the sign test."""
+"""Tests of paired differences: Student's t, for shares with McNemar's, and the sign test.
+
+Differences of values from 0 to 1 keep Student's t, cut at -1 and 1: missions that only one of two
+policies fails weigh on both sides, so their mean is less skewed than that of the values.
+"""
+
+from collections.abc import Callable
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
+from analysis.names import BOUNDED, SHARES
 from analysis.stats.intervals import LEVEL, Interval, column_intervals, mean_interval
 
 _ROUNDING = 64 * np.finfo(float).eps  # relative; differences of differences below are none
@@ -45,13 +52,28 @@ def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
     return Interval(mean, max(smooth.low, -1.0), min(smooth.high, 1.0)), p
 
 
-def column_tests(values: pd.DataFrame, baseline: pd.Series, share: bool = False) -> pd.DataFrame:
+def bounded_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
+    """The mean difference of values from 0 to 1 with its interval, and the p-value of none.
+
+    Student's t, cut at -1 and 1. If all differences are equal, one gain and one loss are added, as
+    for shares: missions that differ otherwise may be too rare to be among these.
+    """
+    mean, p = t_test(smoothed(differences) if np.ptp(differences) == 0 else differences, level)
+    return Interval(float(differences.mean()), max(mean.low, -1.0), min(mean.high, 1.0)), p
+
+
+def difference_test(metric: str) -> Callable[[np.ndarray, float], tuple[Interval, float]]:
+    """The test of paired differences that is fit for a metric of missions."""
+    return share_test if metric in SHARES else bounded_test if metric in BOUNDED else t_test
+
+
+def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
     """Paired comparisons of many columns with a baseline, as ``stats.paired.paired`` has them.
 
     Args:
         values: (R, K) a row per replication; nan where a column lacks one.
         baseline: (R,) the values of the baseline.
-        share: Whether the values are outcomes 0 or 1.
+        metric: The metric; one without bounds, if not given.
 
     Returns:
         (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
@@ -65,16 +87,19 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, share: bool = False)
     table["p"] = 2 * stats.t.sf(t, np.maximum(table["n"] - 1, 1))
     known: dict[tuple[int, int, int], tuple[Interval, float]] = {}
     exact = {}  # columns that Student's t is not for
-    for column in differences if share else differences.columns[constant]:
+    for column in differences if metric in SHARES else differences.columns[constant]:
         own = differences[column].dropna().to_numpy()
-        if share and len(own):
+        if metric in SHARES and len(own):
             key = len(own), int((own > 0).sum()), int((own < 0).sum())  # all that the test needs
             known[key] = known.get(key) or share_test(own, LEVEL)
             exact[column] = (*known[key][0], known[key][1])
         elif len(own):
-            exact[column] = (own[0], own[0], own[0], sign_test(own))
+            mean, p = difference_test(metric)(np.full_like(own, own[0]), LEVEL)
+            exact[column] = (*mean, p)
     if exact:
         table.loc[[*exact], ["difference", "low", "high", "p"]] = np.array([*exact.values()])
+    if metric in BOUNDED:
+        table[["low", "high"]] = table[["low", "high"]].clip(-1, 1)
     return table
 
 

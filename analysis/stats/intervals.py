@@ -14,10 +14,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import MEANS, SHARES
+from analysis.names import BOUNDED, MEANS, SHARES
+from analysis.stats.bounded import LEVEL as LEVEL
+from analysis.stats.bounded import bounded_ends
 from dess.errors import InputError, one_of
-
-LEVEL = 0.95
 
 
 class Interval(NamedTuple):
@@ -40,11 +40,26 @@ def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
     return Interval(successes / n, float(ends.low), float(ends.high))
 
 
-def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
-    """Mean with its Student t interval; fit for skewed metrics from some 30 values on.
+def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
+    """Mean of values from 0 to 1 with its interval, as of ``stats.bounded.bounded_ends``.
 
-    A single value, or values without variance, give a degenerate interval (low = mean = high): the
-    sample says nothing about the spread.
+    Raises:
+        ValueError: If there are no values.
+    """
+    sample = np.asarray(values, float)
+    if not sample.size:
+        raise ValueError("bounded_interval: no values")
+    mean = float(sample.mean())
+    low, high = bounded_ends(mean, float(sample.var()), sample.size, level)
+    return Interval(mean, float(low), float(high))
+
+
+def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
+    """Mean with its Student t interval: for values without bounds, and for paired differences.
+
+    It is fit for skewed metrics from some 30 values on. The mean of values from 0 to 1 has the
+    ``bounded_interval``. A single value, or values without variance, give a degenerate interval
+    (low = mean = high): the sample says nothing about the spread.
 
     Raises:
         ValueError: If there are no values.
@@ -59,10 +74,69 @@ def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) ->
     return Interval(mean, float(low), float(high))
 
 
+def interval_of(
+    metric: str, values: Sequence[float] | np.ndarray, level: float = LEVEL
+) -> Interval:
+    """The mean of a metric of missions with the interval that is fit for it.
+
+    Wilson's interval for ``success``, the ``bounded_interval`` for the collection ratio and the
+    product, and Student's t for all others.
+
+    Raises:
+        ValueError: If there are no values.
+    """
+    if metric in SHARES:
+        sample = np.asarray(values)
+        return wilson(int(sample.sum()), sample.size, level)
+    return (bounded_interval if metric in BOUNDED else mean_interval)(values, level)
+
+
+def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interval:
+    """Mean of the means of fixed design points with its interval: the points are strata.
+
+    What differs from point to point is no chance, so the interval rests on the variance within the
+    points. A replication has the same realisation at all points, so what it adds to the mean is
+    counted as one contribution, as of a cluster of a stratified sample: this is the linearised
+    variance of W. G. Cochran (Sampling Techniques, 3rd edition, 1977, Section 11.18). A bounded
+    metric has the interval of ``bounded_ends`` with the effective number of missions of L. Kish
+    (Survey Sampling, 1965, Section 8.2): all missions, divided by how much more the mean varies
+    than if every point had replications of its own. N. Dean and M. Pagano (Journal of Survey
+    Statistics and Methodology 3 (2015) 484-503) find it good for shares of clustered samples.
+
+    Args:
+        values: (R, K) values of K design points in R replications; nan where a point lacks one.
+            Each point has one at least.
+        metric: The metric.
+        level: Confidence level.
+    """
+    present = ~np.isnan(values)
+    n, points = present.sum(axis=0), values.shape[1]
+    if points == 1:
+        return interval_of(metric, values[present], level)
+    means = np.nansum(values, axis=0) / n
+    residuals = np.where(present, values - means, 0.0)
+    mean = float(means.mean())
+    common = float(((residuals / n).sum(axis=1) ** 2).sum()) / points**2  # variance of the mean
+    if metric in SHARES or metric in BOUNDED:
+        alone = float(((residuals**2).sum(axis=0) / n**2).sum()) / points**2
+        missions = points**2 / float((1 / n).sum())
+        effect = min(max(common / alone, 1.0), points) if alone else points
+        low, high = bounded_ends(mean, alone * missions, missions / effect, level)
+        return Interval(mean, float(low), float(high))
+    replications = int(present.any(axis=1).sum())
+    freedom = max(replications - 1, 1)
+    half = float(stats.t.isf((1 - level) / 2, freedom) * np.sqrt(common * replications / freedom))
+    return Interval(mean, mean - half, mean + half)
+
+
 def summary(
     missions: pd.DataFrame, by: Sequence[str] = ("policy",), level: float = LEVEL
 ) -> pd.DataFrame:
     """Means with intervals of groups of missions.
+
+    A group with missions at several design points (column ``point``), each of which has two or
+    more, has the mean of the points' means and the interval of ``stratified``. Points with a
+    single mission each are taken for a sample of the design.
 
     Args:
         missions: A row per mission, with the fields of ``MISSION_RECORD`` and those of ``by``.
@@ -72,26 +146,24 @@ def summary(
     Returns:
         A row per group, in order of first appearance, and metric: the columns ``by``, ``metric``
         (``success``, ``collection_ratio``, ``collection_ratio_and_communication``, ``reward``),
-        ``mean``, ``low``, ``high`` and ``n``, the number of missions. ``success`` has its Wilson
-        interval, the others Student's t.
+        ``mean``, ``low``, ``high`` and ``n``, the number of missions. The intervals are those of
+        ``interval_of``.
     """
     rows = [
-        (*group, metric, *interval, len(part))
+        (*group, metric, *_interval(part, metric, level), len(part))
         for group, part in groups(missions, by)
-        for metric, interval in _intervals(part, level)
+        for metric in (*SHARES, *MEANS)
     ]
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
-def column_intervals(
-    values: pd.DataFrame, share: bool = False, level: float = LEVEL
-) -> pd.DataFrame:
-    """Means of columns with their intervals, as of ``summary``, for many columns at once.
+def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVEL) -> pd.DataFrame:
+    """Means of columns with their intervals, as of ``interval_of``, for many columns at once.
 
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.
-        share: Whether the values are outcomes 0 or 1, or means of such. Outcomes, and means that
-            are all the same, have Wilson's interval, other means Student's t.
+        metric: The metric; Student's t, if not given. Values of ``success`` that are no outcomes 0
+            or 1, but means of such, have the interval of bounded values.
         level: Confidence level.
 
     Returns:
@@ -100,11 +172,13 @@ def column_intervals(
     n, mean, errors = values.count(), values.mean(), values.sem().fillna(0.0)
     half = errors * stats.t.isf((1 - level) / 2, np.maximum(n - 1, 1))
     table = pd.DataFrame({"mean": mean, "low": mean - half, "high": mean + half, "n": n})
-    if share:
-        outcomes = (values.isin((0, 1)) | values.isna()).all() | (errors == 0)
-        rows = (outcomes & (n > 0)).to_numpy()
-        successes = (mean * n)[rows].round().astype(int)
-        pairs = [*zip(successes, n[rows], strict=True)]
+    if metric in SHARES or metric in BOUNDED:
+        some = n > 0
+        ends = bounded_ends(mean[some], values.var(ddof=0)[some], n[some], level)
+        table.loc[some, ["low", "high"]] = np.transpose(ends)
+    if metric in SHARES:
+        rows = ((values.isin((0, 1)) | values.isna()).all() & (n > 0)).to_numpy()
+        pairs = [*zip((mean * n)[rows].round().astype(int), n[rows], strict=True)]
         known = {pair: wilson(*pair, level)[1:] for pair in {*pairs}}  # each takes its time
         table.loc[rows, ["low", "high"]] = np.array([known[p] for p in pairs]).reshape(-1, 2)
     return table
@@ -128,6 +202,10 @@ def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, p
     yield from missions.groupby(list(by), sort=False, dropna=False) if by else [((), missions)]
 
 
-def _intervals(missions: pd.DataFrame, level: float) -> list[tuple[str, Interval]]:
-    shares = [(m, wilson(missions[m].sum(), len(missions), level)) for m in SHARES]
-    return shares + [(m, mean_interval(missions[m].to_numpy(), level)) for m in MEANS]
+def _interval(missions: pd.DataFrame, metric: str, level: float) -> Interval:
+    """The mean of a group: over its missions, or over the points that these are at."""
+    if "point" in missions and missions["point"].nunique() > 1:
+        wide = missions.pivot(index="replication", columns="point", values=metric)
+        if (wide.count() > 1).all():
+            return stratified(wide.to_numpy(float), metric, level)
+    return interval_of(metric, missions[metric].to_numpy(), level)

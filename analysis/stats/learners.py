@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import optimize, stats
 
-from analysis.names import MEANS, SHARES
+from analysis.names import BOUNDED, MEANS, SHARES
 from analysis.stats.correction import Correction, with_adjusted
 from analysis.stats.differences import differences_of, share_test, sign_test, smoothed, t_test
 from analysis.stats.intervals import LEVEL, check_share
@@ -126,9 +126,10 @@ def compare_learners(
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,
         ``metric``, ``about``, the fields of ``Crossed``, after ``p`` ``p_adjusted``, ``trainings``
         and ``n``, the number of missions (of replications, where ``compare`` would take means).
-        ``about`` says what ``low``, ``high`` and ``p`` are about: ``the learner``, trainings to
-        come included, or ``this checkpoint``, the only one there is. Shares have the intervals and
-        the p-value with one gain and one loss added, as of ``paired``.
+        ``about`` says what ``low``, ``high`` and ``p`` are about: the expected difference over all
+        trainings of ``the learner``, or ``this checkpoint``, the only one there is. ``new_low`` and
+        ``new_high`` bound the difference of one new training. Shares have the intervals and the
+        p-value with one gain and one loss added, as of ``paired``.
 
     Raises:
         InputError: As of ``compare``; if a learner has no checkpoint, or one twice.
@@ -150,8 +151,10 @@ def compare_learners(
             for metric in metrics:
                 differences = differences_of(np.stack([a[metric] for a in parts]), b[metric])
                 result = crossed(differences, level)
-                if metric in SHARES:
+                if metric in SHARES or (metric in BOUNDED and np.ptp(differences) == 0):
                     result = _as_share(result, differences, level)
+                elif metric in BOUNDED:
+                    result = _within(result)
                 about = LEARNER if len(parts) > 1 else CHECKPOINT
                 labels = (learner, baseline, *group, metric, about)
                 rows.append((*labels, *result, *differences.shape))
@@ -164,9 +167,14 @@ def _as_share(result: Crossed, differences: np.ndarray, level: float) -> Crossed
     if len(differences) == 1:
         mean, p = share_test(differences[0], level)
         return result._replace(low=mean.low, high=mean.high, p=p)
-    smooth = crossed(smoothed(differences), level)
-    ends = {name: float(np.clip(getattr(smooth, name), -1, 1)) for name in _ENDS}
-    return result._replace(**ends, p=smooth.p)
+    smooth = _within(crossed(smoothed(differences), level))
+    return result._replace(**{name: getattr(smooth, name) for name in _ENDS}, p=smooth.p)
+
+
+def _within(result: Crossed) -> Crossed:
+    """The result with its intervals cut at -1 and 1, where differences of shares end."""
+    ends = {name: float(np.clip(getattr(result, name), -1, 1)) for name in _ENDS}
+    return result._replace(**ends)
 
 
 def _alpha_of(half: Callable[[float], float], distance: float) -> float:

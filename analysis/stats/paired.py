@@ -14,7 +14,7 @@ import pandas as pd
 
 from analysis.names import MEANS, SHARES
 from analysis.stats.correction import Correction, with_adjusted
-from analysis.stats.differences import differences_of, share_test, t_test
+from analysis.stats.differences import difference_test, differences_of
 from analysis.stats.intervals import LEVEL, check_share
 from analysis.stats.matching import (
     Treatment,
@@ -42,22 +42,23 @@ class Paired(NamedTuple):
     n: int
 
 
-def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, share: bool = False) -> Paired:
+def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "") -> Paired:
     """Compare two samples pair by pair; differences are A - B.
 
     Args:
         a: (n,) values of A.
         b: (n,) values of B; entry r belongs with entry r of A.
         level: Confidence level.
-        share: Whether the values are outcomes 0 or 1, or means of such: shares.
+        metric: What the values are of; a metric without bounds, if not given.
 
     Returns:
         The interval of Student's t and the p-value of the paired t test; those of
-        ``differences.share_test`` for shares. Nothing is ever nan:
+        ``differences.share_test`` for ``success``, and of ``differences.bounded_test`` for metrics
+        from 0 to 1. Nothing is ever nan:
 
-        - All differences equal (up to rounding), n = 1 included: the interval is degenerate (low
-          = difference = high), save that of shares; p is that of the sign test, 2^(1 - n), which is
-          1 for a single pair; 1 if there is no difference at all.
+        - All differences equal (up to rounding), n = 1 included, of a metric without bounds: the
+          interval is degenerate (low = difference = high); p is that of the sign test, 2^(1 - n),
+          which is 1 for a single pair; 1 if there is no difference at all.
         - A or B constant: their correlation is 0. Both: so is the variance reduction.
 
     Raises:
@@ -66,10 +67,10 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, share: bool = Fal
     a, b = np.asarray(a, float), np.asarray(b, float)
     if a.shape != b.shape or not a.size:
         raise ValueError(f"paired: {a.size} and {b.size} values; allowed: as many, at least one")
-    if share and (min(a.min(), b.min()) < 0 or max(a.max(), b.max()) > 1):
+    if metric in SHARES and (min(a.min(), b.min()) < 0 or max(a.max(), b.max()) > 1):
         raise ValueError("paired: no shares; allowed: values from 0 to 1")
     differences = differences_of(a, b)
-    mean, p = (share_test if share else t_test)(differences, level)
+    mean, p = difference_test(metric)(differences, level)
     of_a, of_b, of_differences = map(_variance, (a, b, differences))
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
@@ -119,7 +120,7 @@ def compare(
         check_same_missions(tables, name, baseline)
         for group, (a, b) in matched([tables[name], reference], by):
             for metric in metrics:
-                result = paired(a[metric], b[metric], level, share=metric in SHARES)
+                result = paired(a[metric], b[metric], level, metric)
                 rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)

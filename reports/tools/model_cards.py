@@ -16,9 +16,9 @@ import pandas as pd
 
 import policies
 from analysis import numbers
-from analysis.names import PRODUCT
+from analysis.names import METRICS, PRODUCT
 from analysis.replication import paper
-from analysis.stats.intervals import mean_interval, wilson
+from analysis.stats.intervals import interval_of, mean_interval
 from dess import load_scenario, simulate_batch
 from policies.ddqn.config import MISSION_SEED, config_of, load_config
 from policies.registry import SHIPPED
@@ -33,8 +33,7 @@ EVALUATION_SEED = 20_261_121
 
 def _row(name: str, missions: np.ndarray) -> str:
     """Success, collection ratio and product of missions with their intervals, as a table row."""
-    ends = [wilson(int(missions["success"].sum()), len(missions))]
-    ends += [mean_interval(missions[metric]) for metric in ("collection_ratio", PRODUCT)]
+    ends = [interval_of(metric, missions[metric]) for metric in METRICS]
     return f"| {name} | {' | '.join(numbers.interval(*interval) for interval in ends)} |"
 
 

@@ -13,12 +13,17 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from analysis.names import PRODUCT, SUCCESS
 from analysis.stats.bootstrap import bootstrap_interval, expanded_level
+from analysis.stats.bounded import bounded_ends
 from analysis.stats.correction import adjust
 from analysis.stats.distribution import distribution, quantile_interval
-from analysis.stats.intervals import Interval, mean_interval, wilson
+from analysis.stats.intervals import Interval, mean_interval, stratified, wilson
 from analysis.stats.learners import crossed
 from analysis.stats.paired import paired
+
+Drawing = tuple[Callable[[np.random.Generator, tuple[int, int]], np.ndarray], float]
+Intervals = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 TRIALS = 2000
 QUICK = [300, pytest.param(TRIALS, marks=pytest.mark.slow)]
@@ -93,6 +98,119 @@ def test_student_covers_the_mean(draw, mean, n, trials):
     assert holds(
         covered((mean_interval(draw(generator, n))[1:] for _ in range(trials)), mean), trials
     )
+
+
+# Means of values from 0 to 1
+
+
+def product(failures: float, a: float, b: float) -> Drawing:
+    """Products of missions: 0 of those that fail, of the others a ratio of Beta(a, b)."""
+
+    def draw(generator: np.random.Generator, size: tuple[int, int]) -> np.ndarray:
+        return np.where(generator.random(size) < failures, 0.0, generator.beta(a, b, size))
+
+    return draw, (1 - failures) * a / (a + b)
+
+
+PRODUCTS: dict[str, Drawing] = {
+    "no failures": product(0, 60, 2),
+    "narrow": product(0, 600, 400),
+    "one failure in 500": product(0.002, 60, 2),
+    "one failure in 100": product(0.01, 60, 2),
+    "one failure in 20": product(0.05, 30, 3),
+    "one failure in 3": product(1 / 3, 30, 3),
+    "failures but one in 20": product(0.95, 30, 3),
+    "failures but one in 200": product(0.995, 30, 3),
+    "all fail": product(1, 30, 3),
+    "skewed down": product(0, 8, 0.3),
+    "skewed up": product(0, 0.3, 3),
+    "even": product(0, 1, 1),
+}
+
+
+def lengths_and_coverage(
+    intervals: Intervals, drawing: Drawing, n: int, trials: int
+) -> tuple[float, float]:
+    """The mean length of intervals of n values, and the share of them that hold the mean."""
+    draw, mean = drawing
+    low, high = intervals(draw(rng(1, n), (trials, n)))
+    return float(np.mean(high - low)), float(np.mean((low <= mean) & (mean <= high)))
+
+
+def bounded(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return bounded_ends(values.mean(axis=1), values.var(axis=1), values.shape[1])
+
+
+def student(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    mean, error = values.mean(axis=1), stats.sem(values, axis=1)
+    half = stats.t.ppf(0.975, values.shape[1] - 1) * error
+    return mean - half, mean + half
+
+
+def betting(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The hedged capital interval of Waudby-Smith and Ramdas (2024, Section 4.4), by bisection.
+
+    Its bets are the predictable ones for a confidence interval (their equation 26), at most half of
+    what would lose all; each end is where one of the two capitals reaches 2 / alpha.
+    """
+    n, most = values.shape[1], np.log(2 / 0.05)
+    counts = np.arange(1, n + 1)
+    means = (0.5 + np.cumsum(values, axis=1)) / (counts + 1)
+    variances = (0.25 + np.cumsum((values - means) ** 2, axis=1)) / (counts + 1)
+    before = np.concatenate([np.full((len(values), 1), 0.25), variances[:, :-1]], axis=1)
+    bets = np.sqrt(2 * most / (n * before))
+
+    def low_end(values: np.ndarray) -> np.ndarray:
+        low, high = np.full(len(values), 1e-9), np.maximum(values.mean(axis=1), 1e-9)
+        for _ in range(25):
+            middle = (low + high) / 2
+            stakes = np.minimum(bets, 0.5 / middle[:, None])
+            rejected = np.log1p(stakes * (values - middle[:, None])).sum(axis=1) >= most
+            low, high = np.where(rejected, middle, low), np.where(rejected, high, middle)
+        return low
+
+    return low_end(values), 1 - low_end(1 - values)
+
+
+@pytest.mark.parametrize("n", [10, 30, 100, 300])
+@pytest.mark.parametrize("drawing", PRODUCTS.values(), ids=PRODUCTS)
+def test_bounded_intervals_cover_wherever_the_values_lie(drawing, n):
+    assert lengths_and_coverage(bounded, drawing, n, 500)[1] >= 0.95 - error(500)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [10, 30, 100, 300, 1000, 3000])
+@pytest.mark.parametrize("drawing", PRODUCTS.values(), ids=PRODUCTS)
+def test_bounded_intervals_cover_where_student_does_not_and_are_shorter_than_by_betting(drawing, n):
+    """Their coverage and length, beside those of Student's t and of the betting interval."""
+    length, coverage = lengths_and_coverage(bounded, drawing, n, 4000)
+    assert coverage >= 0.95 - max(0.02, error(4000))
+    of_student, covered_by_student = lengths_and_coverage(student, drawing, n, 4000)
+    if covered_by_student >= 0.93 and n * of_student > 10:  # many values that spread
+        assert length <= 1.1 * of_student
+    by_betting, _ = lengths_and_coverage(betting, drawing, n, max(20, 20_000 // n))
+    assert length <= 0.9 * by_betting
+
+
+def test_student_misses_where_failures_are_rare():
+    """Why means of shares have another interval."""
+    assert lengths_and_coverage(student, PRODUCTS["one failure in 100"], 30, 2000)[1] < 0.6
+    assert lengths_and_coverage(student, PRODUCTS["failures but one in 200"], 100, 2000)[1] < 0.5
+
+
+@pytest.mark.parametrize("trials", QUICK)
+@pytest.mark.parametrize("shared", [0.0, 0.5, 1.0])
+def test_stratified_intervals_cover_the_mean_over_the_points(shared, trials):
+    """Of points of unlike means, whose failures happen in the same replications, or do not."""
+    generator, means = rng(11), np.array([0.5, 0.7, 0.9])
+
+    def values() -> np.ndarray:
+        own, common = generator.random((60, 3)), generator.random((60, 1))
+        fails = np.where(generator.random((60, 1)) < shared, common, own) < 0.1
+        return np.where(fails, 0.0, means + generator.uniform(-0.05, 0.05, (60, 3)))
+
+    intervals = (stratified(values(), PRODUCT)[1:] for _ in range(trials))
+    assert covered(intervals, 0.9 * means.mean()) >= 0.95 - max(0.02, error(trials))
 
 
 @pytest.mark.parametrize("trials", QUICK)
@@ -222,7 +340,7 @@ def shares(gain: float, loss: float) -> tuple[float, float]:
     kinds = rng(8).multinomial(100, [gain, loss, 1 - gain - loss], TRIALS)
     kinds, counts = np.unique(kinds, axis=0, return_counts=True)
     pairs = [np.repeat([[1, 0, 1], [0, 1, 1]], kind, axis=1) for kind in kinds]
-    results = [paired(a, b, share=True) for a, b in pairs]
+    results = [paired(a, b, metric=SUCCESS) for a, b in pairs]
     inside = [r.low <= gain - loss <= r.high for r in results]
     return counts @ inside / TRIALS, counts @ [r.p <= 0.05 for r in results] / TRIALS
 

@@ -89,7 +89,7 @@ def test_successes_are_compared_as_shares(results, table):
     pairs = main_effects.changes(results, table, "greedy", "uavs", "success")
     missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
     of = (missions.loc[point, "success"].to_numpy(float) for point in (1, 0))
-    expected = paired(*of, share=True)
+    expected = paired(*of, metric="success")
     assert pairs.loc[0, ["low", "high"]].tolist() == pytest.approx([expected.low, expected.high])
     assert expected.low < pairs.loc[0, "difference"] < expected.high
 

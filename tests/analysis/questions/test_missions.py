@@ -11,7 +11,7 @@ from analysis import run_study
 from analysis.names import PRODUCT, RATIO
 from analysis.questions import missions
 from analysis.results.tables import Results
-from analysis.stats.intervals import mean_interval
+from analysis.stats.intervals import bounded_interval
 from dess import InputError
 from dess.state import sample_scenario
 from tests.analysis.small import grid, small_study
@@ -133,7 +133,7 @@ def test_uavs_have_a_row_each(results: Results, shown: list[missions.LoggedMissi
 def test_means_are_of_a_policy_at_a_point_or_at_all(results: Results) -> None:
     greedy = results.missions.query("policy == 'greedy'")
     at_point = missions.estimate(results, "greedy", RATIO, 1)
-    expected = mean_interval(greedy.query("point == 1")[RATIO])
+    expected = bounded_interval(greedy.query("point == 1")[RATIO])
     assert tuple(at_point[["mean", "low", "high"]]) == pytest.approx(tuple(expected))
     assert at_point["n"] == 6
     everywhere = missions.estimate(results, "greedy")

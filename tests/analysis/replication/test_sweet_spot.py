@@ -6,7 +6,7 @@ from analysis import run_study
 from analysis.names import METRICS, PRODUCT
 from analysis.replication import sweet_spot
 from analysis.results.tables import Results
-from analysis.stats.intervals import mean_interval
+from analysis.stats.intervals import bounded_interval
 from tests.analysis.small import grid, small_study
 
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.01, "budget": 60, "check": 12}
@@ -25,7 +25,7 @@ def test_the_paper_is_the_first_row_and_policies_follow(results: Results) -> Non
     assert table.loc["paper", METRICS[PRODUCT]] == "93.0 %"
     for policy in results.policies:
         checks = results.checks.query("policy == @policy")
-        mean, low, high = mean_interval(checks[PRODUCT])
+        mean, low, high = bounded_interval(checks[PRODUCT])
         cell = table.loc[policy, METRICS[PRODUCT]]
         assert cell.startswith(f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}]")
         assert cell[-1] == ("▲" if low > 0.93 else "▼" if high < 0.93 else "≈")

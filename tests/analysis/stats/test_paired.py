@@ -6,6 +6,7 @@ import pytest
 from pandas.testing import assert_frame_equal
 from scipy import stats
 
+from analysis.names import PRODUCT, SUCCESS
 from analysis.stats.correction import adjust
 from analysis.stats.paired import compare, paired
 from dess import InputError
@@ -31,16 +32,16 @@ def test_pairs_by_hand():
 
 def test_shares_by_hand():
     a, b = [1] * 5 + [0] + [1] * 4, [0] * 5 + [1] + [1] * 4
-    result = of_lists(a, b, share=True)
+    result = of_lists(a, b, metric=SUCCESS)
     # 5 gains, 1 loss: 2 (1 + 6) / 2^6; one more of each: mean 1 / 3, squares 8 - 12 / 9,
     # t(0.975, 11) = 2.200985: 1 / 3 -+ 2.200985 sqrt(6.66667 / 11 / 12)
     assert result.p == pytest.approx(14 / 64)
     assert result[:3] == pytest.approx((0.4, -0.16130, 0.82797), abs=1e-5)
-    assert of_lists(b, a, share=True)[:3] == pytest.approx((-0.4, -0.82797, 0.16130), abs=1e-5)
+    assert of_lists(b, a, metric=SUCCESS)[:3] == pytest.approx((-0.4, -0.82797, 0.16130), abs=1e-5)
 
 
 def test_means_of_outcomes_are_shares():
-    halves = of_lists([1.0, 0.5, 1.0], [0.5, 0.5, 1.0], share=True)
+    halves = of_lists([1.0, 0.5, 1.0], [0.5, 0.5, 1.0], metric=SUCCESS)
     smooth = of_lists([1.0, 0.5, 1.0, 1.0, 0.0], [0.5, 0.5, 1.0, 0.0, 1.0])
     assert (halves.low, halves.high, halves.p) == (smooth.low, min(smooth.high, 1), smooth.p)
     assert halves.difference == pytest.approx(1 / 6)
@@ -82,18 +83,18 @@ def test_a_constant_has_no_correlation():
 
 @pytest.mark.parametrize(("a", "b"), [([1, 1], [1, 1]), ([1], [0]), ([1, 1, 1], [0, 0, 0])])
 def test_shares_without_spread_have_an_interval(a, b):
-    result = of_lists(a, b, share=True)
+    result = of_lists(a, b, metric=SUCCESS)
     assert -1 <= result.low < result.difference <= result.high <= 1
     assert result.high - result.low > 0.5
     assert result.p == min(1, 2 * 0.5 ** sum(np.not_equal(a, b)))
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "share"), [([], [], False), ([1.0, 2.0], [1.0], False), ([2, 1], [0, 1], True)]
+    ("a", "b", "metric"), [([], [], ""), ([1.0, 2.0], [1.0], ""), ([2, 1], [0, 1], SUCCESS)]
 )
-def test_samples_that_are_no_pairs_are_refused(a, b, share):
+def test_samples_that_are_no_pairs_are_refused(a, b, metric):
     with pytest.raises(ValueError, match="paired: "):
-        of_lists(a, b, share=share)
+        of_lists(a, b, metric=metric)
 
 
 def compared(missions=STUDY, baseline="tour", metrics=(METRIC,), **arguments):
@@ -221,3 +222,20 @@ def test_missions_that_do_not_match_are_refused_in_a_line(change, line):
     with pytest.raises(InputError) as error:
         change()
     assert str(error.value) == line
+
+
+def test_differences_of_shares_end_where_these_do():
+    far = of_lists([1.0, 1.0, 0.0], [0.0, 0.0, 1.0], metric=PRODUCT)
+    assert (far.low, far.high) == (-1.0, 1.0)  # Student's t goes beyond
+    free = of_lists([1.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    assert free.low < -1 and free.high > 1
+
+
+@pytest.mark.parametrize("difference", [0.0, 0.25])
+def test_equal_differences_of_bounded_values_have_an_interval_and_its_p_value(difference):
+    a = np.full(20, 0.5 + difference)
+    result = paired(a, np.full(20, 0.5), metric=PRODUCT)
+    expected = stats.ttest_1samp([difference] * 20 + [1.0, -1.0], 0)
+    assert result.low < result.difference == difference < result.high
+    assert result[1:3] == pytest.approx([*expected.confidence_interval()])
+    assert result.p == pytest.approx(expected.pvalue)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from analysis.names import MEANS, SHARES
-from analysis.stats.intervals import mean_interval, wilson
+from analysis.names import BOUNDED, MEANS, METRICS, PRODUCT, SHARES
+from analysis.stats.intervals import bounded_interval, interval_of, mean_interval, wilson
 from analysis.study import stopping
 from analysis.study.stopping import Metric, Precision, running_interval
 
@@ -68,11 +68,12 @@ def test_running_intervals_are_those_of_the_statistics(metric):
     generator = np.random.default_rng(1)
     share = metric in SHARES
     values = generator.integers(0, 2, 300) if share else 1e6 + generator.normal(size=300)
+    values = generator.beta(8, 2, 300) if metric in BOUNDED else values
     means, widths = running_interval(metric, values)
     for n in (1, 2, 3, 10, 300):
         sample = values[:n]
-        interval = wilson(sample.sum(), n) if share else mean_interval(sample)
-        half = (interval.high - interval.low) / 2 if share or n > 1 else np.inf
+        interval = interval_of(metric, sample)
+        half = (interval.high - interval.low) / 2 if metric in METRICS or n > 1 else np.inf
         assert (means[n - 1], widths[n - 1]) == pytest.approx((interval.mean, half), rel=1e-9)
 
 
@@ -80,6 +81,18 @@ def test_a_constant_has_an_interval_without_length():
     _, widths = running_interval("reward", np.full(50, 0.1))
     assert widths[0] == np.inf
     assert not widths[1:].any()
+
+
+def test_a_product_without_failures_takes_as_many_missions_as_a_failure_is_rare():
+    """The half-width that is asked for is the one that a page prints."""
+    fine = rule(first=30, look_ahead=20, targets={PRODUCT: {"absolute": 0.01}})
+    values = np.random.default_rng(9).beta(600, 400, 5000)
+    row = reached(fine, **{PRODUCT: values})
+    printed = bounded_interval(values[: row.missions])
+    assert row.half_width == pytest.approx((printed.high - printed.low) / 2) and row.met
+    assert 100 < row.stop < 300 and row.missions == row.stop + 20
+    wide = bounded_interval(values[: row.stop - 1])
+    assert (wide.high - wide.low) / 2 > 0.01
 
 
 def test_a_stopping_point_by_hand():
