@@ -11,6 +11,10 @@ import os
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
+from tests.installed import installed
+
+__all__ = ["installed"]  # a fixture
+
 os.environ["OMP_NUM_THREADS"] = "1"
 
 settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)

@@ -1,0 +1,55 @@
+"""``dess`` as users have it: a wheel in an environment of its own, away from the source tree.
+
+``installed`` is fast: its libraries are those of the environment of the tests, by path. Slow tests
+install all libraries into an empty environment.
+"""
+
+import os
+import subprocess
+import sys
+import sysconfig
+import venv
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def built(kind: str, folder: Path, source: Path = ROOT) -> Path:
+    """A ``wheel`` or ``sdist`` of a source tree, built into a folder."""
+    command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
+    subprocess.run(command, cwd=source, check=True, capture_output=True)
+    [file] = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
+    return file
+
+
+def environment(home: Path) -> dict[str, str]:
+    """The variables of a user with an empty home: nothing leads to the source tree."""
+    hidden = ("PYTHONPATH", "VIRTUAL_ENV", "XDG_", "JUPYTER", "IPYTHON", "MPLCONFIGDIR")
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(hidden)}
+    return kept | {"HOME": str(home)}
+
+
+def install(folder: Path, *packages: str) -> Path:
+    """Make an environment in a folder, and install with pip; the folder of its commands."""
+    venv.create(folder, symlinks=True)
+    commands = folder / ("Scripts" if os.name == "nt" else "bin")
+    pip = [sys.executable, "-m", "pip", "--python", str(commands / "python"), "install", "--quiet"]
+    subprocess.run([*pip, *packages], check=True, capture_output=True, cwd=folder)
+    return commands
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command ``dess`` of an installed wheel; run it with the variables of ``environment``."""
+    folder = tmp_path_factory.mktemp("installed")
+    wheel = built("wheel", folder)
+    commands = install(folder / "venv", "--no-deps", "--no-index", str(wheel))
+    [libraries] = (folder / "venv").glob("lib/python*/site-packages")
+    # A path in a .pth file is searched last, and the .pth files in it, of editable installations,
+    # are not read.
+    here = "\n".join(dict.fromkeys(map(sysconfig.get_path, ("purelib", "platlib"))))
+    (libraries / "libraries-of-the-tests.pth").write_text(here, "utf-8")
+    (folder / "venv" / "share").symlink_to(Path(sys.prefix, "share"))  # templates of nbconvert
+    return commands / "dess"

@@ -1,0 +1,82 @@
+"""An installed ``dess``, without the repository: the wheel, the sdist, and their commands."""
+
+import subprocess
+import tarfile
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from tests.analysis.small import small_study
+from tests.distributions import PROJECT
+from tests.installed import ROOT, built, environment, install
+
+
+def run(*command: object, folder: Path) -> str:
+    """What a command prints in a folder that is also its home."""
+    words, variables = [str(word) for word in command], environment(folder)
+    done = subprocess.run(words, cwd=folder, env=variables, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def check_commands(dess: Path, folder: Path) -> None:
+    """Run a study and render its page with an installed command, from an empty folder."""
+    small_study(folder, missions=4)
+    script = "import dess, reports.pages; print(dess.__version__, dess.__file__, reports.__file__)"
+    version, *files = run(dess.with_name("python"), "-c", script, folder=folder).split()
+    assert version == PROJECT["version"]
+    assert all(Path(file).is_relative_to(dess.parents[1]) for file in files)
+    run(dess, "study", "run", "trial.toml", "--out", "trial", folder=folder)
+    page = folder / run(dess, "report", "./trial", folder=folder).strip()
+    assert "trial" in page.read_text("utf-8")
+    assert str(ROOT) not in page.read_text("utf-8")
+
+
+def test_the_wheel_runs_without_the_repository(installed: Path, tmp_path: Path) -> None:
+    check_commands(installed, tmp_path)
+
+
+def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
+    with tarfile.open(built("sdist", tmp_path / "sdist")) as archive:
+        archive.extractall(tmp_path, filter="data")
+    [source] = tmp_path.glob("dess-*")
+    ours, theirs = (built("wheel", tmp_path / to, at) for to, at in (("a", ROOT), ("b", source)))
+    assert ours.name == theirs.name
+    with ZipFile(ours) as a, ZipFile(theirs) as b:
+        assert {n: a.read(n) for n in a.namelist()} == {n: b.read(n) for n in b.namelist()}
+
+
+@pytest.mark.slow
+def test_a_plain_wheel_simulates_in_an_empty_environment(tmp_path: Path) -> None:
+    commands = install_wheel(tmp_path)
+    dess = commands / "dess"
+    listed = run(commands / "python", "-c", PACKAGES, folder=tmp_path).split()
+    assert not {"torch", "matplotlib", "jupyterlab", "hatchling"} & set(listed)
+    assert "success" in run(dess, "simulate", "--events", "log.parquet", folder=tmp_path)
+    assert "greedy" in run(dess, "evaluate", "--policy", "greedy", folder=tmp_path)
+    refused = [dess, "simulate", "--policy", "ddqn"]
+    done = subprocess.run(refused, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.endswith("pip install 'dess[learning]'\n")
+
+
+@pytest.mark.slow
+def test_a_wheel_with_everything_runs_in_an_empty_environment(tmp_path: Path) -> None:
+    dess, folder = install_wheel(tmp_path, "[all]") / "dess", tmp_path
+    check_commands(dess, folder)
+    [page] = folder.glob("build/reports/*trial.html")
+    run(dess, "verify", page, folder=folder)
+    asked = ("--set", "uavs=2", "--parameter", "missions=8", "--parameter", "policies=['greedy']")
+    run(dess, "report", "what-if", *asked, folder=folder)
+    assert "ddqn" in run(dess, "policies", folder=folder)
+    assert "success" in run(dess, "simulate", "--policy", "ddqn", folder=folder)
+
+
+PACKAGES = "from importlib.metadata import distributions; print(*(d.name for d in distributions()))"
+
+
+def install_wheel(folder: Path, extras: str = "") -> Path:
+    """Install the wheel with its pinned libraries, as pip does it; the folder of its commands."""
+    wheel = built("wheel", folder / "wheel")
+    return install(folder / "venv", f"{wheel}{extras}", "-c", str(ROOT / "constraints.txt"))
