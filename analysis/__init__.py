@@ -4,7 +4,24 @@ Names are imported on first use, so that ``import analysis`` is fast.
 """
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
+    from analysis.execution.runner import evaluate as evaluate
+    from analysis.execution.runner import run_study as run_study
+    from analysis.results.resimulate import resimulate as resimulate
+    from analysis.results.tables import Results as Results
+    from analysis.results.tables import load_results as load_results
+    from analysis.stats.bootstrap import bootstrap_interval as bootstrap_interval
+    from analysis.stats.distribution import distribution as distribution
+    from analysis.stats.intervals import summary as summary
+    from analysis.stats.learners import compare_learners as compare_learners
+    from analysis.stats.paired import compare as compare
+    from analysis.study.study import Study as Study
+    from analysis.study.study import load_study as load_study
+    from analysis.study.study import study_names as study_names
+    from analysis.sweeps.sweep import sweep as sweep
+    from analysis.sweeps.what_if import what_if as what_if
 
 _HOME = {
     "Study": "study.study",
@@ -31,3 +48,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(f"analysis.{_HOME[name]}"), name)
     raise AttributeError(f"module 'analysis' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

@@ -1,9 +1,12 @@
 """The names of metrics and parameters, as code, figures and pages use them."""
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from dess.errors import form_of, kind_of
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
@@ -81,6 +84,58 @@ DECISIONS = (
 def parameter(field: str) -> Parameter:
     """The parameter that belongs to a field of a scenario; without one, named after the field."""
     return (PARAMETERS | _OTHERS).get(field, Parameter(field, field))
+
+
+class Field(NamedTuple):
+    """A field of a scenario, as the model declares it, and its value in a scenario.
+
+    Attributes:
+        name: The name, as of ``--set``.
+        meaning: What it is, with the symbol of the paper in parentheses.
+        unit: Its unit; empty for counts and for what is no number.
+        allowed: The values that it may have, in words.
+        default: Its value where a scenario does not set it: Section VI-A and Table II.
+        value: Its value in the scenario.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    allowed: str
+    default: Any
+    value: Any
+
+
+def fields(space: ScenarioSpace) -> list[Field]:
+    """Every field of a scenario, in the order of the model."""
+    values, default = space.model_dump(mode="json"), ScenarioSpace.of().model_dump(mode="json")
+    return [
+        Field(name, *_meaning(name), _allowed(space, name), _single(default[name]), _single(value))
+        for name, value in values.items()
+    ]
+
+
+def _meaning(name: str) -> tuple[str, str]:
+    """What a field is, and its unit, from its description ``meaning [unit] (symbol): form``."""
+    description = ScenarioSpace.model_fields[name].description or ""
+    meaning = description.partition(": ")[0]
+    unit = re.search(r" \[([^\],]+)\]", meaning)
+    return (meaning.replace(unit[0], ""), unit[1]) if unit else (meaning, "")
+
+
+def _allowed(space: ScenarioSpace, name: str) -> str:
+    """The allowed values in words, such as ``an integer 1..16 or [low, high]``."""
+    if name not in (*SAMPLED, "pads"):
+        return form_of(ScenarioSpace.model_fields[name])
+    low, high = space.limits(name)
+    kind = kind_of(Scenario.model_fields[name])
+    return f"{kind} {low:g}..{high:g}" + (" or [low, high]" if name in SAMPLED else "")
+
+
+def _single(value: Any) -> Any:
+    """A range of one value as this value."""
+    is_range = isinstance(value, list) and len(value) == 2
+    return value[0] if is_range and value[0] == value[1] else value
 
 
 def metric_name(metric: str) -> str:

@@ -11,7 +11,18 @@ Names are imported on first use, so that ``import dess`` is fast.
 """
 
 from importlib import import_module, metadata
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
+    from dess.batch import simulate_batch as simulate_batch
+    from dess.env.batch import batch_env as batch_env
+    from dess.env.parallel import parallel_env as parallel_env
+    from dess.errors import InputError as InputError
+    from dess.mission import simulate as simulate
+    from dess.scenario import Scenario as Scenario
+    from dess.scenario import ScenarioSpace as ScenarioSpace
+    from dess.scenario import load_scenario as load_scenario
+    from dess.scenario import scenario_names as scenario_names
 
 _HOME = {
     "InputError": "errors",
@@ -34,3 +45,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(f"dess.{_HOME[name]}"), name)
     raise AttributeError(f"module 'dess' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

@@ -43,7 +43,7 @@ def simulate_batch(
     *,
     workers: int = 1,
     batch_size: int = BATCH_SIZE,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> Records:
     """Simulate many missions in lockstep.
 

@@ -83,7 +83,10 @@ def form_of(field: "FieldInfo") -> str:
     kind = kind_of(field)
     if kind == _WORDS[bool]:
         return "true or false"
-    return f"{kind} {_limits(field)}".strip() if kind else field.description or "another value"
+    if kind:
+        return f"{kind} {_limits(field)}".strip()
+    description = field.description or "another value"
+    return description.partition(": ")[2] or description
 
 
 def kind_of(field: "FieldInfo") -> str:

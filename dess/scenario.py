@@ -52,10 +52,13 @@ class _Constants(BaseModel):
     cell_size: Number = Field(800.0, gt=0, description="side of a cell [m] (c)")
     altitude: Number = Field(10.0, gt=0, description="flying altitude [m] (h)")
     nodes: tuple[Cell, ...] = Field(
-        PAPER_NODES, min_length=1, max_length=1024, description="cells [x, y] of the sensor nodes"
+        PAPER_NODES,
+        min_length=1,
+        max_length=1024,
+        description="cells of the sensor nodes: [x, y] for each",
     )
     zone: tuple[int, int, int, int] = Field(
-        (26, 2, 4, 4), description="start and charging zone: [x, y, width, height] in cells (L)"
+        (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
     )
     pads: Integer | None = Field(
         None, ge=1, description="charging pads; without it, as many as the zone has cells"
@@ -79,7 +82,7 @@ class _Constants(BaseModel):
         1,
         ge=0,
         le=1,
-        description="battery spent in a slot without charging [%]: 1, or 0 to fly without battery "
+        description="battery spent in a slot without charging [%]; 0 to fly without battery "
         "decrease (Algorithm 1, phase I)",
     )
 
@@ -104,12 +107,18 @@ class _Constants(BaseModel):
     )
 
     # Reward (Table III)
-    reward_data: Number = Field(1.3, description="per data unit that the team collects (alpha)")
-    reward_overruled: Number = Field(-1.0, description="overruled by the safety controller (beta)")
-    reward_depleted: Number = Field(-300.0, description="battery empty without quota (nu)")
-    reward_charging: Number = Field(0.05, description="per charging slot (c)")
-    reward_quota: Number = Field(100.0, description="quota filled (omega)")
-    reward_step: Number = Field(-0.1, description="per mission slot (zeta)")
+    reward_data: Number = Field(
+        1.3, description="reward per data unit that the team collects (alpha)"
+    )
+    reward_overruled: Number = Field(
+        -1.0, description="reward of an action that the safety controller overrules (beta)"
+    )
+    reward_depleted: Number = Field(
+        -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
+    )
+    reward_charging: Number = Field(0.05, description="reward per charging slot (c)")
+    reward_quota: Number = Field(100.0, description="reward of a UAV that fills its quota (omega)")
+    reward_step: Number = Field(-0.1, description="reward per mission slot (zeta)")
 
     @field_validator("nodes", "zone", mode="before")
     @classmethod
@@ -288,6 +297,7 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
         InputError: If there is no such scenario, or it is not valid.
     """
     where, read = _SCENARIOS.load(name_or_path)
+    read.pop("description", None)
     values = read | overrides
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
         without = _validated(ScenarioSpace, values | {"nodes": [[0, 0]]}, where)
@@ -299,6 +309,15 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
 def scenario_names() -> list[str]:
     """The names of the shipped scenarios."""
     return _SCENARIOS.names()
+
+
+def scenario_description(name_or_path: str | Path) -> str:
+    """What a scenario is about, as its file says under ``description``.
+
+    Raises:
+        InputError: If there is no such scenario.
+    """
+    return str(_SCENARIOS.load(name_or_path)[1].get("description", ""))
 
 
 def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:

@@ -8,7 +8,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
 
@@ -19,6 +19,7 @@ from mkdocs.structure.pages import Page
 from typer.cli import get_docs_for_click
 
 import dess
+from analysis.names import fields
 from reports import cli
 
 ROOT = Path(__file__).parents[1]
@@ -37,20 +38,13 @@ def commands() -> str:
 
 def scenario_fields() -> str:
     """A table of the fields of a scenario: meaning, allowed values, default."""
-    rows = ["| field | meaning | allowed | default |", "| --- | --- | --- | --- |"]
-    for name, field in dess.Scenario.model_fields.items():
+    rows = ["| field | meaning | unit | allowed | default |", "| --- | --- | --- | --- | --- |"]
+    for field in fields(dess.load_scenario("paper")):
         default = str(field.default) if len(str(field.default)) < 40 else "as in the paper"
-        limits = ", ".join(_limits(field.metadata)) or "any"
-        rows.append(f"| `{name}` | {field.description} | {limits} | {default} |")
+        rows.append(
+            f"| `{field.name}` | {field.meaning} | {field.unit} | {field.allowed} | {default} |"
+        )
     return "\n".join(rows)
-
-
-def _limits(metadata: Iterable[object]) -> Iterable[str]:
-    words = {"ge": "at least", "gt": "more than", "le": "at most", "lt": "less than"}
-    for bound in metadata:
-        for key, word in words.items():
-            if hasattr(bound, key):
-                yield f"{word} {getattr(bound, key)}"
 
 
 def names(package: str) -> str:

@@ -8,3 +8,7 @@ actions = policy.act(view)
 from policies.registry import load, load_team, names
 
 __all__ = ["load", "load_team", "names"]
+
+
+def __dir__() -> list[str]:
+    return [*__all__]

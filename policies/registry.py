@@ -1,13 +1,22 @@
-"""Policies by name. Other packages register theirs under the entry point ``dess.policies``.
+"""Policies by name, from the folder of a training, from a Python file, or of another package.
 
-load("greedy"), load("ddqn"), load("runs/my-training"), load_team("greedy,tour")
+load("greedy"), load("ddqn"), load("runs/my-training"), load("my_policies.py:Eager")
+load_team("greedy,tour")
+
+Other packages register theirs under the entry point ``dess.policies``.
 """
 
+import inspect
 import json
 import os
-from importlib import import_module
+import re
+import sys
+from collections.abc import Callable
+from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from dess.code.libraries import needs
 from dess.errors import InputError, one_of
@@ -26,6 +35,13 @@ SHIPPED = {
 # One folder per trained policy, and the file that describes it.
 TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
 
+# A class of a Python file.
+FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
+_OTHERS = (
+    "the folder of a trained policy, a class of a Python file (FILE.py:CLASS), or a policy that an "
+    f"installed package registers under the entry point {GROUP}"
+)
+
 
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
@@ -39,48 +55,102 @@ def trained_names() -> list[str]:
 
 
 def descriptions() -> dict[str, str]:
-    """The descriptions of all policies, in the order of ``names``; no policy is loaded."""
+    """The descriptions of all policies, in the order of ``names``.
+
+    Those of other packages are loaded; if one cannot be loaded, its description says so.
+    """
     known = {name: description for name, (_, description) in SHIPPED.items()}
     known |= {name: _description(TRAINED / name) for name in trained_names()}
-    return {name: known.get(name, "of another package") for name in names()}
+    outside = {name: _outside_description(point) for name, point in _outside().items()}
+    return {name: (outside | known)[name] for name in names()}
 
 
 def load(name: str | Path) -> Policy:
-    """Load a policy by its name, or the trained policy of a folder, named by its config.
+    """Load a policy by its name, from the folder of a trained policy, or from a Python file.
+
+    Args:
+        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``.
+            The folder of such a file is added to ``sys.path``, so the file can import those beside
+            it. A file that was changed is loaded again only by a new process.
 
     Raises:
         InputError: If the policy does not exist or cannot be loaded.
     """
-    folder, name = Path(name), str(name)
+    name = str(name)
     if name in SHIPPED:
-        module, _, attribute = SHIPPED[name][0].partition(":")
-        return getattr(import_module(module), attribute)()
-    shipped = name in trained_names()
-    if shipped:
-        folder = TRAINED / name
-    # An empty name would be the working folder.
-    if name and os.path.exists(folder / CONFIG):
+        return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
+    if folder := folder_of(name):
         needs("learning", f"policy {name}")
         from policies.ddqn.checkpoint import load_policy  # imports torch
 
         policy = load_policy(folder)
-        if shipped:
+        if name in trained_names():
             policy.name = name
         return policy
+    if file := FILE.fullmatch(name):
+        path, kind = Path(file["path"]), file["kind"]
+        if not path.is_file():
+            raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
+        return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
     outside = _outside()
     if name not in outside:
-        raise InputError(
-            f"policy: {name!r} is unknown{one_of(name, names(), 'the folder of a trained policy')}"
-        )
+        raise InputError(f"policy: {name!r} is unknown{one_of(name, names(), _OTHERS)}")
+    return _made(name, outside[name].value, outside[name].load)
+
+
+def folder_of(name: str) -> Path | None:
+    """The folder of a trained policy, if the name is that of one."""
+    folder = TRAINED / name if name in trained_names() else Path(name)
+    # An empty name would be the working folder.
+    return folder if name and os.path.exists(folder / CONFIG) else None
+
+
+def package_of(name: str) -> str:
+    """The package that adds a policy, with its version; empty for all other policies."""
+    point = _outside().get(name)
+    return f"{point.dist.name} {point.dist.version}" if point and point.dist else ""
+
+
+def _made(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) -> Policy:
+    """A policy of a class, which may be anybody's."""
     try:
-        policy = outside[name].load()()
-    except Exception as error:  # code of another package may raise anything; name the package
-        raise InputError(
-            f"policy: {name} of {outside[name].value} cannot be loaded: {error}"
-        ) from error
+        policy = load_class()()
+    except InputError:
+        raise
+    except Exception as error:  # code of others may raise anything; name it
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"policy: {name} of {where} cannot be loaded: {reason}") from error
     if not isinstance(policy, Policy):
-        raise InputError(f"policy: {name} of {outside[name].value} has no name and act(view)")
+        raise InputError(f"policy: {name} of {where} has no name and act(view)")
     return policy
+
+
+def _class_of(module: str, name: str) -> Callable[[], Any]:
+    """A class by the name of its module and its own.
+
+    Raises:
+        InputError: If the module has no such class.
+    """
+    found = vars(import_module(module))
+    if name not in found:
+        classes = [n for n, value in found.items() if hasattr(value, "act")]
+        raise InputError(f"policy: {module}: {name!r} is no class of it{one_of(name, classes)}")
+    return found[name]
+
+
+def _importable(path: Path) -> str:
+    """The name under which a file is imported, once its folder is on ``sys.path``.
+
+    Raises:
+        InputError: If another module has this name.
+    """
+    if (folder := str(path.resolve().parent)) not in sys.path:
+        sys.path.append(folder)
+    invalidate_caches()
+    spec = find_spec(path.stem)
+    if not spec or not spec.origin or Path(spec.origin).resolve() != path.resolve():
+        raise InputError(f"policy: {path}: another module has its name; allowed: another file name")
+    return path.stem
 
 
 def load_team(text: str) -> list[Policy]:
@@ -90,6 +160,16 @@ def load_team(text: str) -> list[Policy]:
         InputError: If one of them is unknown.
     """
     return [load(name.strip()) for name in text.split(",")]
+
+
+def _outside_description(point: EntryPoint) -> str:
+    """What a policy of another package is, or why it cannot be loaded."""
+    origin = f"of the package {package_of(point.name)}"
+    try:
+        words = inspect.getdoc(type(load(point.name))) or ""
+    except InputError as error:
+        return f"{str(error).partition(point.value)[2].strip()} ({origin})"
+    return f"{words.partition(chr(10))[0].rstrip('.')} ({origin})" if words else origin
 
 
 def _outside() -> dict[str, EntryPoint]:

@@ -7,6 +7,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import jupytext
@@ -153,6 +154,27 @@ def test_torch_is_loaded_only_for_the_learner(script: str) -> None:
 
 def test_the_learner_is_seen_to_load_torch() -> None:
     assert loaded_by(f"import {LEARNER}.checkpoint") >= LEARNING
+
+
+@pytest.mark.parametrize("package", ["dess", "analysis"])
+def test_lazy_names_are_typed_for_editors(package: str) -> None:
+    block = next(node for node in SOURCES[package].body if isinstance(node, ast.If))
+    assert ast.unparse(block.test) == "TYPE_CHECKING"
+    typed = {
+        alias.asname: f"{node.module}.{alias.name}"
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    home = import_module(package)._HOME
+    assert typed == {name: f"{package}.{module}.{name}" for name, module in home.items()}
+
+
+@pytest.mark.parametrize("package", ["dess", "policies", "analysis"])
+def test_packages_list_their_public_names(package: str) -> None:
+    module = import_module(package)
+    assert dir(module) == sorted(module.__all__)
+    assert all(getattr(module, name) is not None for name in dir(module))
 
 
 @pytest.mark.parametrize("name", LIBRARY)

@@ -6,22 +6,46 @@ imports the simulator, pandas or torch when it runs.
 
 import sys
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 from typer.exceptions import TyperException
 
+import dess
 from dess import InputError
 from dess.code.libraries import absence
 from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
 
+
+def _print_version(is_wanted: bool) -> None:
+    if is_wanted:
+        print(f"dess {dess.__version__}")
+        raise typer.Exit
+
+
 app = typer.Typer(
     help="Discrete-event simulation of UAV data harvesting with charging at sea.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for group in (simulate, evaluate, train, sweep, report, lists):
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Options of the command itself."""
+
+
+for group in (simulate, evaluate, train, sweep, report):
     app.add_typer(group.app)
+for name in ("policies", "scenarios", "studies"):
+    app.add_typer(getattr(lists, name), name=name)
 app.add_typer(study.app, name="study")
 
 

@@ -24,13 +24,14 @@ def print_list(entries: Iterable[tuple[str, str]]) -> None:
         print(f"{name:12} {description}".rstrip())
 
 
-def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table; its first column is aligned to the left, the others to the right."""
+def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
+    """Print a table; its first columns are aligned to the left, the others to the right."""
     lines = [header, *rows]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    aligns = [str.ljust if number < left else str.rjust for number in range(len(header))]
     aligned = [
-        [cell.rjust(width) if number else cell.ljust(width) for number, (cell, width) in cells]
-        for cells in (enumerate(zip(line, widths, strict=True)) for line in lines)
+        [align(cell, width) for align, cell, width in zip(aligns, line, widths, strict=True)]
+        for line in lines
     ]
     aligned.insert(1, ["─" * width for width in widths])
     print("", *("  ".join(cells).rstrip() for cells in aligned), "", sep="\n")

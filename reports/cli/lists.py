@@ -1,31 +1,118 @@
-"""``dess policies``, ``dess scenarios`` and ``dess studies``: the names that commands accept."""
+"""``dess policies``, ``dess scenarios`` and ``dess studies``: lists, and ``show`` for one name."""
+
+import json
+from typing import Annotated, Any
 
 import typer
 
 from reports.cli import console
+from reports.cli.settings import JsonOption, SetOption, load_space
 
-app = typer.Typer()
+policies = typer.Typer(invoke_without_command=True)
+scenarios = typer.Typer(invoke_without_command=True)
+studies = typer.Typer(invoke_without_command=True)
 
 
-@app.command()
-def policies() -> None:
-    """List the policies."""
+@policies.callback()
+def list_policies(context: typer.Context) -> None:
+    """List the policies, or show one."""
     from policies.registry import descriptions
 
-    console.print_list(descriptions().items())
+    if context.invoked_subcommand is None:
+        console.print_list(descriptions().items())
 
 
-@app.command()
-def scenarios() -> None:
-    """List the shipped scenarios."""
-    from dess import scenario_names
+@policies.command("show")
+def show_policy(
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|DIR|FILE.py:CLASS",
+            help="A policy, by name, folder of a training or file.",
+        ),
+    ],
+    as_json: JsonOption = False,
+) -> None:
+    """Show a policy: its origin, the scenarios that it can simulate, its card."""
+    from policies.about import about
 
-    console.print_list((name, "") for name in scenario_names())
+    found = about(name)
+    if as_json:
+        print(json.dumps(found._asdict(), indent=2))
+        return
+    any_place = "any scenario" if not found.requires else f"only {_settings(found.requires)}"
+    print(f"{found.name}: {found.origin} ({found.code})")
+    print(f"scenarios: {any_place}; of the shipped ones {', '.join(found.scenarios) or 'none'}")
+    if found.trained_on:
+        print(f"trained on: {_settings(found.trained_on)}")
+    print(f"\n{found.card.strip()}")
 
 
-@app.command()
-def studies() -> None:
-    """List the shipped studies."""
+@scenarios.callback()
+def list_scenarios(context: typer.Context) -> None:
+    """List the shipped scenarios, or show one."""
+    from dess.scenario import scenario_description, scenario_names
+
+    if context.invoked_subcommand is None:
+        console.print_list((name, scenario_description(name)) for name in scenario_names())
+
+
+@scenarios.command("show")
+def show_scenario(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
+    ],
+    settings: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Show every field of a scenario: its value, its default, what is allowed, what it is."""
+    from analysis.names import fields
+    from dess.scenario import scenario_description
+
+    space, description = load_space(name, settings), scenario_description(name)
+    if as_json:
+        rows = [field._asdict() for field in fields(space)]
+        print(json.dumps({"scenario": name, "description": description, "fields": rows}, indent=2))
+        return
+    if description:
+        print(description)
+    heads = ["field", "value", "default", "unit", "allowed", "meaning"]
+    rows_ = [
+        [f.name, _value(f.value), _value(f.default), f.unit, f.allowed, f.meaning]
+        for f in fields(space)
+    ]
+    console.print_table(heads, rows_, left=len(heads))
+
+
+@studies.callback()
+def list_studies(context: typer.Context) -> None:
+    """List the shipped studies, or show one."""
     from analysis.study.study import study_descriptions
 
-    console.print_list(study_descriptions().items())
+    if context.invoked_subcommand is None:
+        console.print_list(study_descriptions().items())
+
+
+@studies.command("show")
+def show_study(
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Show a study: every field, as its file would set it."""
+    import tomli_w
+
+    from analysis.study.study import load_study
+
+    data = load_study(name).model_dump(mode="json", exclude_none=True)
+    print(json.dumps(data, indent=2) if as_json else tomli_w.dumps(data).strip())
+
+
+def _settings(values: dict[str, Any]) -> str:
+    return ", ".join(f"{field}={_value(value)}" for field, value in values.items())
+
+
+def _value(value: Any) -> str:
+    """A value as TOML has it; of a long list its length."""
+    if isinstance(value, list) and len(value) > 4:
+        return f"{len(value)} of them"
+    return "" if value is None else json.dumps(value)

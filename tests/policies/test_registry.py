@@ -1,22 +1,28 @@
 """From names to policies, the shipped ones and those of outside packages."""
 
+import pickle
+import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import dess
 import policies
 from dess import InputError
 from dess.mission import simulate
-from dess.scenario import Scenario, load_scenario
+from dess.scenario import Scenario, load_scenario, scenario_names
 from policies import registry
+from policies.about import about
 from policies.base import Policy
 from policies.ddqn.checkpoint import save_policy
 from policies.ddqn.config import config_of
 from policies.ddqn.observations.states import layout_of
 from policies.ddqn.training import build
 from policies.registry import SHIPPED, trained_names
+
+ROOT = Path(__file__).parents[2]
 
 OUTSIDE = """
 import numpy as np
@@ -79,6 +85,8 @@ def test_unknown_names_are_refused(text: str) -> None:
     assert line.startswith("policy: ")
     assert "\n" not in line
     assert all(name in line for name in SHIPPED)
+    assert "FILE.py:CLASS" in line
+    assert "entry point dess.policies" in line
 
 
 def _trained(folder: Path) -> Path:
@@ -118,7 +126,7 @@ def test_a_shipped_trained_policy_loads_by_its_name(
 
 def test_a_folder_without_a_policy_is_unknown(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "none"):
-        with pytest.raises(InputError, match="or the folder of a trained policy$"):
+        with pytest.raises(InputError, match="or the folder of a trained policy, "):
             policies.load(path)
 
 
@@ -141,11 +149,114 @@ def test_outside_packages_add_policies() -> None:
 @pytest.mark.parametrize(
     ("name", "complaint"),
     [
-        ("broken", "cannot be loaded: no weights"),
-        ("absent", "cannot be loaded: .*Absent"),
+        ("broken", "cannot be loaded: RuntimeError: no weights"),
+        ("absent", "cannot be loaded: AttributeError: .*Absent"),
         ("nothing", "has no name and act"),
     ],
 )
 def test_broken_outside_policies_are_named(name: str, complaint: str) -> None:
     with pytest.raises(InputError, match=f"policy: {name} of outside_policies:.*{complaint}"):
         policies.load(name)
+
+
+@pytest.mark.usefixtures("outside")
+def test_the_list_says_which_outside_policies_cannot_be_loaded() -> None:
+    described = registry.descriptions()
+    assert [*described] == policies.names()
+    assert described["still"] == "of the package outside-policies 1"
+    problem = "cannot be loaded: RuntimeError: no weights (of the package outside-policies 1)"
+    assert described["broken"] == problem
+    assert described["nothing"].startswith("has no name and act(view)")
+
+
+FILE = """
+import numpy as np
+import beside_it
+
+class Eager:
+    name = "eager"
+
+    def act(self, view):
+        return np.full(len(view), beside_it.HOVER)
+
+class Nameless:
+    def act(self, view):
+        pass
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A Python file with policies, which imports another file of its folder."""
+    path = tmp_path / "in_a_file.py"
+    path.write_text(FILE)
+    (tmp_path / "beside_it.py").write_text("HOVER = 4")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    for module in ("in_a_file", "beside_it"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    return path
+
+
+def test_a_policy_loads_from_a_file(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(file.parent)
+    team = policies.load_team(f"{file}:Eager,greedy,in_a_file.py:Eager")
+    assert [policy.name for policy in team] == ["eager", "greedy", "eager"]
+    assert type(team[0]) is type(team[2])
+    assert isinstance(pickle.loads(pickle.dumps(team[0])), Policy)
+    assert np.isfinite(simulate(Scenario.of(uavs=3), team, 0).reward)
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("in_a_file.py:Eger", r"'Eger' is no class of it \(did you mean Eager\?\)"),
+        ("in_a_file.py:Nameless", "policy: Nameless of .*in_a_file.py has no name and act"),
+        ("none.py:Eager", "policy: .*none.py: no such file; allowed: FILE.py:CLASS"),
+        ("in_a_file.py", "is unknown; allowed: .*FILE.py:CLASS"),
+        ("json.py:Eager", "another module has its name; allowed: another file name"),
+        ("wrong.py:Eager", "policy: Eager of .*wrong.py cannot be loaded: SyntaxError"),
+    ],
+)
+def test_files_without_such_a_policy_are_named(file: Path, name: str, complaint: str) -> None:
+    (file.parent / "json.py").write_text(FILE)
+    (file.parent / "wrong.py").write_text("class Eager(")
+    with pytest.raises(InputError, match=complaint):
+        policies.load(file.parent / name)
+
+
+def test_an_edited_file_has_another_fingerprint(file: Path) -> None:
+    script = f"from analysis.results.provenance import team_of; t = team_of('{file}:Eager')"
+    script += "; m = t.members[0]; print(m.name, m.class_, m.code)"
+
+    def identity() -> str:
+        command = [sys.executable, "-c", script]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+        return done.stdout
+
+    first = identity()
+    assert first.startswith("eager in_a_file:Eager ")
+    assert identity() == first
+    file.write_text(FILE.replace("len(view)", "len(view) + 0"))
+    edited = identity()
+    assert edited != first
+    (file.parent / "beside_it.py").write_text("HOVER = 3")
+    assert identity() not in (first, edited)
+
+
+def test_what_a_policy_is_and_can_simulate(file: Path) -> None:
+    ddqn = about("ddqn")
+    assert ddqn.scenarios == ["fig4", "paper"]
+    assert ddqn.requires["grid"] == 32
+    assert ddqn.trained_on["uavs"] == [1, 3]
+    assert ddqn.card.startswith("# ddqn")
+    greedy = about("greedy")
+    assert greedy.scenarios == scenario_names()
+    assert (greedy.requires, greedy.trained_on) == ({}, {})
+    assert greedy.code == "policies.heuristics:Greedy"
+    assert greedy.origin == f"shipped with dess {dess.__version__}"
+    assert about(f"{file}:Eager").origin == f"the file {file}"
+
+
+@pytest.mark.usefixtures("outside")
+def test_the_package_of_a_policy_is_named() -> None:
+    assert about("still").origin == "the package outside-policies 1"

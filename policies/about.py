@@ -1,0 +1,75 @@
+"""What there is to know about a policy: where it comes from, what it can simulate, its card."""
+
+import inspect
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import dess
+from dess.scenario import SAMPLED, load_scenario, scenario_names
+from policies.base import Policy
+from policies.registry import CONFIG, FILE, SHIPPED, folder_of, load, package_of, trained_names
+
+CARD = "README.md"  # beside the weights of a trained policy
+
+
+class About(NamedTuple):
+    """A policy in words.
+
+    Attributes:
+        name: As commands take it.
+        origin: Where it comes from: dess, a package, a folder or a file.
+        code: Its module and class.
+        requires: The fields of a scenario that must have these values; empty if any will do.
+        scenarios: The shipped scenarios that it can simulate.
+        trained_on: The ranges of the sampled parameters in its training; empty if it has none.
+        card: Its model card in Markdown, or what its class says.
+    """
+
+    name: str
+    origin: str
+    code: str
+    requires: dict[str, Any]
+    scenarios: list[str]
+    trained_on: dict[str, Any]
+    card: str
+
+
+def about(name: str) -> About:
+    """What there is to know about a policy.
+
+    Raises:
+        InputError: If it does not exist or cannot be loaded.
+    """
+    policy, folder = load(name), folder_of(name)
+    config = json.loads((folder / CONFIG).read_text("utf-8")) if folder else {}
+    card = folder / CARD if folder else Path(CARD)
+    requires = config.get("layout", {})
+    scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
+    trained_on = config.get("training", {}).get("scenario")
+    return About(
+        name=name,
+        origin=_origin(name),
+        code=f"{type(policy).__module__}:{type(policy).__qualname__}",
+        requires=requires,
+        scenarios=[n for n, fields in scenarios.items() if requires.items() <= fields.items()],
+        trained_on={field: scenarios[trained_on][field] for field in SAMPLED}
+        if trained_on in scenarios
+        else {},
+        card=card.read_text("utf-8") if folder and card.exists() else _docstring(policy),
+    )
+
+
+def _origin(name: str) -> str:
+    """Where a policy comes from, in words."""
+    if name in (*SHIPPED, *trained_names()):
+        return f"shipped with dess {dess.__version__}"
+    if folder := folder_of(name):
+        return f"the folder {folder}"
+    if file := FILE.fullmatch(name):
+        return f"the file {file['path']}"
+    return f"the package {package_of(name)}"
+
+
+def _docstring(policy: Policy) -> str:
+    return inspect.getdoc(type(policy)) or ""
