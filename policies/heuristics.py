@@ -1,4 +1,4 @@
-"""Heuristic policies under the return guard: random, nearest, greedy and tour.
+"""Heuristic policies: random, nearest, greedy and tour under the return guard, random without it.
 
 Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
 (``_step``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
@@ -23,7 +23,7 @@ from policies.guard import (
     slots_needed,
 )
 
-_RANDOM, _NEAREST, _GREEDY, _TOUR = range(4)
+_RANDOM, _NEAREST, _GREEDY, _TOUR, _UNGUARDED = range(5)
 
 # A node is worth a visit if it has at least this share of the mean initial data. Without such a
 # threshold, UAVs would fly to and fro for single new data units.
@@ -64,6 +64,13 @@ class Random(_Heuristic):
     _kind = _RANDOM
 
 
+class RandomUnguarded(_Heuristic):
+    """Choose as ``random`` does, but without the return guard: it shows what the guard is worth."""
+
+    name = "random-unguarded"
+    _kind = _UNGUARDED
+
+
 class Nearest(_Heuristic):
     """Fly to the nearest node that is worth a visit."""
 
@@ -97,12 +104,12 @@ def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_u
         b, i = rows_mission[row], rows_uav[row]
         mission, team, data = missions[b], uavs[b], residual[b]
         u = team[i]
-        charge = must_charge(mission, u, data.sum())
+        charge = kind != _UNGUARDED and must_charge(mission, u, data.sum())
         home_x, home_y = u.x, u.y
         if charge:
             home_x, home_y, _ = parking_cell(mission, team, i, taken)
         safe_moves(mission, team, i, charge, home_x, home_y, safe)
-        if kind == _RANDOM:
+        if kind in (_RANDOM, _UNGUARDED):
             actions[row] = _random_action(mission, team, i, safe)
             continue
         node = _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y)

@@ -27,6 +27,10 @@ GROUP = "dess.policies"
 # Name -> (module and class, description).
 SHIPPED = {
     "random": ("policies.heuristics:Random", "a random safe move, clear of teammates"),
+    "random-unguarded": (
+        "policies.heuristics:RandomUnguarded",
+        "the same without the return guard: it shows what the guard is worth",
+    ),
     "nearest": ("policies.heuristics:Nearest", "the nearest node with enough data"),
     "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),

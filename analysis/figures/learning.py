@@ -45,7 +45,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
         for number, (variant, label) in enumerate(labels.items()):
             of_variant = averages[averages["variant"] == variant]
             _trainings(of_variant, colours[variant], ax)
-            _mean(of_variant, colours[variant], style.LINES[number], label, ax)
+            _mean(of_variant, colours[variant], style.LINES[number], label, metric in EVALUATED, ax)
         low, high = averages["value"].min(), averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         ax.set(title=NAMES[metric], ylim=(low - room, high + room))
@@ -161,9 +161,11 @@ def _trainings(averages: pd.DataFrame, colour: str, ax: Axes) -> None:
         ax.plot(curve["updates"], curve["value"], color=colour, linewidth=0.7, alpha=0.55)
 
 
-def _mean(averages: pd.DataFrame, colour: str, line: str, label: str, ax: Axes) -> None:
+def _mean(
+    averages: pd.DataFrame, colour: str, line: str, label: str, share: bool, ax: Axes
+) -> None:
     """The mean of the trainings with its band; its last phase in full."""
-    rows = bands(averages)
+    rows = bands(averages, share=share)
     last = rows["phase"].iloc[-1]
     for phase, part in rows.groupby("phase", sort=False):
         n = part["n"].iloc[-1]

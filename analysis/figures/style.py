@@ -28,7 +28,10 @@ INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
 SEA, ZONE, ZONE_EDGE = "#f3f8fb", "#ffe08a", "#d9a400"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
 # Policies that look the same in all figures, whichever others are drawn.
-KNOWN_POLICIES = ("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper")
+KNOWN_POLICIES = (
+    *("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"),
+    "random-unguarded",
+)
 LINES = ("-", "--", ":", "-.")
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
 

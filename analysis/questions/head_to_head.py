@@ -176,7 +176,9 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
     """Comparisons as a table to print: marked differences and p-values, a row per policy.
 
     Args:
-        comparisons: A row per policy and metric, as of ``stats.paired.compare``.
+        comparisons: A row per policy and metric, as of ``stats.paired.compare``, or per learner
+            and metric, as of ``stats.learners.compare_learners``: these have the prediction
+            interval of one new training as well.
         name: The column that tells the rows apart.
     """
     lines: list[dict[tuple[str, str], str]] = []
@@ -186,9 +188,19 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
             side = position_by_test(row.difference, row.p_adjusted)
             points = numbers.points(row.difference, row.low, row.high)
             line[METRICS[row.metric], "points"] = f"{points} {MARKS[side]}"
+            if "new_low" in rows:
+                line[METRICS[row.metric], "one new training"] = new_training(row)
             line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
         lines.append(line)
     return numbers.headed(lines)
+
+
+def new_training(comparison: Any) -> str:
+    """The prediction interval of a row of ``compare_learners`` [points]; a single one has none."""
+    if comparison.trainings == 1:
+        return "unknown"
+    ends = comparison.difference, comparison.new_low, comparison.new_high
+    return numbers.points(*ends).partition(" ")[2]
 
 
 def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:

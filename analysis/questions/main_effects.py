@@ -11,6 +11,7 @@ the same replications, so they are compared mission by mission:
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,12 +21,15 @@ from analysis.names import PRODUCT, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
-from analysis.stats.intervals import LEVEL
+from analysis.stats.intervals import LEVEL, Interval
 from analysis.stats.paired import paired
 from dess import InputError
 
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"
+
+
+ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``changes`` by parameter and policy
 
 
 @dataclass(frozen=True)
@@ -105,8 +109,8 @@ def changes(
     return pairs.assign(p_adjusted=adjust(pairs["p"].to_numpy(float), "holm"))
 
 
-def changes_by_field(results: Results, table: pd.DataFrame) -> dict[str, dict[str, pd.DataFrame]]:
-    """The changes of collection ratio and communication, by parameter and policy.
+def changes_by_field(results: Results, table: pd.DataFrame, metric: str = PRODUCT) -> ByField:
+    """The changes of a metric, by parameter and policy.
 
     Args:
         results: The study.
@@ -115,7 +119,7 @@ def changes_by_field(results: Results, table: pd.DataFrame) -> dict[str, dict[st
     policies = table["policy"].unique()
     fields = table.groupby("field", sort=False)["position"].nunique()
     return {
-        str(field): {p: changes(results, table, p, str(field), PRODUCT) for p in policies}
+        str(field): {p: changes(results, table, p, str(field), metric) for p in policies}
         for field in fields.index[fields > 1]
     }
 
@@ -135,6 +139,37 @@ def shape(pairs: pd.DataFrame) -> Shape:
     else:
         words = PEAK if peaks else VALLEY if valleys else IRREGULAR
     return Shape(words, peaks)
+
+
+class Lower(NamedTuple):
+    """A value that another one is significantly better than: which, and by how much.
+
+    Attributes:
+        other: The better value in words, of several the one with the largest lead.
+        lead: Its lead, with its interval.
+    """
+
+    other: str
+    lead: Interval
+
+
+def significantly_lower(pairs: pd.DataFrame, values: Mapping[int, str], value: str) -> Lower | None:
+    """Whether another value of a parameter is significantly better than a value.
+
+    Args:
+        pairs: As of ``changes``.
+        values: The values in words, by their positions.
+        value: The value in words; one that the study lacks is lower than none.
+    """
+    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
+    leads = []
+    for row in pairs.itertuples():
+        first, second = values[row.first], values[row.second]
+        if first == value and (row.first, row.second) in ups:
+            leads.append(Lower(second, Interval(row.difference, row.low, row.high)))
+        if second == value and (row.first, row.second) in downs:
+            leads.append(Lower(first, Interval(-row.difference, -row.high, -row.low)))
+    return max(leads, key=lambda lower: lower.lead.mean, default=None)
 
 
 def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
@@ -164,12 +199,16 @@ def leading_policies(
     return [policy for policy in (learned or best[0], heuristic or best[1]) if policy]
 
 
-def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]]) -> pd.DataFrame:
+def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
     """How collection ratio and communication goes along every parameter, as a table to print.
+
+    Beside the change of the product from the first to the last value stands that of the collection
+    ratio alone, which no failed mission moves: a few failures can make most of a small change.
 
     Args:
         table: The ``effects``.
         changes: ``changes_by_field``.
+        ratios: The same of the collection ratio.
     """
     rows = table[table["metric"] == PRODUCT]
     rows = rows.set_index(["policy", "field", "position"]).sort_index()
@@ -178,7 +217,12 @@ def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]
         for policy, pairs in pairs_of_field.items():
             values = rows.loc[(policy, field)]
             first, last = values.iloc[0], values.iloc[-1]
-            change = pairs.set_index(["first", "second"]).loc[0, len(values) - 1]
+            change, of_ratio = (
+                of.set_index(["first", "second"]).loc[
+                    0, len(values) - 1, ["difference", "low", "high"]
+                ]
+                for of in (pairs, ratios[field][policy])
+            )
             along = shape(pairs)
             peaks = values.loc[[*along.peaks], "value"] if along.words == PEAK else []
             lines.append(
@@ -188,7 +232,8 @@ def listed(table: pd.DataFrame, changes: Mapping[str, Mapping[str, pd.DataFrame]
                     "Along the values": along.words,
                     "First": f"{numbers.percent(first['mean'])} at {first['value']}",
                     "Last": f"{numbers.percent(last['mean'])} at {last['value']}",
-                    "Last − first": numbers.points(*change[["difference", "low", "high"]]),
+                    "Last − first": numbers.points(*change),
+                    "Of the ratio alone": numbers.points(*of_ratio),
                     "Highest at": " or ".join(peaks),
                     "Largest difference": f"{100 * pairs['difference'].abs().max():.1f}",
                 }

@@ -47,8 +47,20 @@ class LoggedMission:
     @property
     def collected(self) -> str:
         """What it collected, as a part of a sentence."""
-        total = self.row["initial"] + self.row["arrived"]
-        return f"{self.row['collected']:.0f} of {total:.0f} data units collected"
+        collected, total, _ = self.data_units
+        return f"{collected} of {total} data units collected"
+
+    @property
+    def data_units(self) -> tuple[str, str, str]:
+        """What was collected, all data and what is left [data units], as text with one decimal.
+
+        The first and the last add up to the second as they are printed. So what is left is all data
+        less what is collected, after both are rounded.
+        """
+        total = round(float(self.row["initial"] + self.row["arrived"]), 1)
+        collected = round(float(self.row["collected"]), 1)
+        left = max(total - collected, 0.0)
+        return f"{collected:.1f}", f"{total:.1f}", f"{left:.1f}"
 
     @property
     def depletions(self) -> str:
@@ -188,7 +200,8 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
         "Mission slots": row["slots"],
         "Charging sessions": (log["event"] == "charge_start").sum(),
         "Nodes never served": f"{len(left) - served} of {len(left)}",
-        "Data left": f"{row['residual']:.1f}",
+        "Data collected": f"{mission.data_units[0]} of {mission.data_units[1]}",
+        "Data left": mission.data_units[2],
         "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
     }
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES
+from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
 from analysis.questions import costs
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.chunks import parts_of
@@ -57,6 +57,28 @@ def fleet_table(fleets: pd.DataFrame) -> pd.DataFrame:
     table = numbers.wide(rows, ["policy", "uavs", "n"]).reset_index()
     table["n"] = table["n"].map("{:,}".format)
     return table.rename(columns={"policy": "Policy", "uavs": "UAVs", "n": "Missions", **METRICS})
+
+
+def guard_in_words(means: pd.DataFrame) -> str:
+    """Why even a random policy succeeds: the return guard, and what success is without it.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+    """
+    of_success = means[means["metric"] == SUCCESS].set_index("policy")
+    shares = {policy: numbers.estimate(row) for policy, row in of_success.iterrows()}
+    text = (
+        "Every policy of this project except `random-unguarded` acts under the return guard, which "
+        "allows only actions after which a UAV can still reach the charging zone in time."
+    )
+    if "random" in shares:
+        text += f" So even `random` has a success of {shares['random']}."
+    if "random-unguarded" in shares:
+        text += (
+            " `random-unguarded` makes random moves as well, but without the guard: its success is "
+            f"{shares['random-unguarded']}."
+        )
+    return text
 
 
 def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:

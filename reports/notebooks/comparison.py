@@ -66,14 +66,19 @@ display(
 )
 
 # %% [markdown]
-# Of several trainings, the claim is about the learner, trainings to come included. Of a single one,
-# it is about this checkpoint: another training of the same learner may turn out better or worse.
+# Of a learner with several trainings, the interval of the points is a confidence interval of the
+# expected difference: of the mean over all trainings that the learner might have. A single training
+# may lie outside of it. *One new training* is the 95 % prediction interval of the difference that
+# one more training of this learner would have. Of a learner with a single training, the claim is
+# about this checkpoint, and nothing is known of another training.
 # The rest of this page is about one policy: of several trainings the first, whatever came of it.
 
 # %% [markdown]
 # ### Mission by mission
 #
-# A mission that fails counts 0, so a single failure weighs as much as many small leads. In the
+# A mission that fails counts 0, so a single failure weighs as much as many small leads. Failures are
+# rare because all policies here act under the return guard, which allows only actions after which a
+# UAV can still reach the charging zone in time. In the
 # figure, the 95 % band holds the whole curve. Where the curve crosses 0 is the share of missions
 # that are lost. Up to 0.5 % of the missions lie beyond each end of the axis.
 

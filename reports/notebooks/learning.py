@@ -125,7 +125,8 @@ html.figure(
 # %%
 html.table(
     ablation.ablation_table(table, last, baseline),
-    "Means over n trainings with 95 % intervals; none of one training, or where all are the same. "
+    "Means over n trainings with 95 % confidence intervals of the expected result, then the 95 % "
+    "prediction interval of one new training; none of one training, or where all are the same. "
     f"Differences: Welch's t; of a single training, Student's t with the spread of {baseline}, so "
     f"the interval holds 0 if one more training of {baseline} might have come out like that. "
     "▲ the whole interval is above 0: better; ▼ below it: worse; ≈ around it: inconclusive",

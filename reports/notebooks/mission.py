@@ -83,8 +83,9 @@ html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 # %%
 mean = missions.estimate(fig4, shown_policy)
 html.say(
-    "The policy is **{policy}**: its collection ratio and communication is {mean} over {n:,} "
-    "missions, the best of the study is {best}. Each column is a single mission, replication "
+    "The policy is **{policy}**: the mean of its collection ratio and communication over the three "
+    "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all); the best "
+    "of the study is {best}. Each column is a single mission, replication "
     "{replication} of seed {seed}: an example, not an average. All three have the same "
     "realisation: initial data, arrivals and shadowing are equal, only the number of UAVs differs.",
     policy=shown_policy, mean=numbers.estimate(mean), n=mean["n"],
@@ -107,6 +108,10 @@ def captioned(point: int) -> tuple[Figure, str, str]:
 
 
 html.gallery([captioned(point) for point in points])
+
+# %% [markdown]
+# A UAV seldom runs out of energy on its way, because all policies here act under the return guard: it
+# allows only actions after which a UAV can still reach the charging zone in time.
 
 # %% [markdown]
 # ## Slot by slot

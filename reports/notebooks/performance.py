@@ -24,7 +24,7 @@ from analysis import load_results, numbers, summary
 from analysis.figures import policies as figures
 from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import printed
-from analysis.questions.summary import best_policy, by_fleet, fleet_table
+from analysis.questions.summary import best_policy, by_fleet, fleet_table, guard_in_words
 from analysis.replication import paper
 from reports.pages import html
 
@@ -63,6 +63,9 @@ html.table(
     "Means with 95 % intervals, and the difference to the paper in percentage points. "
     "▲ the whole interval is above the paper's figure, ▼ below it, ≈ around it: inconclusive.",
 )
+
+# %%
+html.say(guard_in_words(overall))
 
 # %%
 best = best_policy(table4.missions)

@@ -125,7 +125,7 @@ def statuses(playback: Playback) -> list[str]:
     for data, (charging, waiting) in zip(left, playback.rows("charging", "waiting"), strict=True):
         queue = f", {sum(waiting)} waiting" if any(waiting) else ""
         pads = f"{sum(charging)} of {counted(playback.pads, 'pad')} in use{queue}"
-        texts.append(f"{data:.0f} data units left · {pads}")
+        texts.append(f"{data:.1f} data units left · {pads}")
     return texts
 
 

@@ -31,6 +31,17 @@ def _checked(policy: Any) -> Checked:
     return Checked(policy, allowed)
 
 
+def test_random_without_the_guard_is_legal_and_fails_nearly_all_missions() -> None:
+    """Both choose among the same moves, unless the guard forbids one."""
+    paper, unguarded = load_scenario("paper"), policies.load("random-unguarded")
+    simulate(paper, Checked(unguarded, lambda view: view.legal), 21, 0)
+    shares = [
+        simulate_batch(paper, policies.load(name), 32, 300).missions["success"].mean()
+        for name in ("random", "random-unguarded")
+    ]
+    assert shares[0] >= 0.97 and shares[1] <= 0.05
+
+
 @given(spaces(), heuristics, seeds, replications)
 def test_heuristics_are_legal_safe_and_without_memory(
     space: ScenarioSpace, policy: Any, seed: int, replication: int

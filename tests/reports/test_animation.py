@@ -54,7 +54,7 @@ def test_every_slot_is_shown(mission: tuple[pd.DataFrame, Scenario]) -> None:
         areas, data = _part(film, "nodes").get_sizes(), residual.iloc[slot].clip(lower=0)
         assert np.allclose(areas / areas.max(), data / data.max())
         text = _part(film, "status").get_text()
-        assert text.startswith(f"slot {slot} of {film.end} · {data.sum():.0f} data units left · ")
+        assert text.startswith(f"slot {slot} of {film.end} · {data.sum():.1f} data units left · ")
     assert seen == {"charging", "waiting"}
 
 

@@ -38,26 +38,41 @@ def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVE
         level: Confidence level.
 
     Returns:
-        A row per variant, the highest mean first: ``variant``, ``n`` trainings, ``mean``, ``low``,
-        ``high`` (nan with one training), ``difference``, ``difference_low``, ``difference_high``,
-        ``p`` and ``p_adjusted`` (Holm), of ``difference``; nan for the baseline.
+        A row per variant, the highest mean first: ``variant``, ``n`` trainings; ``mean``, ``low``,
+        ``high`` of the expected result; ``new_low`` and ``new_high`` of one new training (nan with
+        one training; the ends for metrics from 0 to 1 are cut there); ``difference``,
+        ``difference_low``, ``difference_high``, ``p`` and ``p_adjusted`` (Holm), of ``difference``;
+        nan for the baseline.
     """
     values = {v: part[metric].to_numpy() for v, part in last.groupby("variant", sort=False)}
     rows = []
     for variant, sample in values.items():
         mean = mean_interval(sample, level)
+        half = np.sqrt(len(sample) + 1) * (mean.high - mean.mean)
+        new = Interval(mean.mean, mean.mean - half, mean.mean + half)
+        if metric.removeprefix("final_") in METRICS:
+            mean, new = within(mean), within(new)
         if len(sample) == 1:
-            mean = Interval(mean.mean, np.nan, np.nan)
+            mean = new = Interval(mean.mean, np.nan, np.nan)
         gap, p = _UNKNOWN, np.nan
         if variant != baseline:
             gap, p = difference(sample, values[baseline], level)
-        rows.append((variant, len(sample), *mean, *gap, p))
-    columns = ["variant", "n", "mean", "low", "high"]
+        rows.append((variant, len(sample), *mean, *new[1:], *gap, p))
+    columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
     table = pd.DataFrame(rows, columns=columns)
     known = table["p"].notna()
     table.loc[known, "p_adjusted"] = adjust(table.loc[known, "p"].to_numpy(), "holm")
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
+
+
+def within(interval: Interval) -> Interval:
+    """An interval of Student's t of results from 0 to 1, cut there.
+
+    The results of trainings are means of many missions each, so they spread far less than missions
+    do, and Student's t is fit for them where values of missions have ``bounded_interval``.
+    """
+    return Interval(interval.mean, max(interval.low, 0.0), min(interval.high, 1.0))
 
 
 def difference(
@@ -97,6 +112,7 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
         "Variant": table["variant"],
         "n": table["n"],
         METRICS[PRODUCT]: [_mean(row) for row in table.itertuples()],
+        "One new training": [_new(row) for row in table.itertuples()],
         f"To {baseline} [points]": [_gap(row) for row in table.itertuples()],
         "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
         METRICS[SUCCESS]: others[:, 0],
@@ -109,6 +125,12 @@ def _mean(row: Any) -> str:
     if row.low < row.high:
         return numbers.interval(row.mean, row.low, row.high)
     return numbers.percent(row.mean)
+
+
+def _new(row: Any) -> str:
+    if row.new_low < row.new_high:
+        return numbers.interval(row.mean, row.new_low, row.new_high).partition(" % ")[2]
+    return ""
 
 
 def _gap(row: Any) -> str:

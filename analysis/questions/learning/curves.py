@@ -1,7 +1,8 @@
 """Learning curves: smoothed, with bands over trainings, with and without transfer learning.
 
-A training is the unit: trainings of one variant differ in their seed alone, and intervals hold for
-trainings to come. One training says nothing of the spread.
+A training is the unit: trainings of one variant differ in their seed alone. Intervals are about the
+expected curve, the mean over all trainings that the variant might have; a single new training may
+lie outside. One training says nothing of the spread.
 
 Curves are tables with a row per evaluation while training: ``variant``, ``seed`` (of the training),
 ``updates`` (the training step), ``phase`` (of the paper's Algorithm 1; the last is the mission
@@ -18,7 +19,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.questions.learning.ablation import difference
+from analysis.questions.learning.ablation import difference, within
 from analysis.stats.intervals import Interval, mean_interval
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
@@ -83,12 +84,13 @@ def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
     return curves[[*keys, "updates"]].assign(value=averages)
 
 
-def bands(averages: pd.DataFrame, level: float = BAND) -> pd.DataFrame:
+def bands(averages: pd.DataFrame, level: float = BAND, share: bool = False) -> pd.DataFrame:
     """Means with intervals over the trainings of a variant, at every training step.
 
     Args:
         averages: Rows of ``smoothed``.
         level: Confidence level.
+        share: Whether the values lie between 0 and 1: the intervals are then cut there.
 
     Returns:
         A row per variant, phase and step: ``variant``, ``phase``, ``updates``, ``mean``, ``low``,
@@ -97,7 +99,8 @@ def bands(averages: pd.DataFrame, level: float = BAND) -> pd.DataFrame:
     keys = ["variant", "phase", "updates"]
     rows = []
     for key, part in averages.groupby(keys, sort=False):
-        mean, *ends = mean_interval(part["value"].to_numpy(), level)
+        interval = mean_interval(part["value"].to_numpy(), level)
+        mean, *ends = within(interval) if share else interval
         if len(part) < FEWEST:
             ends = [np.nan, np.nan]
         rows.append((*key, mean, *ends, len(part)))

@@ -6,8 +6,9 @@ from pathlib import Path
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, PRODUCT, SHORT_METRICS, SUCCESS
+from analysis.names import COST, PRODUCT, RATIO, SHORT_METRICS, SUCCESS
 from analysis.questions import costs, summary
+from analysis.questions.head_to_head import new_training
 from analysis.questions.summary import settings
 from analysis.replication import paper
 from analysis.results.tables import Results
@@ -143,13 +144,15 @@ def _print_precisions(points: list[str], table: pd.DataFrame) -> None:
 
 def _print_sensitivities(table: pd.DataFrame) -> None:
     """A table per policy, a row per parameter: its effect alone, and with all interactions."""
-    for policy, indices in table[table["metric"] == PRODUCT].groupby("policy", sort=False):
+    for policy, indices in table[table["metric"] == RATIO].groupby("policy", sort=False):
         rows = []
         for row in indices.itertuples():
             alone = numbers.interval(row.first, row.first_low, row.first_high)
             total = numbers.interval(row.total, row.total_low, row.total_high)
             rows.append([row.parameter, alone, total])
-        console.print_table([f"{policy}: share of the product's variance", "alone", "total"], rows)
+        console.print_table(
+            [f"{policy}: share of the collection ratio's variance", "alone", "total"], rows
+        )
 
 
 def _print_comparisons(table: pd.DataFrame) -> None:
@@ -162,6 +165,7 @@ def _print_comparisons(table: pd.DataFrame) -> None:
 def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
     cells, product = differences(table, "learner")
+    cells["one new training"] = product.apply(new_training, axis=1)
     cells = cells.assign(about=product["about"], trainings=product["trainings"])
     print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 

@@ -156,6 +156,16 @@ def test_a_comparison_is_a_row_with_a_pair_of_columns_per_metric():
     assert head_to_head.by_metric(pd.DataFrame()).empty
 
 
+def test_a_learner_has_the_prediction_interval_of_one_new_training():
+    row = comparison((PRODUCT, 0.02, 0.001)).rename(columns={"policy": "learner"})
+    row = row.assign(new_low=-0.03, new_high=0.07, trainings=3)
+    table = head_to_head.by_metric(row, "learner")
+    assert table[METRICS[PRODUCT], "points"].tolist() == ["+2.0 [+1.0, +3.0] ▲"]
+    assert table[METRICS[PRODUCT], "one new training"].tolist() == ["[−3.0, +7.0]"]
+    alone = head_to_head.by_metric(row.assign(trainings=1), "learner")
+    assert alone[METRICS[PRODUCT], "one new training"].tolist() == ["unknown"]
+
+
 def test_missions_are_won_tied_lost_and_failed():
     missions = missions_of(lambda t: 0, n=10).assign(
         difference=[1, 1, 1, 1, 1, 0, 0, 0, -1, -1],

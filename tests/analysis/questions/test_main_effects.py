@@ -130,13 +130,15 @@ def test_the_table_has_a_row_per_parameter_and_policy():
     policies = {"mine": [0.1, 0.2, 0.1], "other": [0.1, 0.3, 0.4]}
     effects = pd.concat(effects_of(means, policy=policy) for policy, means in policies.items())
     changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
-    table = main_effects.listed(effects, changes).set_index("Policy")
+    ratios = {"uavs": {"mine": pairs_of([0.2, 0.1]), "other": pairs_of([0.1, 0.1])}}
+    table = main_effects.listed(effects, changes, ratios).set_index("Policy")
     assert table.loc["other"].tolist() == [
         "Number of UAVs",
         RISES,
         "10.0 % at 1",
         "40.0 % at 3",
         "+30.0 [+29.9, +30.1]",
+        "+20.0 [+19.9, +20.1]",
         "",
         "30.0",
     ]
@@ -147,7 +149,8 @@ def test_the_table_has_a_row_per_parameter_and_policy():
 @pytest.mark.parametrize(("steps", "top"), [((0.2, -0.1), "2"), ((0.2, 0, -0.1), "2 or 3")])
 def test_the_table_says_where_a_peak_may_be(steps, top):
     means = np.cumsum([0.1, *steps])
-    table = main_effects.listed(effects_of(means), {"uavs": {"mine": pairs_of([*steps])}})
+    changes = {"uavs": {"mine": pairs_of([*steps])}}
+    table = main_effects.listed(effects_of(means), changes, changes)
     assert table.loc[0, ["Along the values", "Highest at"]].tolist() == [PEAK, top]
 
 

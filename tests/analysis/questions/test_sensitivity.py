@@ -7,6 +7,7 @@ from scipy.stats import norm
 
 from analysis.questions.sensitivity import (
     METRICS,
+    failures_in_words,
     index_table,
     sensitivity,
 )
@@ -203,3 +204,8 @@ def test_metrics_without_variance_have_no_row():
     both = pd.concat([table, known])
     assert index_table(both)["Metric"].tolist() == ["Collection ratio"] * 2
     assert index_table(both)["Parameter"].tolist() == ["Number of UAVs", "noise"]
+
+
+def test_what_shares_of_success_rest_on_is_said():
+    missions = pd.DataFrame({"policy": ["a", "a", "b"], "success": [1, 1, 0]})
+    assert failures_in_words(missions) == "the failed missions: 0 of a and 1 of b"

@@ -151,3 +151,12 @@ def test_the_selected_point_and_its_check(tmp_path):
     rewards = results.checks.query("policy == 'greedy'")["reward"]
     assert checks.loc[("greedy", "reward"), "mean"] == pytest.approx(np.mean(rewards))
     assert summary.comparisons(results).empty  # each policy has missions of its own
+
+
+def test_the_guard_is_named_with_what_success_is_without_it():
+    ends = {"mean": [0.998, 0.0], "low": [0.993, 0.0], "high": [0.999, 0.004]}
+    means = pd.DataFrame({"policy": ["random", "random-unguarded"], "metric": "success", **ends})
+    text = summary.guard_in_words(means)
+    assert "even `random` has a success of 99.8 % [99.3, 99.9]." in text
+    assert text.endswith("without the guard: its success is 0.0 % [0.0, 0.4].")
+    assert summary.guard_in_words(means.iloc[:0]).endswith("in time.")

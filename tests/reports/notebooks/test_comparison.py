@@ -106,7 +106,7 @@ def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: 
     for row in drawn.loc[drawn["replication"].isin(worst), columns].itertuples():
         assert f"{row.policy} in mission {row.replication}, a single one (n = 1): " in shown
         total = row.initial + row.arrived
-        assert f"{row.collected:.0f} of {total:.0f} data units collected in {row.slots} " in shown
+        assert f"{row.collected:.1f} of {total:.1f} data units collected in {row.slots} " in shown
 
 
 def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:

@@ -33,7 +33,7 @@ def test_missions_and_their_means(results: Path, text: str) -> None:
         assert f"is {mean:.1f} % [{low:.1f}, {high:.1f}], the paper's {printed}." in text
         (mission,) = at_point[at_point["replication"] == 0].itertuples()
         total = mission.initial + mission.arrived
-        assert f"{mission.slots} slots; {mission.collected:.0f} of {total:.0f} data units" in text
+        assert f"{mission.slots} slots; {mission.collected:.1f} of {total:.1f} data units" in text
         assert f"I = {point + 1}: {100 * mission.collection_ratio:.1f} % collected" in text
 
 

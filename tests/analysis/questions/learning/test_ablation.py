@@ -73,8 +73,18 @@ def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
     rows = ablation_table(table, last, "base").fillna("").set_index("Variant")
     assert rows.index.tolist() == ["once", "base", "worse"]  # by their means
     # by hand: 0.02 t(0.975, 2) / sqrt(3) = 0.0497
-    assert rows.loc["base"].tolist() == [3, "72.0 % [67.0, 77.0]", "", "", "100.0 %", "82.0 %"]
+    # and 0.02 t(0.975, 2) sqrt(1 + 1/3) = 0.0994 of one new training
+    base = [3, "72.0 % [67.0, 77.0]", "[62.1, 81.9]", "", "", "100.0 %", "82.0 %"]
+    assert rows.loc["base"].tolist() == base
+    assert rows.loc["once", "One new training"] == ""
     assert rows.loc["once", "Collection ratio and communication"] == "73.0 %"
     assert rows.loc["worse", "To base [points]"].startswith("−61.0 [")
     assert [cell[-1:] for cell in rows["To base [points]"]] == ["≈", "", "▼"]
     assert rows.loc["worse", "p (Holm)"] == "< 0.001"
+
+
+def test_intervals_of_shares_end_where_these_do(last: pd.DataFrame) -> None:
+    far = last.assign(final_success=last["seed"].map({0: 1.0, 1: 0.9, 2: 0.2}))
+    table = ablation(far, "final_success", "base").set_index("variant").loc["base"]
+    assert (table["low"], table["high"]) == (0.0, 1.0)
+    assert (table["new_low"], table["new_high"]) == (0.0, 1.0)
