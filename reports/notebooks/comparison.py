@@ -76,11 +76,12 @@ display(
 # %% [markdown]
 # ### Mission by mission
 #
-# A mission that fails counts 0, so a single failure weighs as much as many small leads. Failures are
-# rare because all policies here act under the return guard, which allows only actions after which a
-# UAV can still reach the charging zone in time. In the
-# figure, the 95 % band holds the whole curve. Where the curve crosses 0 is the share of missions
-# that are lost. Up to 0.5 % of the missions lie beyond each end of the axis.
+# A mission that fails counts 0, so a single failure weighs as much as many small leads. Failures
+# are rare because all policies here act under the return guard, which allows only actions after
+# which a UAV can still reach the charging zone in time.
+#
+# In the figure, the 95 % band holds the whole curve. Where the curve crosses 0 is the share of
+# missions that are lost. Up to 0.5 % of the missions lie beyond each end of the axis.
 
 # %%
 html.table(head_to_head.outcomes(missions, pair), "Outcomes, with 95 % intervals of their shares")

@@ -110,8 +110,8 @@ def captioned(point: int) -> tuple[Figure, str, str]:
 html.gallery([captioned(point) for point in points])
 
 # %% [markdown]
-# A UAV seldom runs out of energy on its way, because all policies here act under the return guard: it
-# allows only actions after which a UAV can still reach the charging zone in time.
+# A UAV seldom runs out of energy on its way, because all policies here act under the return guard:
+# it allows only actions after which a UAV can still reach the charging zone in time.
 
 # %% [markdown]
 # ## Slot by slot
