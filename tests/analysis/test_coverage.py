@@ -7,6 +7,7 @@ quantile's depend on a binomial count only, so their coverage is summed, not dra
 """
 
 from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -190,6 +191,28 @@ def test_bounded_intervals_cover_where_student_does_not_and_are_shorter_than_by_
         assert length <= 1.1 * of_student
     by_betting, _ = lengths_and_coverage(betting, drawing, n, max(20, 20_000 // n))
     assert length <= 0.9 * by_betting
+
+
+def table_of_the_docs() -> str:
+    """Coverage and mean length [points] of the intervals for some products: a table in Markdown."""
+    lines = [
+        "| missions | n | Student's t | one 0 and one 1 added | betting |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    cases = [("no failures", 300), ("one failure in 100", 100), ("one failure in 100", 1000)]
+    for name, n in [*cases, ("one failure in 20", 300), ("failures but one in 200", 100)]:
+        cells = []
+        for intervals in (student, bounded, betting):
+            length, coverage = lengths_and_coverage(intervals, PRODUCTS[name], n, 1000)
+            cells.append(f"{100 * coverage:.1f} %, {100 * length:.1f}")
+        lines.append(f"| {name} | {n} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+@pytest.mark.slow
+def test_the_table_of_the_docs_is_measured():
+    page = Path(__file__).parents[2] / "docs" / "concepts" / "confidence-intervals.md"
+    assert table_of_the_docs() in page.read_text("utf-8")
 
 
 def test_student_misses_where_failures_are_rare():
