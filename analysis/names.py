@@ -20,6 +20,9 @@ METRICS = {
 # Shorter names for the terminal.
 SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "product"}
 
+# Short names of metrics on the command line.
+ALIASES = {"ratio": RATIO, "product": PRODUCT}
+
 # All metrics of a mission: shares of missions, and means over missions.
 SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)

@@ -19,6 +19,7 @@ import numpy as np
 
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.workers import Cluster, Here, Pool
+from analysis.results import commands
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
 from analysis.results.manifest import Cell, Selected
 from analysis.results.reuse import sources
@@ -240,7 +241,8 @@ class _Run:
         """The failure of a job, with a command that reproduces it: a mission, or the study."""
         command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if mission := problem.mission:
-            command = self.store.manifest.command(mission.cell, mission.replications[0])
+            which = mission.cell, mission.replications[0]
+            command = commands.of_folder(self.store.folder, self.store.manifest, *which)
         policy = self.study.policies[job.chunk.team]
         return Failure(policy, job.missions, problem.error, command, problem.traceback)
 

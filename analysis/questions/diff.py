@@ -131,7 +131,8 @@ def most_changed(found: Diff, missions: int) -> pd.DataFrame:
     rows = found.changed[:missions]
     for side, results in (("a", found.a), ("b", found.b)):
         which = rows[[f"policy_{side}", f"point_{side}", "replication"]]
-        commands = [results.command(*mission) for mission in which.itertuples(index=False)]
+        asked, folder = which.itertuples(index=False), results.store.folder
+        commands = [results.command(p, point, n, folder) for p, point, n in asked]
         rows = rows.assign(**{f"command_{side}": commands})
     return rows
 

@@ -247,6 +247,15 @@ def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
     return int((uavs["end"] == "battery").sum())
 
 
+def commands(results: Results, policy: str, replications: Iterable[int]) -> list[str]:
+    """The commands that simulate missions again, from the usual results folder, and draw them."""
+    folder = results.usual_folder
+    return [
+        f"{results.command(policy, 0, number, folder)} --figure mission-{number}.png"
+        for number in replications
+    ]
+
+
 def listed(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
     """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies."""
     return numbers.headed(

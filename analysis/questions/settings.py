@@ -45,10 +45,9 @@ def points(results: Results) -> pd.DataFrame:
         of the scenario. What is no number is text: a range is ``5–7.5``.
     """
     manifest = results.store.manifest
-    fields = dict.fromkeys(field for point in manifest.points for field in point.values)
     columns = {}
-    for field in fields:
-        values = [{**manifest.scenario, **point.values}[field] for point in manifest.points]
+    for field in manifest.values[0]:
+        values = [of_point[field] for of_point in manifest.values]
         if field == "pads":  # without a number, it depends on the zone
             values = [results.scenario(number).charging_pads for number in range(len(values))]
         texts = _hashable(field, values)

@@ -9,6 +9,7 @@ Every function takes results, or the missions in them.
 
 import json
 from collections.abc import Iterable
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -111,7 +112,11 @@ def settings(results: Results) -> list[str]:
 
 
 def worst(
-    results: Results, policy: str, missions: int = 5, point: int | None = None
+    results: Results,
+    policy: str,
+    missions: int = 5,
+    point: int | None = None,
+    folder: str | Path | None = None,
 ) -> pd.DataFrame:
     """The missions of a policy with the lowest collection ratio and communication.
 
@@ -120,6 +125,7 @@ def worst(
         policy: The policy.
         missions: How many.
         point: The design point; all, if not given.
+        folder: The results folder that the commands name; ``results/NAME`` by default.
 
     Returns:
         A row per mission, the worst first, of those alike first the one with the lower collection
@@ -132,7 +138,8 @@ def worst(
     ordered = policy_missions.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)
     table = ordered.loc[: missions - 1, ["policy", "point", "replication", *SHARES, *MEANS]]
     keys = zip(table["point"], table["replication"], strict=True)
-    return table.assign(command=[results.command(policy, *key) for key in keys])
+    folder = folder or results.usual_folder
+    return table.assign(command=[results.command(policy, *key, folder) for key in keys])
 
 
 def comparisons(results: Results) -> pd.DataFrame:

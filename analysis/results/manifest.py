@@ -1,7 +1,6 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
-import shlex
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path, PurePath
@@ -27,7 +26,7 @@ from analysis.study.design import Design, DesignPoint
 from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
 from dess import InputError
-from dess.scenario import ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import ScenarioSpace, load_scenario
 
 SCHEMA_VERSION = 3
 
@@ -127,26 +126,6 @@ class Origin(Document):
         if others := [n for n in versions if n in known and known[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
-
-    def simulate_command(self, policy: str, values: dict[str, Any], replication: int) -> str:
-        """The command that simulates a mission again.
-
-        If the scenario is not a shipped one, its file may not be at hand. The command then sets
-        every field that differs from the paper's scenario.
-
-        Args:
-            policy: The team.
-            values: The values of the mission's design point.
-            replication: The replication of the mission.
-        """
-        name, changes = self.study["scenario"], self.study["set"] | values
-        if name not in scenario_names():
-            name, paper = "paper", load_scenario("paper").model_dump(mode="json")
-            fields = self.space(values).model_dump(mode="json")
-            changes = {key: value for key, value in fields.items() if value != paper[key]}
-        settings = [word for k, v in changes.items() for word in ("--set", f"{k}={json.dumps(v)}")]
-        which = ["--policy", policy, "--seed", str(self.seed), "--replication", str(replication)]
-        return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
 
 
 class Manifest(Origin):
@@ -279,11 +258,6 @@ class Manifest(Origin):
             if holds:
                 raise InputError(f"{path}: {complaint}; {_ALLOWED}")
 
-    def command(self, cell: Cell, replication: int) -> str:
-        """The command that simulates a mission of a cell again."""
-        policy, values = self.policies[cell.team].policy, self.points[cell.point].values
-        return self.simulate_command(policy, values, replication)
-
     @property
     def key(self) -> str:
         """A hash of all that the records depend on, and of their number."""
@@ -307,12 +281,20 @@ class Manifest(Origin):
     def settings(self) -> list[Setting]:
         """The design points of a study with prices, for the search for the cheapest setting."""
         assert self.costs is not None
-        fields = dict.fromkeys(field for point in self.points for field in point.values)
-        rows = [{**self.scenario, **point.values} for point in self.points]
         return [
-            Setting.of({field: row[field] for field in fields}, space, self.costs)
-            for row, space in zip(rows, self.scenarios, strict=True)
+            Setting.of(values, space, self.costs)
+            for values, space in zip(self.values, self.scenarios, strict=True)
         ]
+
+    @cached_property
+    def values(self) -> list[dict[str, Any]]:
+        """The values of every design point, of all fields that the design sets.
+
+        A field that a design point does not set has the value of the scenario.
+        """
+        fields = dict.fromkeys(field for point in self.points for field in point.values)
+        rows = ({**self.scenario, **point.values} for point in self.points)
+        return [{field: row[field] for field in fields} for row in rows]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.results import commands
 from analysis.results.chunks import check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
@@ -71,9 +72,27 @@ class Results:
             )
         return log.to_pandas()
 
-    def command(self, policy: str, point: int, replication: int) -> str:
-        """The command that simulates a mission of the study again."""
-        return self.store.manifest.command(self.cell(policy, point), replication)
+    @property
+    def usual_folder(self) -> str:
+        """The folder that ``dess study run`` keeps the study in; pages name no other one."""
+        return f"results/{self.manifest['study']['name']}"
+
+    def command(
+        self, policy: str, point: int, replication: int, folder: str | Path | None = None
+    ) -> str:
+        """The command that simulates a mission of the study again.
+
+        Args:
+            policy: The team.
+            point: The number of its design point.
+            replication: Of the mission.
+            folder: The results folder that the command reads the scenario from. Without it, the
+                command is longer and sets the fields of the scenario itself.
+        """
+        cell, manifest = self.cell(policy, point), self.store.manifest
+        if folder is None:
+            return commands.of_fields(manifest, policy, manifest.points[point].values, replication)
+        return commands.of_folder(folder, manifest, cell, replication)
 
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected as the best for a policy, with its guarantee."""

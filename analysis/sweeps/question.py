@@ -22,7 +22,7 @@ import dess
 from analysis.execution.dry_run import check_effort, check_policies
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
-from analysis.names import METRICS, PRODUCT, RATIO
+from analysis.names import ALIASES, METRICS
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
@@ -38,7 +38,6 @@ from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 
 FOLDER = "sweeps"
 LONGEST = 60  # characters of the fields in a name
-ALIASES = {"ratio": RATIO, "product": PRODUCT}  # short names of metrics that may be required
 
 # Missions that the search of the cheapest setting may take: per setting on average, and of all;
 # and those of every setting that it begins with.

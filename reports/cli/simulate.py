@@ -1,11 +1,12 @@
 """``dess simulate``: one mission, its event log, its picture and its animation."""
 
 import json
+import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from dess.record import MissionRecord
-    from dess.scenario import Scenario
+    from dess.scenario import Scenario, ScenarioSpace
 
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
@@ -33,21 +34,41 @@ METRICS = (
     "residual",
 )
 
+T = TypeVar("T")
 app = typer.Typer()
 
 
 @app.command()
 def simulate(
+    context: typer.Context,
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
     policy: Annotated[
-        str,
-        typer.Option(metavar="P[,P...]", help="A policy, or several that the UAVs follow in turn."),
-    ] = "greedy",
+        str | None,
+        typer.Option(
+            metavar="P[,P...]",
+            help="A policy, or several that the UAVs follow in turn.  [default: greedy, or that "
+            "of the study]",
+        ),
+    ] = None,
     seed: SeedOption = 0,
     replication: Annotated[
-        int, typer.Option(help="Number of the replication, which selects the random draws.")
-    ] = 0,
+        int | None,
+        typer.Option(
+            help="Number of the replication, which selects the random draws.  [default: 0, or "
+            "the first of the design point]"
+        ),
+    ] = None,
+    of: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Simulate a mission of this results folder again, with its scenario and seed.",
+        ),
+    ] = None,
+    point: Annotated[
+        int | None, typer.Option(help="With --of: number of the design point, from 0.")
+    ] = None,
     events: Annotated[
         Path | None,
         typer.Option(
@@ -73,8 +94,16 @@ def simulate(
     from dess.state import check_seed, sample_scenario
     from policies import load_team
 
-    space, team = load_space(scenario, settings), load_team(policy)
-    check_seed(seed, replication)
+    if of:
+        _refuse_given(context, "scenario", "settings", "seed")
+        asked = _of_study(of, point, policy, replication)
+    elif point is not None:
+        raise InputError("--point: belongs to a study; allowed: with --of DIR")
+    else:
+        space = load_space(scenario, settings)
+        asked = _Asked(space, policy or "greedy", seed, replication or 0, scenario)
+    team = load_team(asked.policy)
+    check_seed(asked.seed, asked.replication)
     _check_suffix("--figure", figure, FIGURES, "picture")
     _check_suffix("--animation", animation, ANIMATIONS, "animation")
     if animation and animation.suffix == ".mp4":
@@ -82,20 +111,86 @@ def simulate(
 
         check_ffmpeg()
     writers = {events: _write_log, figure: _draw, animation: _animate}
-    title = f"{policy}, scenario {Path(scenario).stem}, replication {replication} of seed {seed}"
     with ExitStack() as files:
         written = {path: files.enter_context(replacing(path)) for path in writers if path}
         with console.compile_notice():
-            record = simulate(space, team, seed, replication, events=bool(written))
-        mission = _Mission(record, sample_scenario(space, seed, replication), title)
+            which = asked.seed, asked.replication
+            record = simulate(asked.space, team, *which, events=bool(written))
+        mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
         for path, temporary in written.items():
             writers[path](mission, temporary, path.suffix[1:])
     if as_json:
-        names = {"policy": policy, "scenario": scenario, "seed": seed, "replication": replication}
         metrics = {key: getattr(record, key) for key in METRICS}
-        print(json.dumps(names | metrics | {"uavs": record.uav_rows()}, indent=2))
+        print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()}, indent=2))
     else:
         _print_mission(record)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What is to be simulated; ``point`` is None where it is no mission of a study."""
+
+    space: "ScenarioSpace"
+    policy: str
+    seed: int
+    replication: int
+    scenario: str
+    study: str = ""
+    point: int | None = None
+
+    @property
+    def title(self) -> str:
+        where = f"scenario {Path(self.scenario).stem}"
+        if self.point is not None:
+            where = f"study {self.study}, point {self.point}"
+        return f"{self.policy}, {where}, replication {self.replication} of seed {self.seed}"
+
+    @property
+    def names(self) -> dict[str, Any]:
+        shown = ["policy", "scenario", "seed", "replication"]
+        shown += ["study", "point"] if self.point is not None else []
+        return {name: getattr(self, name) for name in shown}
+
+
+def _of_study(
+    folder: Path, point: int | None, policy: str | None, replication: int | None
+) -> _Asked:
+    """What a results folder says of a mission; a line on stderr if it may be another one now."""
+    from analysis.results.manifest import Manifest
+    from analysis.results.store import MANIFEST
+
+    manifest = Manifest.read(folder / MANIFEST)
+    policies = [team.policy for team in manifest.policies]
+    policy = _chosen("policy", policy, policies, ", ".join(policies))
+    points = range(len(manifest.points))
+    point = _chosen("point", point, points, f"0..{len(points) - 1}")
+    if changes := manifest.changes_here:
+        line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
+        print(line, file=sys.stderr)
+    if replication is None:
+        replication = manifest.points[point].replication
+    names = manifest.study["scenario"], manifest.study["name"]
+    return _Asked(manifest.scenarios[point], policy, manifest.seed, replication, *names, point)
+
+
+def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:
+    """What is given of the study, or the only one that it has."""
+    if given is None and len(there) == 1:
+        return there[0]
+    if given is None:
+        raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
+    if given not in there:
+        raise InputError(f"--{option}: {given!r} is not in the study; allowed: {allowed}")
+    return given
+
+
+def _refuse_given(context: typer.Context, *names: str) -> None:
+    """Refuse options that a study answers."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source and source.name != "DEFAULT":
+            option = "set" if name == "settings" else name
+            raise InputError(f"--{option}: comes from the study; allowed: --of without --{option}")
 
 
 def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:

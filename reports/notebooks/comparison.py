@@ -157,8 +157,9 @@ html.table(regions.listed(leaves, policy), f"{policy} is {regions.tally(leaves)}
 #
 # Those with the lowest product, of equal ones those with less collected; and of all others those
 # in which the policy is furthest behind. Points are the difference in the product. The commands
-# simulate a mission again and draw it; another `--policy` acts in the same mission. The first two
-# are drawn below, by both policies, if their records are still the same when simulated again.
+# simulate a mission of the results folder again and draw it; another `--policy` of the study acts
+# in the same mission. The first two are drawn below, by both policies, if their records are still
+# the same when simulated again.
 
 # %%
 worst = head_to_head.worst(missions, 5)
@@ -171,8 +172,7 @@ display(
 )
 
 # %%
-shown = [*worst["replication"], *lost["replication"]]
-lines = [f"{study.command(policy, 0, n)} --figure mission-{n}.png" for n in shown]
+lines = head_to_head.commands(study, policy, [*worst["replication"], *lost["replication"]])
 maps = figures.maps(kept_missions(study, head_to_head.drawn(missions, pair), results))
 display(html.say("{commands}", commands=html.commands(lines)), *map(html.gallery, maps))
 

@@ -190,7 +190,7 @@ worst = summary.worst(study, summary.best_policy(study.missions))
 # %%
 display(
     tables.worst(study, worst),
-    html.say("To simulate them again:\n\n{lines}", lines=html.commands(worst["command"])),
+    html.say("{commands}", commands=words.commands(study, worst)),
 )
 
 # %% [markdown]

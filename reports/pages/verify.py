@@ -14,6 +14,7 @@ from pathlib import Path
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
+from analysis.results import commands
 from analysis.results.evidence import Evidence, chosen, learned_files
 from analysis.results.resimulate import difference
 from analysis.results.store import MANIFEST, Store
@@ -135,7 +136,7 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
         policy, values, replication = mission.policy, mission.values, mission.replication
         record = simulate(evidence.space(values), load_team(policy), evidence.seed, replication)
         if changed := difference(record, mission.record):
-            command = evidence.simulate_command(policy, values, replication)
+            command = commands.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
     return Check(evidence.study["name"], len(numbers), lines, evidence.changes_here)
 
@@ -151,7 +152,7 @@ def _check_logs(store: Store, missions: int, seed: int) -> Check:
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
         if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
-            command = manifest.command(cell, replication)
+            command = commands.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(numbers), lines)
 

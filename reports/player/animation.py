@@ -60,8 +60,8 @@ def check_ffmpeg() -> None:
     """
     if not FFMpegWriter.isAvailable():
         raise InputError(
-            "animation: .mp4 needs the program ffmpeg, which is not installed; allowed: install it, "
-            "or write .gif or .html, which need no other program"
+            "animation: .mp4 needs the program ffmpeg, which is not installed; allowed: install "
+            "it, or write .gif or .html, which need no other program"
         )
 
 

@@ -44,7 +44,7 @@ def show(
         "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
         "selected": summary.selections(results),
         "checks": summary.checks(results),
-        "worst": summary.worst(results, policy, worst),
+        "worst": summary.worst(results, policy, worst, folder=folder),
     }
     if as_json:
         rows = {name: json.loads(t.to_json(orient="records")) for name, t in tables.items()}

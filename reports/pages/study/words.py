@@ -10,6 +10,7 @@ from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
 from dess import InputError
+from reports.pages import html
 
 MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
 _MOST_VALUES = 12  # the largest number of values of a field in a list
@@ -95,6 +96,19 @@ def guarantees(results: Results) -> str:
     """What is guaranteed about the selections, as a list."""
     rows = summary.selections(results).itertuples()
     return "\n".join(f"- {row.policy}: {row.guarantee}" for row in rows)
+
+
+def commands(results: Results, missions: pd.DataFrame) -> str:
+    """The commands that simulate missions again, and the folder that they name.
+
+    Args:
+        results: The study.
+        missions: Rows of ``summary.worst``.
+    """
+    return (
+        f"These commands simulate them again. `{results.usual_folder}` stands for the results "
+        f"folder of the study, wherever it is:\n\n{html.commands(missions['command'])}"
+    )
 
 
 def _design(results: Results) -> Iterator[str]:

@@ -1,5 +1,7 @@
 """``dess simulate``: its JSON, the event log, the figure."""
 
+import shlex
+
 import pyarrow.parquet as pq
 import pytest
 
@@ -44,6 +46,65 @@ def test_a_mission_of_a_study_can_be_simulated_alone(dess, dess_json, tmp_path):
     alone = dess_json("simulate", "--scenario", "small.toml", *team)
     shared = SIMULATE_KEYS[2:-1]
     assert {key: alone[key] for key in shared} == {key: row[key] for key in shared}
+
+
+def test_a_mission_of_a_results_folder_is_simulated_again(dess, dess_json, tmp_path):
+    """With the scenario of its design point, the policy and the seed of the study."""
+    text = (tmp_path / "trial.toml").read_text()
+    (tmp_path / "grid.toml").write_text(
+        f"{text}\n[design]\nkind = 'grid'\nvalues.quota = [20, 60]\n"
+    )
+    assert dess("study", "run", "grid.toml", "--out", "out")[0] == 0
+    (tmp_path / "small.toml").unlink()  # the folder has it
+    results = load_results(tmp_path / "out")
+    rows = results.missions.query("policy == 'random' and point == 1 and replication == 6")
+    command = shlex.split(results.command("random", 1, 6, "out"))
+    assert command == shlex.split(
+        "dess simulate --of out --point 1 --policy random --replication 6"
+    )
+    mission = dess_json(*command[1:])
+    assert list(mission) == [*SIMULATE_KEYS[:4], "study", "point", *SIMULATE_KEYS[4:]]
+    assert (mission["scenario"], mission["study"], mission["point"]) == ("small.toml", "grid", 1)
+    shared = SIMULATE_KEYS[2:-1]
+    assert {key: mission[key] for key in shared} == rows.iloc[0][shared].to_dict()
+    assert dess_json(*command[1:-2])["replication"] == 0
+
+
+def test_the_only_policy_of_a_study_needs_no_name(dess, dess_json):
+    assert dess("study", "run", "trial.toml", "--policy", "tour", "--out", "out")[0] == 0
+    assert dess_json("simulate", "--of", "out")["policy"] == "tour"
+
+
+def test_other_code_than_that_of_the_results_is_noted(dess, tmp_path):
+    assert dess("study", "run", "trial.toml", "--policy", "tour", "--out", "out")[0] == 0
+    path = tmp_path / "out" / "manifest.json"
+    path.write_text(path.read_text().replace('"numpy": "', '"numpy": "0.'))
+    code, _, err = dess("simulate", "--of", "out")
+    assert code == 0
+    assert err.startswith("note: out: made with other versions of numpy: the mission may be")
+
+
+# Arguments beside --of, and what the line on stderr must name.
+BAD_OF = {
+    "": "--policy: the study has 2; allowed: one of greedy, random",
+    "--policy tour": "--policy: 'tour' is not in the study; allowed: greedy, random",
+    "--policy random --point 1": "--point: 1 is not in the study; allowed: 0..0",
+    "--policy random --point -1": "--point: -1 is not in the study; allowed: 0..0",
+    "--seed 7": "--seed: comes from the study; allowed: --of without --seed",
+    "--set uavs=2": "--set: comes from the study; allowed: --of without --set",
+    "--scenario paper": "--scenario: comes from the study; allowed: --of without --scenario",
+}
+
+
+def test_a_mission_that_the_study_has_not_gets_one_line(dess, tmp_path):
+    assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
+    before = files_of(tmp_path)
+    for arguments, words in BAD_OF.items():
+        asked = ("simulate", "--of", "out", "--events", "log.parquet", *arguments.split())
+        code, out, err = dess(*asked)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
+    assert files_of(tmp_path) == before
 
 
 def test_set_takes_toml_values(dess_json):

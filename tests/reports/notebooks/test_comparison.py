@@ -84,7 +84,8 @@ def test_the_worst_missions_can_be_simulated_again(text: str, results: Path) -> 
     study = load_results(results / NAME)
     missions = head_to_head.duels(study, head_to_head.pair_of(study))
     for number in head_to_head.worst(missions, 5)["replication"]:
-        assert f"{study.command('ddqn', 0, number)} --figure mission-{number}.png" in text
+        command = study.command("ddqn", 0, number, "results/comparison")
+        assert f"{command} --figure mission-{number}.png" in text
 
 
 def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: Path) -> None:

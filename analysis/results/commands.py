@@ -1,0 +1,50 @@
+"""Commands that simulate a mission of a study again.
+
+of_folder("results/fleets", manifest, cell, replication=17)
+# dess simulate --of results/fleets --point 2 --policy greedy --replication 17
+"""
+
+import json
+import shlex
+from pathlib import Path
+from typing import Any
+
+from analysis.results.manifest import Cell, Manifest, Origin
+from dess.scenario import load_scenario, scenario_names
+
+
+def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:
+    """The command that reads all but the replication from a results folder.
+
+    Args:
+        folder: The results folder.
+        manifest: What the folder is about.
+        cell: The team and the design point of the mission.
+        replication: Of the mission.
+    """
+    point = ["--point", str(cell.point)] if len(manifest.points) > 1 else []
+    policy = manifest.policies[cell.team].policy
+    which = [*point, "--policy", policy, "--replication", str(replication)]
+    return shlex.join(["dess", "simulate", "--of", str(folder), *which])
+
+
+def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: int) -> str:
+    """The command that needs no results folder, and sets the fields of the scenario itself.
+
+    Where the scenario is not a shipped one, its file may be anywhere: the command sets all fields
+    that differ from the paper's scenario.
+
+    Args:
+        origin: What the results were made with.
+        policy: The team.
+        values: Of the mission's design point.
+        replication: Of the mission.
+    """
+    name, changes = origin.study["scenario"], origin.study["set"] | values
+    if name not in scenario_names():
+        name, paper = "paper", load_scenario("paper").model_dump(mode="json")
+        fields = origin.space(values).model_dump(mode="json")
+        changes = {key: value for key, value in fields.items() if value != paper[key]}
+    settings = [word for k, v in changes.items() for word in ("--set", f"{k}={json.dumps(v)}")]
+    which = ["--policy", policy, "--seed", str(origin.seed), "--replication", str(replication)]
+    return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
