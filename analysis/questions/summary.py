@@ -8,7 +8,7 @@ Every function takes results, or the missions in them.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -25,9 +25,12 @@ from analysis.stats.distribution import distribution
 from analysis.stats.intervals import groups, summary
 from analysis.stats.learners import compare_learners
 from analysis.stats.paired import compare
+from analysis.stats.screening import may_be_best
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import Saltelli
 from analysis.study.stopping import Precision
+
+BEST, TIED, WORSE, ONLY = "best", "tied", "worse", "only"  # verdicts on a policy at a design point
 
 
 def means(results: Results) -> pd.DataFrame:
@@ -37,6 +40,51 @@ def means(results: Results) -> pd.DataFrame:
         A row per policy, design point and metric, as ``analysis.summary`` has it.
     """
     return summary(results.missions, by=["policy", "point"])
+
+
+def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
+    """The rows of ``means`` of the settings that meet all targets.
+
+    A setting is a policy at a design point. It meets a target if the whole interval of the mean
+    does, so that chance alone seldom lets a setting pass that does not meet it.
+
+    Args:
+        means: Rows of ``means``.
+        targets: Metric -> the least mean.
+    """
+    for metric, least in targets.items():
+        passed = means[(means["metric"] == metric) & (means["low"] >= least)]
+        means = means.merge(passed[["policy", "point"]])
+    return means
+
+
+def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``means`` with a column ``verdict``: how the policy compares with the others there.
+
+    Compared are the policies of the table at the same design point, by each metric, on the
+    replications that they have in common, by ``stats.screening.may_be_best``: at every design point
+    by itself, the truly best policy is ``BEST`` or ``TIED`` with a probability of 95 %.
+
+    Args:
+        results: The study.
+        means: Rows of ``means``.
+
+    Returns:
+        The rows, with ``BEST`` if the policy is significantly better than the others, ``TIED`` if
+        it is one of several that may be the best, ``WORSE`` if another one is significantly better,
+        ``ONLY`` if there is no other one.
+    """
+    verdicts = pd.Series(ONLY, index=means.index)
+    for metric, rows in means.groupby("metric", sort=False):
+        wide = results.missions.pivot(
+            index=["point", "replication"], columns="policy", values=metric
+        )
+        for point, here in rows.groupby("point"):
+            if len(here) > 1:
+                values = wide.loc[point, here["policy"]].to_numpy(float)
+                may_be = may_be_best(values, metric in SHARES)
+                verdicts[here.index] = np.where(may_be, TIED if may_be.sum() > 1 else BEST, WORSE)
+    return means.assign(verdict=verdicts)
 
 
 def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:

@@ -110,8 +110,46 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         print(f"{len(points)} design points are too many to list; --json has them")
         return
     for metric in metrics:
-        cells = numbers.wide(means[means["metric"] == metric], "point", "policy")
+        rows = means[means["metric"] == metric]
+        cells = numbers.wide(rows, "point", "policy")
+        if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
+            cells["best"] = _best(rows)
         print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
+        if "best" in cells:
+            print(
+                " best: significantly better than the others on common replications (95 %, at "
+                "each design point by itself); ≈: these may all be the best"
+            )
+
+
+def _best(rows: pd.DataFrame) -> pd.Series:
+    """The policy that is the best at each design point, or those that may be, the first first."""
+    may_be = rows[rows["verdict"] != summary.WORSE].sort_values("mean", ascending=False)
+    return may_be.groupby("point")["policy"].agg(" ≈ ".join)
+
+
+def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, float]) -> None:
+    """Print the settings that meet targets.
+
+    Args:
+        results: The study.
+        means: Rows of ``summary.with_verdicts`` of these settings.
+        targets: Metric -> the least mean.
+    """
+    points, policies = settings(results), len(results.policies)
+    asked = [f"{SHORT_METRICS[metric]} of {least:g} or more" for metric, least in targets.items()]
+    product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
+    count = f"{len(product):,} of {len(points) * policies:,}"
+    meet = "meets" if len(product) == 1 else "meet"
+    print(f"{count} settings {meet} {numbers.words(asked)}, by the lower end of the interval")
+    if product.empty:
+        return
+    cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], ["policy", "point"])
+    cells = cells.rename(columns=SHORT_METRICS).assign(**{"of these policies": product["verdict"]})
+    names = [f"{policy} {points[point]}".rstrip() for policy, point in cells.index]
+    print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
+    if len(cells) > MANY_POINTS:
+        print(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
 
 
 def _print_distributions(table: pd.DataFrame) -> None:

@@ -3,6 +3,7 @@
 import json
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -34,6 +35,42 @@ def test_means_are_of_a_policy_at_a_point(results):
     ends = ["mean", "low", "high"]
     assert tuple(table.loc[("random", 2, "reward"), ends]) == mean_interval(cell["reward"])
     assert len(table) == 2 * 4 * 4
+
+
+def stub(**policies):
+    """Results of one design point: the products of every policy in the same replications."""
+    tables = [
+        pd.DataFrame(
+            {"policy": name, "point": 0, "replication": range(len(values)), PRODUCT: values}
+        )
+        for name, values in policies.items()
+    ]
+    results = SimpleNamespace(missions=pd.concat(tables, ignore_index=True))
+    rows = [(name, 0, PRODUCT, np.mean(values), 0.0) for name, values in policies.items()]
+    return results, pd.DataFrame(rows, columns=["policy", "point", "metric", "mean", "low"])
+
+
+def test_policies_are_compared_on_common_replications():
+    """A small lead in every replication is significant, however far these spread."""
+    spread = np.linspace(0.0, 0.8, 30)
+    jitter = np.tile([0.009, 0.011], 15)
+    results, means = stub(a=spread + jitter, b=spread, c=spread[::-1] - 0.3)
+    verdicts = summary.with_verdicts(results, means)["verdict"].tolist()
+    assert verdicts == [summary.BEST, summary.WORSE, summary.WORSE]
+    results, means = stub(a=spread, b=spread[::-1])
+    assert summary.with_verdicts(results, means)["verdict"].tolist() == [summary.TIED] * 2
+    assert summary.with_verdicts(results, means[1:])["verdict"].tolist() == [summary.ONLY]
+
+
+def test_targets_are_met_by_the_lower_end():
+    rows = [("a", 0, 0.9), ("a", 1, 0.89), ("b", 0, 0.95)]
+    means = pd.DataFrame(rows, columns=["policy", "point", "low"]).assign(metric=PRODUCT)
+    product = means.assign(metric="success", low=[0.5, 0.9, 0.9])
+    table = pd.concat([means, product], ignore_index=True)
+    left = summary.meeting(table, {PRODUCT: 0.9})
+    assert [*zip(left["policy"], left["point"], strict=True)] == [("a", 0), ("b", 0)] * 2
+    assert summary.meeting(table, {PRODUCT: 0.9, "success": 0.6})["policy"].tolist() == ["b"] * 2
+    assert summary.meeting(table, {}).equals(table)
 
 
 def test_settings_are_in_words(results, tmp_path):
