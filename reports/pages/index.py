@@ -5,6 +5,7 @@ import re
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from markupsafe import Markup
 
@@ -35,13 +36,18 @@ class Card:
     thumbnail: Markup
 
 
-def index_of(pages: Mapping[str, str], reports: Sequence[Report]) -> str:
+def index_of(
+    pages: Mapping[str, str],
+    reports: Sequence[Report],
+    left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> str:
     """The index of pages.
 
     Args:
         pages: The HTML of pages, by file name.
         reports: The reports in the order of their cards; those without a page are left out. Pages
             of studies come after them, by name.
+        left_out: Titles of reports whose results are missing, with the commands that make these.
     """
     shown = [report for report in reports if report.page in pages]
     cards = [
@@ -56,7 +62,7 @@ def index_of(pages: Mapping[str, str], reports: Sequence[Report]) -> str:
     origins = html.carrying(_evidence(contents), files)
     scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
     values = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
-    return fill(INDEX, cards=cards, **values)
+    return fill(INDEX, cards=cards, left_out=left_out, **values)
 
 
 def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:

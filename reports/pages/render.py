@@ -6,10 +6,12 @@ The same results give the same bytes, since a page contains no time and no path 
 import logging
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import Any
 
 from markupsafe import Markup
@@ -19,6 +21,7 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
+from analysis.execution import decision_time
 from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess import InputError
@@ -56,7 +59,8 @@ def render(
     The index shows all pages in the folder, also those of earlier calls.
 
     Args:
-        names: The reports; all if empty.
+        names: The reports. If empty, all whose results are there; the index and a line in the log
+            name the others.
         results: The folder that holds a results folder per study.
         out: The folder to write to.
         progress: Called after every mission that the pages need beside the results, and every cell.
@@ -75,13 +79,20 @@ def render(
     """
     results, out, given = Path(results), Path(out), parameters or {}
     values = {name: with_paths(value, os.path.abspath) for name, value in given.items()}
-    reports = [read(name, notebooks) for name in dict.fromkeys(names) or names_in(notebooks)]
+    asked = [*dict.fromkeys(names)]
+    reports = [read(name, notebooks) for name in asked or names_in(notebooks)]
     check_parameters(reports, values)
-    for study in dict.fromkeys(study for report in reports for study in report.studies):
-        _check_results(results / study)
+    lacking = {report.name: _lacking(report, results) for report in reports}
+    for name, errors in lacking.items():
+        for error in errors.values():
+            if asked:
+                raise error
+            log.warning("note: report %s is left out: %s", name, error)
+    left_out = {report.title: [*lacking[report.name]] for report in reports if lacking[report.name]}
+    reports = [report for report in reports if not lacking[report.name]]
     for report in reports:
         report.set({"results": ".", **values})
-    _write(reports, results, out, progress, values, notebooks)
+    _write(reports, results, out, progress, values, notebooks, left_out)
     return out / INDEX
 
 
@@ -108,7 +119,7 @@ def render_study(
         ReportError: If the notebook fails, as of ``render``.
     """
     folder, out, values = Path(folder), Path(out), parameters or {}
-    report = report_of(folder)
+    report = report_of(folder, values)
     check_parameters([report], values)
     report.set({"results": ".", **values})
     _write([report], folder, out, progress, values, SHIPPED)
@@ -122,6 +133,7 @@ def _write(
     progress: Progress | None,
     values: Mapping[str, Any],
     notebooks: Path,
+    left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     needed = [out] + [results for report in reports if "results" in report.parameters]
@@ -132,7 +144,7 @@ def _write(
         complete = [report for report in reports if not report.failure]
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
         shown = [read(name, notebooks) for name in names_in(notebooks)]
-        files[INDEX] = index_of(pages_in(out, but=files) | files, shown)
+        files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
         with writable(out):
             for name, text in files.items():
                 Path(folder, name).write_bytes(text.encode())
@@ -161,6 +173,23 @@ def _folders(folders: Iterable[Path]) -> Iterator[None]:
             with suppress(OSError):  # not empty
                 path.rmdir()
         raise
+
+
+def _lacking(report: Report, results: Path) -> dict[str, InputError]:
+    """The results that a report lacks: the command that makes them, and what is wrong."""
+    needs: dict[str, Callable[[], object]] = {
+        f"dess study run {study}": partial(_check_results, results / study)
+        for study in report.studies
+    }
+    if report.name == missions.COMPARISON:
+        needs["dess timing"] = partial(decision_time.read, results / "timing")
+    errors = {}
+    for command, check in needs.items():
+        try:
+            check()
+        except InputError as error:
+            errors[command] = error
+    return errors
 
 
 def _check_results(folder: Path) -> None:

@@ -68,11 +68,7 @@ def _print_most_changed(found: diff.Diff, most: int) -> None:
     for row in diff.most_changed(found, most).itertuples():
         where = f"{row.policy_a} {points[row.point_a]}".strip()
         print(f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}")
-        commands = {"A": row.command_a, "B": row.command_b}
-        if row.command_a == row.command_b:
-            commands = {"A and B, each with its own code": row.command_a}
-        for side, command in commands.items():
-            print(f"     {side}: {command}")
+        print(f"     A: {row.command_a}\n     B: {row.command_b}")
 
 
 def _shortened(fields: list[str]) -> str:

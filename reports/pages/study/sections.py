@@ -6,8 +6,10 @@ where the study has what the tag names, with all its tags; ``TAGS`` says what th
     report_of(Path("results/fleets"))
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from analysis import numbers
 from analysis.questions import summary
@@ -17,17 +19,28 @@ from analysis.study.cheapest import Cheapest
 from analysis.study.selection import Selection
 from reports.pages import notebook
 from reports.pages.notebook import SHIPPED, Report, tags_of
+from reports.pages.study import words
 
 NOTEBOOK, PREFIX = "study", "study-"  # the notebook; names of pages
 
 
-def report_of(folder: Path, notebooks: Path = SHIPPED) -> Report:
+def report_of(
+    folder: Path, values: Mapping[str, Any] = MappingProxyType({}), notebooks: Path = SHIPPED
+) -> Report:
     """The report of a results folder, with the sections and the title of its study.
 
+    Args:
+        folder: The results folder.
+        values: Values for the parameters of the notebook, to be checked.
+        notebooks: The folder of the notebooks.
+
     Raises:
-        InputError: If the folder holds no results, or they are incomplete or damaged.
+        InputError: If the folder holds no results, or they are incomplete or damaged; if the study
+            has no such metric or baseline.
     """
     results = load_results(folder)
+    words.metric_of(results, values.get("metric"))
+    words.setting(results, values.get("baseline", 0))
     study, original = results.manifest["study"], notebook.parsed(NOTEBOOK, notebooks)
     kept = {tag: has(results) for tag, has in TAGS.items()}
     original.cells = [

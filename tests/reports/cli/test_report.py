@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from reports.pages import render
+from tests.analysis.small import files_of
 
 
 @pytest.fixture
@@ -61,3 +62,21 @@ def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
     code, out, err = dess("report", tmp_path / "fleets")
     assert (code, out) == (1, "")
     assert err.splitlines()[-1].startswith("dess: error: report study-fleets: cell 3 of 9")
+
+
+def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, monkeypatch, tmp_path):
+    def fail(*_):
+        raise AssertionError("a cell runs")
+
+    monkeypatch.setattr("reports.pages.kernels.Kernels.run", fail)
+    assert dess("study", "run", "trial.toml", "--missions", 2, "--out", "out")[0] == 0
+    before = files_of(tmp_path)
+    for value, words in {
+        "baseline=99": "baseline: 99 is not a design point; allowed: 0..0",
+        "metric='speed'": "metric: 'speed' is unknown",
+        "speed=2": "parameter: 'speed' is unknown to study-trial",
+    }.items():
+        code, out, err = dess("report", "./out", "--parameter", value)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert words in err
+    assert files_of(tmp_path) == before

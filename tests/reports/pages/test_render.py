@@ -299,6 +299,26 @@ def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path: Pa
     assert not (tmp_path / "out").exists()
 
 
+def test_pages_without_results_are_left_out_with_a_note(
+    results: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Of all pages; a page that is named must have its results."""
+    lacking = MISSION.replace("[trial]", "[trial, fleets]")
+    notebooks = write_notebooks(tmp_path / "notebooks", scorecard=SCORECARD, comparison=lacking)
+    index = render([], results, tmp_path / "out", notebooks=notebooks)
+    assert {path.stem for path in index.parent.iterdir()} == {"index", "scorecard"}
+    page = index.read_text("utf-8")
+    listed = re.findall("<li>(.*?)</li>", page)
+    assert len(listed) == 1
+    commands = re.findall("<code>(.*?)</code>", listed[0])
+    assert commands == ["dess study run fleets", "dess timing"]
+    assert str(results) not in page
+    assert "note: report comparison is left out: results: " in caplog.text
+    with pytest.raises(InputError, match="holds no results of study fleets; they are made by"):
+        render(["comparison", "scorecard"], results, tmp_path / "a", notebooks=notebooks)
+    assert not (tmp_path / "a").exists()
+
+
 def test_results_of_another_study_are_refused(results: Path, tmp_path: Path) -> None:
     (tmp_path / "table4").symlink_to(results / "trial")
     with pytest.raises(InputError, match="table4 holds study trial; allowed: table4"):

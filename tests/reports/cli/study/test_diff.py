@@ -55,8 +55,8 @@ def test_the_missions_that_differ_are_named_with_their_commands(dess, dess_json,
         identity | {"replication": 2, "fields": "reward"},
     ]
     first = data["most_changed"][0]
-    assert "random, replication 6: collection_ratio\n     A and B, each" in out
-    assert f": {first['command_a']}\n" in out
+    assert "random, replication 6: collection_ratio\n     A: dess simulate --of a" in out
+    assert f"A: {first['command_a']}\n     B: {first['command_b']}\n" in out
     simulated = json.loads(dess(*shlex.split(first["command_a"])[1:], "--json")[1])
     assert simulated["replication"] == 6
 
