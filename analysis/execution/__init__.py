@@ -1,1 +1,1 @@
-"""Running a study: rounds of jobs, workers, and what it would cost."""
+"""Running a study: rounds of jobs, workers, and estimates of the time that a run takes."""

@@ -1,6 +1,6 @@
-"""What a decision costs in time: measured by a command, and kept in a file that pages read.
+"""The time that a policy takes to decide: measured by a command, and stored in a file.
 
-A time differs whenever it is measured, so no report measures any.
+Pages read the file and never measure, because a measured time is different every time.
 """
 
 import json
@@ -35,30 +35,30 @@ from policies import load_team
 
 FILE = "timing.json"
 SCHEMA_VERSION = 1
-SLOW = 0.95  # the quantile of the slow calls
-ROUNDS = 3  # of the batch; the middle one counts
-THREADS = 1  # of the libraries that compute: a UAV has one core to spare, if that
+SLOW = 0.95  # the quantile that is reported for slow calls
+ROUNDS = 3  # rounds of the batch engine; the median time counts
+THREADS = 1  # threads of the numerical libraries; a UAV has at most one free core
 
 Clock = Callable[[], float]
-# Called with the steps done and the steps in all.
+# Called with the number of steps done and of all steps.
 Progress = Callable[[int, int], None]
 
 
 class Cost(Document):
-    """What the decisions of a policy cost [s].
+    """The time that a policy takes to decide [s].
 
-    A call of ``Policy.act`` decides for all UAVs of a mission that must act, with all that the
-    policy derives from the view; not the work of the engine before and after it.
+    A call of ``Policy.act`` decides for all UAVs of a mission that must act. The time includes all
+    that the policy computes from the view, but not the work of the engine before and after it.
 
     Attributes:
         policy: The team.
         members: The identities of its policies.
-        calls: In the SimPy engine, each with the rows of one mission.
-        rows: In these calls: UAVs that were decided for.
-        median: Of the calls.
-        slow: Their ``SLOW`` quantile.
-        batch_rows: UAVs that were decided for in a round of the batch engine.
-        batch: Time in calls per row, of the middle one of ``ROUNDS`` rounds.
+        calls: Number of calls in the SimPy engine, each for one mission slot of one mission.
+        rows: Number of decisions in these calls, one for each UAV that had to act.
+        median: Median time of the calls [s].
+        slow: The ``SLOW`` quantile of the times of the calls [s].
+        batch_rows: Number of decisions in a round of the batch engine.
+        batch: Time per decision in the batch engine [s], the median over ``ROUNDS`` rounds.
     """
 
     policy: str
@@ -72,17 +72,17 @@ class Cost(Document):
 
 
 class Timing(Document):
-    """What decisions cost, and on what they were measured.
+    """Measured times of decisions, and where they were measured.
 
     Attributes:
-        version: Of dess, as ``code`` (a hash of its sources) and ``commit``.
-        libraries: And their versions, Python among them.
-        processor: Its model, as the system calls it.
-        cores: That the process might use.
-        threads: That the libraries were allowed.
+        version: Version of dess, which ``code`` (a hash of its sources) and ``commit`` specify.
+        libraries: The versions of the libraries and of Python.
+        processor: The model of the processor, as the operating system names it.
+        cores: Number of cores that the process could use.
+        threads: Number of threads that the libraries could use.
         scenario: The name of the scenario.
-        constants: What it says.
-        missions: Number per policy: replications 0, 1, ... of the seed.
+        constants: The fields of the scenario.
+        missions: Number of missions per policy: replications 0, 1, ... of the seed.
     """
 
     schema_version: int
@@ -126,18 +126,18 @@ def measure(
     clock: Clock = perf_counter,
     progress: Progress | None = None,
 ) -> Timing:
-    """Measure what the decisions of policies cost, on ``THREADS`` threads.
+    """Measure the time of the policies' decisions, on ``THREADS`` threads.
 
-    One mission at a time in the SimPy engine, then all at once in the batch engine. The policies
-    take turns, so that a machine that slows down for a while slows down all of them. The first
-    mission, and the first round of the batch, are simulated once before to warm up.
+    Missions are simulated one at a time with the SimPy engine, then all together with the batch
+    engine. The policies take turns, so that a machine that is slow for a while slows down all of
+    them. The first mission and the first round of the batch are simulated once before to warm up.
 
     Args:
-        policies: The teams, by name.
+        policies: The names of the teams.
         scenario: Name or file of the scenario.
-        seed: Of the missions.
+        seed: Seed of the missions.
         missions: Number of missions per policy.
-        clock: Tells the time [s].
+        clock: Returns the time [s].
         progress: Called after every step.
 
     Raises:
@@ -174,10 +174,10 @@ def measure(
 
 @contextmanager
 def writing(folder: str | Path) -> Iterator[Path]:
-    """Where to write a timing: a file that takes its place in the folder in the end.
+    """Yield a temporary path for a timing, which becomes the file in the folder at the end.
 
     Raises:
-        InputError: At once, if none can be written there.
+        InputError: Before the block is run, if no file can be written there.
     """
     path = Path(folder) / FILE
     with writable(path):
@@ -190,7 +190,7 @@ def read(folder: str | Path) -> Timing:
     """Read the timing in a folder.
 
     Raises:
-        InputError: If there is none, or it is damaged or of another version.
+        InputError: If there is none, or it is damaged or has another version.
     """
     path = Path(folder) / FILE
     allowed = f"allowed: what is made by: dess timing --out {Path(folder).resolve()}"
@@ -198,7 +198,7 @@ def read(folder: str | Path) -> Timing:
 
 
 def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bool:
-    """Whether a folder holds a timing of these policies, by the code and on the processor at hand.
+    """Whether a folder contains a timing of these policies by this code on this processor.
 
     Raises:
         InputError: If there is no such policy.
@@ -222,13 +222,13 @@ def unlike(timing: Timing, manifest: Manifest) -> list[str]:
 
 
 class _Timed:
-    """A policy that notes the time [s] and the rows of each of its calls."""
+    """A policy that records the time [s] and the number of rows of each of its calls."""
 
     def __init__(self, policy: Any, clock: Clock, calls: list[tuple[float, int]]):
         self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
 
     def act(self, view: View) -> np.ndarray:
-        """Choose as the policy does."""
+        """Return the actions of the policy, and record the time."""
         start = self.clock()
         actions = self.policy.act(view)
         self.calls.append((self.clock() - start, len(view)))
@@ -236,17 +236,17 @@ class _Timed:
 
 
 class _Team:
-    """A team that is timed; a time [s] is kept with the number of rows that it was spent on."""
+    """A team whose calls are timed; each time [s] is stored with the call's number of rows."""
 
     def __init__(self, name: str, clock: Clock):
         self.name = name
-        self.calls: list[tuple[float, int]] = []  # of the mission or round that is simulated
+        self.calls: list[tuple[float, int]] = []  # of the mission or round in progress
         self.policies = [_Timed(policy, clock, self.calls) for policy in load_team(name)]
         self.single: list[tuple[float, int]] = []  # every call of the SimPy engine
         self.rounds: list[tuple[float, int]] = []  # every round of the batch engine
 
     def cost(self) -> Cost:
-        """What it has cost."""
+        """The measured times of the team."""
         seconds, rows = zip(*self.single, strict=True)
         median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
         return Cost(
@@ -264,7 +264,7 @@ class _Team:
 def _steps(
     teams: Iterable[_Team], space: ScenarioSpace, seed: int, missions: int
 ) -> Iterator[None]:
-    """Simulate all that is measured, step by step."""
+    """Simulate all missions that are measured, step by step."""
     for number, replication in enumerate([0, *range(missions)]):
         for team in teams:
             team.calls.clear()

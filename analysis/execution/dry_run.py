@@ -1,4 +1,4 @@
-"""The plan of a run of a study: its missions, those that are present already, and the time."""
+"""The plan of a run: how many missions are needed, how many are present, how long it takes."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -16,11 +16,12 @@ from analysis.study.study import MANY_POINTS, Study
 from dess import InputError, simulate, simulate_batch
 from policies import load_team
 
-# Missions that are timed to estimate the time of all; more, as long as they take no time.
-TRIAL, LONG_TRIAL, ENOUGH = 48, 240, 0.2  # the last in seconds
+# Missions that are timed to estimate the time of all: TRIAL, or LONG_TRIAL if TRIAL missions take
+# less than ENOUGH seconds.
+TRIAL, LONG_TRIAL, ENOUGH = 48, 240, 0.2
 TRIAL_SEED = 400_000_000
 
-# A run that takes longer than this [s] has to be confirmed. Few missions are run without a trial.
+# A run that takes longer than this [s] has to be confirmed. Few missions need no estimate.
 LONG_RUN, FEW = 3600.0, 10_000
 
 
@@ -30,8 +31,8 @@ class Planned:
 
     Attributes:
         policy: The team.
-        missions: Missions wanted; by a rule, at least that many.
-        present: Those that are in the results folder already.
+        missions: Number of missions needed; a lower bound if a rule decides it.
+        present: Number of these missions that are already in the results folder.
         seconds: Estimated time of the others [s].
     """
 
@@ -46,10 +47,11 @@ class Plan:
     """What a run of a study would do.
 
     Attributes:
-        policies: What it would do for every policy.
+        policies: What the run would do for every policy.
         points: Number of design points.
-        at_most: Missions that a rule may ask for, over all policies; nothing without a rule.
-        seconds: Estimated time of what is missing, by all workers [s].
+        at_most: Largest number of missions that a rule may ask for, over all policies; None without
+            a rule.
+        seconds: Estimated time of the missing missions with all workers [s].
     """
 
     policies: tuple[Planned, ...]
@@ -59,7 +61,7 @@ class Plan:
 
     @property
     def missions(self) -> int:
-        """Missions wanted of all policies, without those that a rule adds."""
+        """Number of missions needed of all policies, without those that a rule adds."""
         return sum(planned.missions for planned in self.policies)
 
 
@@ -75,12 +77,12 @@ def plan_study(
     Args:
         study: The study.
         out: The results folder, which need not exist.
-        workers: Processes.
-        clock: Tells the time [s].
-        accept_code: Whether missions count that other code has simulated.
+        workers: Number of processes.
+        clock: Returns the time [s].
+        accept_code: Whether missions that other code has simulated count as present.
 
     Raises:
-        InputError: If the folder holds something else, or there is no worker.
+        InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
     store = Store.peek(study, out, accept_code)
@@ -108,18 +110,18 @@ def check_effort(
     Args:
         study: The study.
         out: The results folder, which need not exist.
-        workers: Processes.
-        clock: Tells the time [s].
-        accept_code: As of ``run_study``.
-        reuse: As of ``run_study``.
-        yes: Whether it may take as long as it takes.
+        workers: Number of processes.
+        clock: Returns the time [s].
+        accept_code: As for ``run_study``.
+        reuse: As for ``run_study``.
+        yes: Whether a run of any length is allowed.
 
     Returns:
-        How many missions are missing; by a rule, at least that many.
+        The number of missing missions; a lower bound if a rule decides it.
 
     Raises:
-        InputError: If it would take long, with the number of missions and the estimated time; if
-            the folder holds something else, or there is no worker.
+        InputError: If the run would take long (the message has the number of missions and the
+            estimated time), the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
     teams = range(len(study.policies))
@@ -148,12 +150,13 @@ def check_effort(
 
 
 def check_policies(study: Study) -> None:
-    """Have every policy act in a mission in every place of the design: a grid, a zone and nodes.
+    """Check that every policy can act on every layout of the design (grid, zone and nodes).
 
-    Any other error than ``InputError`` is left to the run, which records it.
+    Errors other than ``InputError`` are ignored here, because the run records them as failures.
 
     Raises:
-        InputError: If a policy cannot act in one of them, as one that has learned another place.
+        InputError: If a policy cannot act on a layout, such as a learned policy on a layout that
+            differs from that of its training.
     """
     spaces = (point.scenario for point in study.points)
     places = [*{(space.grid, space.zone, space.nodes): space for space in spaces}.values()]
@@ -162,12 +165,12 @@ def check_policies(study: Study) -> None:
             simulate_batch(places, load_team(policy), study.seed, len(places))
         except InputError:
             raise
-        except Exception:  # a policy that raises anything else fails in the run, which records it
+        except Exception:  # the run will record it as a failure
             continue
 
 
 def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
-    """Missions of a team that are missing, and all that are wanted for now."""
+    """Number of missions of a team that are missing, and that are needed for now."""
     manifest = store.manifest
     parts = parts_of(manifest, team) + check_parts(manifest, team)
     missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
@@ -176,7 +179,7 @@ def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
 
 
 def _budget(study: Study) -> int:
-    """Missions of a policy that the rule of a study may ask for."""
+    """Largest number of missions of a policy that the rule of a study may ask for."""
     if study.selection:
         checked = len(study.points) if isinstance(study.selection, Cheapest) else 1
         return study.selection.budget + study.selection.check * checked
@@ -185,7 +188,7 @@ def _budget(study: Study) -> int:
 
 
 def _seconds_per_mission(study: Study, team: int, clock: Callable[[], float]) -> float:
-    """The time of a mission, from a trial of some, spread over the design points [s]."""
+    """The mean time of a mission [s], measured on some missions of various design points."""
     policies = load_team(study.policies[team])
 
     def trial(missions: int) -> float:

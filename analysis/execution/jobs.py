@@ -1,4 +1,4 @@
-"""What a study is made of, fit to be handed to a worker: chunks of missions, and event logs."""
+"""Jobs: the units of work of a study that are sent to workers (chunks of missions, event logs)."""
 
 import traceback
 from collections.abc import Callable, Iterator
@@ -20,13 +20,13 @@ Progress = Callable[[int], object]
 
 @dataclass(frozen=True)
 class MissionsJob:
-    """The missions of a chunk.
+    """A job that simulates the missions of a chunk.
 
     Attributes:
-        chunk: What they are, and where they are kept.
-        spaces: The scenario of each of its parts.
-        policy: Its team.
-        seed: Their seed.
+        chunk: The chunk, which tells the missions and where they are stored.
+        spaces: The scenario of each part of the chunk.
+        policy: The team of the chunk.
+        seed: Seed of the missions.
         engine: ``batch`` or ``events``.
     """
 
@@ -38,11 +38,11 @@ class MissionsJob:
 
     @property
     def missions(self) -> int:
-        """How many missions it has."""
+        """The number of missions."""
         return self.chunk.missions
 
     def run(self, progress: Progress | None = None) -> Records:
-        """Simulate the missions; ``progress`` is told how many are done since its last call."""
+        """Simulate the missions; ``progress`` gets the number of missions since its last call."""
         team = load_team(self.policy)
         rows = [(space, r) for space, r, _ in self._missions()]
         spaces, replications = [list(column) for column in zip(*rows, strict=True)]
@@ -58,7 +58,7 @@ class MissionsJob:
         return records
 
     def alone(self) -> Iterator["MissionsJob"]:
-        """Its missions, one by one."""
+        """A job for each of the missions."""
         for space, replication, cell in self._missions():
             part = Part(cell, range(replication, replication + 1))
             yield replace(self, chunk=replace(self.chunk, parts=(part,)), spaces=(space,))
@@ -69,19 +69,19 @@ class MissionsJob:
                 yield space, replication, part.cell
 
     def save(self, store: Store, records: Records) -> None:
-        """Keep the records."""
+        """Store the records."""
         store.write(self.chunk, records)
 
 
 @dataclass(frozen=True)
 class LogJob:
-    """One mission, for its event log.
+    """A job that simulates one mission for its event log.
 
     Attributes:
-        chunk: The mission; its record comes with another job.
-        space: Its scenario.
-        policy: Its team.
-        seed: Its seed.
+        chunk: The mission; another job stores its record.
+        space: The scenario of the mission.
+        policy: The team.
+        seed: The seed.
     """
 
     chunk: Chunk
@@ -92,7 +92,7 @@ class LogJob:
 
     @property
     def mission(self) -> Part:
-        """The only part of its chunk."""
+        """The only part of the chunk."""
         return self.chunk.parts[0]
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
@@ -103,11 +103,11 @@ class LogJob:
         return log.columns()
 
     def alone(self) -> Iterator["LogJob"]:
-        """Itself."""
+        """The job itself, since it has one mission."""
         yield self
 
     def save(self, store: Store, columns: dict[str, np.ndarray]) -> None:
-        """Keep the event log."""
+        """Store the event log."""
         store.write_log(self.mission.cell, self.mission.replications[0], columns)
 
 
@@ -116,12 +116,12 @@ Job = MissionsJob | LogJob
 
 @dataclass(frozen=True)
 class Problem:
-    """Why a job has no result.
+    """The reason why a job has no result.
 
     Attributes:
-        error: In a line.
-        traceback: Where it was raised.
-        mission: The first of its missions that fails alone, if one does.
+        error: The error in one line.
+        traceback: Where the error was raised.
+        mission: The first mission of the job that also fails when it is simulated alone, if any.
     """
 
     error: str
@@ -130,16 +130,16 @@ class Problem:
 
     @classmethod
     def of(cls, error: Exception, mission: Part | None = None) -> Self:
-        """What was raised."""
+        """The problem that belongs to an exception."""
         line = " ".join(traceback.format_exception_only(error)[-1].split())
         return cls(line, "".join(traceback.format_exception(error)), mission)
 
 
 def attempt(job: Job, progress: Progress | None = None) -> Any:
-    """Do a job: what comes of it, or its ``Problem``.
+    """Run a job and return its result, or a ``Problem``.
 
     Raises:
-        InputError: If it cannot be done at all, such as for want of its policy.
+        InputError: If the job cannot be run at all, for example because a policy is missing.
         KeyboardInterrupt: If it is interrupted.
     """
     try:
@@ -153,7 +153,7 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
 
 
 def was_interrupted(error: BaseException | None) -> bool:
-    """Whether an error comes of Ctrl-C: in compiled code, numba makes it a ``SystemError``."""
+    """Whether an error was caused by Ctrl-C, which numba reports as a ``SystemError``."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True
@@ -162,7 +162,7 @@ def was_interrupted(error: BaseException | None) -> bool:
 
 
 def _culprit(job: Job) -> Part | None:
-    """The first mission of a job that fails alone."""
+    """The first mission of a job that fails when it is simulated alone."""
     for single in job.alone():
         try:
             single.run()

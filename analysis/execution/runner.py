@@ -1,8 +1,8 @@
-"""Runs studies: splits them into jobs and has a pool do these; evaluates single teams.
+"""Run studies: split them into jobs, and let a pool of workers run these; evaluate single teams.
 
-A job depends on nothing but its fields, so the result is the same wherever and in whatever order
-the jobs are run. Where a rule decides how many missions there are, they come in rounds; what a
-round asks for depends on the missions of the rounds before it alone.
+The result of a job depends only on its fields, so the results of a study are the same wherever and
+in whatever order the jobs are run. If a rule decides the number of missions, they are simulated in
+rounds. What a round needs depends only on the missions of the rounds before.
 """
 
 import shlex
@@ -32,7 +32,8 @@ from dess.record import Records
 from dess.scenario import ScenarioSpace
 from policies import load_team
 
-# Missions of a chunk, by engine: enough to fill the batch, few enough to lose little.
+# Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
+# interrupted.
 CHUNK = {"batch": 500, "events": 50}
 
 Counts = list[list[int]]  # missions of every team and design point
@@ -42,9 +43,9 @@ class Round(NamedTuple):
     """A round of a study.
 
     Attributes:
-        number: Which, from 0.
-        missions: Wanted of all rounds up to this one.
-        present: Of these, missions that the folder has already.
+        number: The number of the round, from 0.
+        missions: Number of missions needed in all rounds up to this one.
+        present: Number of these missions that are already in the folder.
     """
 
     number: int
@@ -53,10 +54,10 @@ class Round(NamedTuple):
 
 
 class ChunkError(Exception):
-    """Some chunks of a study could not be computed, all others are there.
+    """Some chunks of a study could not be computed; all others are complete.
 
     Attributes:
-        failures: What went wrong, by the file that tells it.
+        failures: What went wrong, by the path of the file that describes it.
     """
 
     def __init__(self, failures: dict[Path, Failure]):
@@ -74,27 +75,28 @@ def run_study(
     accept_code: bool = False,
     reuse: Sequence[Path] = (),
 ) -> Results:
-    """Run a study into a results folder; what is there already is kept.
+    """Run a study into a results folder; missions that are already there are kept.
 
-    Results are written as they come in, so after an interruption the same call completes them.
+    Results are written as soon as they are computed. After an interruption, the same call computes
+    what is missing.
 
     Args:
         study: The study, its name or its file.
         out: The results folder.
-        workers: Processes.
-        scheduler: Address of a ``dask.distributed`` scheduler to run on instead.
-        progress: Called with the number of missions done since its last call, first in every round
-            with those that are there already.
+        workers: Number of processes.
+        scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
+        progress: Called with the number of missions done since its last call. The first call of a
+            round counts the missions that are already there.
         announce: Called before each round.
-        accept_code: Whether to go on with missions that other code has simulated. What is accepted
-            is written into the manifest.
-        reuse: Other results folders, whose missions are taken over where they are those of the
-            study. Those that are damaged, or of other code or another seed, are not.
+        accept_code: Whether to keep missions that other code has simulated. The manifest records
+            that they were accepted.
+        reuse: Other results folders. Their missions are copied if they belong to the study, that
+            is, if code, scenario, policy and seed are the same and the files are not damaged.
 
     Raises:
-        InputError: If the study is not valid, the folder cannot be written, is in use or holds
+        InputError: If the study is not valid, the folder cannot be written, is in use or contains
             something else, or the scheduler cannot be used.
-        ChunkError: If something could not be computed; after all that could.
+        ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
     """
     if not isinstance(study, Study):
         study = load_study(study)
@@ -106,7 +108,7 @@ def run_study(
 
 
 def check_workers(workers: int) -> None:
-    """Refuse a number of workers that is none.
+    """Refuse a number of workers below 1.
 
     Raises:
         InputError: If it is below 1.
@@ -126,13 +128,13 @@ class _Run:
     announce: Callable[[Round], object] | None
     reuse: Sequence[Path]
     rounds: int = 0  # so far
-    asked: int = 0  # missions of these rounds
+    asked: int = 0  # missions needed in these rounds
 
     def complete(self) -> None:
-        """Do what is missing, round by round.
+        """Compute what is missing, round by round.
 
         Raises:
-            ChunkError: If some of a round could not be computed, after the rest of it.
+            ChunkError: If a chunk could not be computed, after the other chunks of the round.
         """
         teams, points = range(len(self.study.policies)), range(len(self.study.points))
         before: Counts = [[0 for _ in points] for _ in teams]
@@ -150,14 +152,14 @@ class _Run:
         self.store.finish(wanted, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
-        """How many missions the rule wants of a team's points, now that these are there."""
+        """How many missions the rule needs at each point of a team, given those present."""
         rule = self.study.rule
         if isinstance(rule, Cheapest):
             return rule.wanted(self._samples(team, counts), self.store.manifest.settings)
         return rule.wanted(self._samples(team, counts)) if rule else counts
 
     def _select(self, team: int, counts: list[int]) -> Selected:
-        """What is selected for a team, if the study selects."""
+        """What is selected for a team; None if the study selects nothing."""
         rule = self.study.selection
         if isinstance(rule, Cheapest):
             return rule.choice(self._samples(team, counts), self.store.manifest.settings).selected
@@ -167,7 +169,7 @@ class _Run:
         return self.store.samples(parts_of(self.store.manifest, team, counts))
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
-        """Do the missing missions of a round, whose parts these are, and the logs."""
+        """Simulate the missing missions of a round with these parts, and the event logs."""
         self._take_over(parts)
         jobs, present = [*logs], 0
         for chunk in split(parts, CHUNK[self.study.engine]):
@@ -184,7 +186,7 @@ class _Run:
         self._do(jobs)
 
     def _take_over(self, parts: Sequence[Part]) -> None:
-        """Take what is missing of the parts from the other folders, as far as it is there."""
+        """Copy missing missions of the parts from the other folders, as far as they have them."""
         if self.reuse and any(map(self.store.missing, split(parts, CHUNK[self.study.engine]))):
             for source in self._sources:
                 self.store.take_over(source, parts)
@@ -194,7 +196,7 @@ class _Run:
         return sources(self.reuse, self.store.manifest)
 
     def _log_jobs(self) -> list[Job]:
-        """The missions to simulate again, whose event logs are wanted and missing."""
+        """The jobs for missions whose event logs are needed and missing."""
         return [
             LogJob(
                 Chunk(cell.team, (Part(cell, range(replication, replication + 1)),)),
@@ -217,7 +219,7 @@ class _Run:
         )
 
     def _do(self, jobs: Sequence[Job]) -> None:
-        """Do the jobs and store their results."""
+        """Run the jobs and store their results."""
         failures = {}
         with closing(self.pool.run(jobs, self.progress)) as results:
             for number, result in results:
@@ -230,7 +232,7 @@ class _Run:
             raise ChunkError(failures)
 
     def _save(self, job: Job, result: Any) -> Problem | None:
-        """Store the result of a job; a result that the store refuses is a problem of the job."""
+        """Store the result of a job; if the store refuses it, the job has a problem."""
         try:
             job.save(self.store, result)
         except ValueError as error:
@@ -238,7 +240,7 @@ class _Run:
         return None
 
     def _failure(self, job: Job, problem: Problem) -> Failure:
-        """The failure of a job, with a command that reproduces it: a mission, or the study."""
+        """The failure of a job, with a command that reproduces it by a mission or by the study."""
         command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
         if mission := problem.mission:
             which = mission.cell, mission.replications[0]
@@ -248,7 +250,7 @@ class _Run:
 
 
 def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
-    """The missions wanted beyond those of before, each once, in the order of the study."""
+    """The missions that are needed in addition to earlier ones, each once, in the study's order."""
     parts: list[Part] = []
     asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
     for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True):
@@ -266,8 +268,8 @@ class Evaluation:
 
     Attributes:
         policy: The team.
-        records: What the missions left.
-        seconds: Time of their simulation alone, compilation and start of workers apart [s].
+        records: The records of the missions.
+        seconds: Time of the simulation [s], without compilation and the start of workers.
     """
 
     policy: str
@@ -276,7 +278,7 @@ class Evaluation:
 
     @property
     def uav_slots(self) -> int:
-        """Mission slots flown or charged, summed over the UAVs of all missions."""
+        """Mission slots in which a UAV was active, summed over the UAVs of all missions."""
         return int(self.records.missions["uav_slots"].sum())
 
 
@@ -290,17 +292,17 @@ def evaluate(
     progress: Progress | None = None,
     clock: Callable[[], float] = time.perf_counter,
 ) -> Evaluation:
-    """Simulate replications 0, 1, ... of a team, and time it.
+    """Simulate replications 0, 1, ... of a team, and measure the time.
 
     Args:
-        scenario: The scenario space that the missions are drawn from.
+        scenario: The scenario space from which the missions are drawn.
         team: ``"P"`` or ``"P,P,..."``.
-        missions: How many.
-        seed: Their seed.
+        missions: Number of missions.
+        seed: Seed of the missions.
         engine: ``batch`` or ``events``.
         workers: Threads of the batch engine, processes of the event engine.
         progress: Called with the number of missions done since its last call.
-        clock: Tells the time [s].
+        clock: Returns the time [s].
 
     Raises:
         InputError: If a policy is unknown or a number out of range.
@@ -328,10 +330,10 @@ def evaluate(
 
 
 def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
-    """The results of all jobs, in their order.
+    """The results of all jobs, in the order of the jobs.
 
     Raises:
-        RuntimeError: If one failed.
+        RuntimeError: If one of them failed.
     """
     done = dict(pool.run(jobs, progress))
     for result in done.values():

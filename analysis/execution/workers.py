@@ -1,7 +1,7 @@
-"""Who does the jobs: this process, joblib workers, or a dask.distributed cluster.
+"""Pools that run jobs: this process, joblib workers, or a dask.distributed cluster.
 
-A job that raises has a ``Problem`` for a result. A worker that is killed is replaced and its job
-done again; a job that kills its worker each time has a ``Problem`` too.
+A job that raises an error has a ``Problem`` as its result. A worker that is killed is replaced, and
+its job is run again; a job that kills its worker every time also has a ``Problem``.
 """
 
 import os
@@ -21,19 +21,19 @@ from dess import InputError
 from dess.code.libraries import needs
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
-DEATHS = 2  # of workers that a job was alone with, after which it is given up
+DEATHS = 2  # a job is given up after this many deaths of workers that ran only this job
 
 
 class Pool(AbstractContextManager["Pool"]):
-    """Does jobs, in a ``with`` block."""
+    """A pool that runs jobs, to be used in a ``with`` block."""
 
     @abstractmethod
     def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
-        """Do the jobs; their numbers and results as they come in."""
+        """Run the jobs; yield their numbers and results as they come in."""
 
 
 class Here(Pool):
-    """This machine: this process, or joblib workers."""
+    """A pool on this machine: this process, or joblib workers."""
 
     def __init__(self, workers: int):
         self.workers = workers
@@ -42,7 +42,7 @@ class Here(Pool):
         pass
 
     def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
-        """Do the jobs; their numbers and results as they come in."""
+        """Run the jobs; yield their numbers and results as they come in."""
         if self.workers == 1:
             for number, job in enumerate(jobs):
                 yield number, _in_turn(job, progress)
@@ -52,13 +52,13 @@ class Here(Pool):
         while waiting:
             started: set[int] = set()
             for number, result in self._finished(waiting, started):
-                yield number, _told(waiting.pop(number), result, progress)
-            # Only if a worker died: one of those that were under way did it.
+                yield number, _reported(waiting.pop(number), result, progress)
+            # A worker died, and one of the jobs that were running caused it.
             for number in sorted(started & waiting.keys()):
-                yield number, _told(waiting[number], self._alone(waiting.pop(number)), progress)
+                yield number, _reported(waiting[number], self._alone(waiting.pop(number)), progress)
 
     def _alone(self, job: Job) -> Any:
-        """Do a job that may have killed its worker, with nothing else under way."""
+        """Run a job that may have killed its worker, while no other job is running."""
         for _ in range(DEATHS):
             for _, result in self._finished({0: job}, set()):
                 return result
@@ -66,14 +66,14 @@ class Here(Pool):
         return Problem(line, mission=self._deadly(job))
 
     def _deadly(self, job: Job) -> Part | None:
-        """The first mission of a job that kills its worker alone."""
+        """The first mission of a job that kills its worker when it is simulated alone."""
         for single in job.alone():
             if not [*self._finished({0: single}, set())]:
                 return single.chunk.parts[0]
         return None
 
     def _finished(self, jobs: dict[int, Job], started: set[int]) -> Iterator[tuple[int, Any]]:
-        """Results by number as they come in, until a worker dies; who was ``started`` by then."""
+        """Results by job number as they come in, until a worker dies; ``started`` is updated."""
         from joblib import Parallel, delayed
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
@@ -98,32 +98,32 @@ class Here(Pool):
 
 
 def _in_turn(job: Job, progress: Progress | None) -> Any:
-    """Do a job in this process, with progress in the middle of it."""
+    """Run a job in this process, and report progress while it runs."""
     done = 0
 
-    def tell(missions: int) -> None:
+    def report(missions: int) -> None:
         nonlocal done
         done += missions
         if progress:
             progress(missions)
 
-    result = attempt(job, tell)
+    result = attempt(job, report)
     if done < job.missions:
-        tell(job.missions - done)
+        report(job.missions - done)
     return result
 
 
-def _told(job: Job, result: Any, progress: Progress | None) -> Any:
-    """A result, once progress knows of it."""
+def _reported(job: Job, result: Any, progress: Progress | None) -> Any:
+    """Report the missions of a finished job to ``progress``, and return its result."""
     if progress and job.missions:
         progress(job.missions)
     return result
 
 
 def _compile(jobs: Sequence[Job]) -> None:
-    """Compile the engine, once, so that the workers only load it.
+    """Compile the engine once in this process, so that the workers only load it.
 
-    With a policy of our own: what others do in this process is not known.
+    A heuristic of this project is used for it, because it is unknown what other policies do.
     """
     for job in [job for job in jobs if isinstance(job, MissionsJob)][:1]:
         replace(next(job.alone()), policy="random").run()
@@ -134,7 +134,7 @@ def _numbered(number: int, job: Job) -> tuple[int, Any]:
 
 
 def _live_and_die_with(parent: int) -> None:
-    """Leave interrupts to the parent process, and go when it has been killed."""
+    """Ignore interrupts, which the parent process handles, and end when the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
@@ -154,7 +154,9 @@ class Cluster(Pool):
         from distributed.comm import get_address_host_port
 
         try:
-            get_address_host_port(address)  # a Client that fails on it would hang when it is closed
+            get_address_host_port(
+                address
+            )  # check first, because a Client with a wrong address would hang when it is closed
             self.client = Client(address, timeout="10s", set_as_default=False)
         except (OSError, ValueError) as error:
             raise InputError(
@@ -165,7 +167,7 @@ class Cluster(Pool):
         self.client.close()
 
     def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
-        """Do the jobs; their numbers and results as they come in."""
+        """Run the jobs; yield their numbers and results as they come in."""
         from distributed import as_completed
 
         code = engine_code()
@@ -180,9 +182,9 @@ class Cluster(Pool):
         try:
             for future, result in finished:
                 number = numbers[future.key]
-                if future.status == "error":  # its exception, with its type and traceback
+                if future.status == "error":  # dask gives the exception with its type and traceback
                     result = _problem(result[1])
-                yield number, _told(jobs[number], result, progress)
+                yield number, _reported(jobs[number], result, progress)
                 future.release()
         finally:
             self.client.cancel(futures)
@@ -198,7 +200,7 @@ def _checked(job: Job, code: str, members: list[Member]) -> Any:
 
 
 def _problem(error: Exception) -> Problem:
-    """What dask says of a job whose workers died; other errors are raised."""
+    """The problem of a job whose workers died, as dask reports it; other errors are raised."""
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):

@@ -1,1 +1,1 @@
-"""The simulator against what is known: checks of chance and exact ones."""
+"""Verification of the simulator against exact theory: statistical checks and exact checks."""

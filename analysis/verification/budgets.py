@@ -1,4 +1,4 @@
-"""Budgets of data and energy: nothing is made or lost, and every battery keeps to its rules."""
+"""Checks that data are neither created nor lost, and that batteries follow their rules."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list
     """The results of all studies in a folder, and the names of those that cannot be loaded.
 
     Args:
-        folder: Holds a results folder per study.
+        folder: A folder that contains a results folder per study.
         but: A study to leave out.
     """
     loaded, damaged = {}, []
@@ -36,11 +36,11 @@ def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list
 
 
 def conservation_check(studies: Mapping[str, Results]) -> Check:
-    """Every mission of every study: data are neither made nor lost.
+    """Check in every mission of every study that data are neither created nor lost.
 
-    Every addition rounds its result, which is never above the whole, by half a unit of rounding at
-    most. So the number of additions bounds what rounding can do. The check shows the mission that
-    comes closest to its bound.
+    Every addition rounds its result, which is at most the total amount of data, by at most half a
+    unit in the last place. So the number of additions gives a bound of the rounding error. The
+    check reports the mission that comes closest to its bound.
 
     Args:
         studies: Results by the name of their study.
@@ -62,7 +62,7 @@ def _imbalances(results: Results) -> pd.DataFrame:
     nodes = missions["point"].map([len(space.nodes) for space in spaces].__getitem__)
     whole = missions["initial"] + missions["arrived"]
     error = (whole - missions["collected"] - missions["residual"]).abs()
-    # Collected twice: from a node, and to the sum of the mission. Then arrivals, and nodes.
+    # Two additions per communication (node and mission), then arrivals and nodes.
     additions = 2 * m * missions["uav_slots"] + 2 * nodes * (missions["slots"] + 1)
     return pd.DataFrame(
         {"error": error / whole.where(whole > 0, 1.0), "bound": EPSILON * additions}
@@ -70,7 +70,7 @@ def _imbalances(results: Results) -> pd.DataFrame:
 
 
 def balance_check(logs: Sequence[Log]) -> Check:
-    """Node by node: what it had and received is what was taken and is left, to the last bit."""
+    """Check at every node, bit for bit, that initial + arrived = collected + residual data."""
     off = max((float(np.abs(log.residuals[-1] - log.left).max()) for log in logs), default=0.0)
     lowest = min((float(log.residuals.min()) for log in logs), default=0.0)
     lowest, n = min(lowest, 0.0), sum(log.left.size for log in logs)
@@ -79,19 +79,19 @@ def balance_check(logs: Sequence[Log]) -> Check:
 
 
 def battery_check(logs: Sequence[Log]) -> Check:
-    """Every UAV slot of the logs: the battery by its rules (eq. 1-4, 8)."""
+    """Check that the battery follows its rules (eq. 1-4, 8) in every UAV slot of the logs."""
     wrong = np.concatenate([np.zeros(0, bool), *map(battery_errors, logs)])
     cost, gain = (
         "/".join(map(str, sorted({getattr(log.scenario, field) for log in logs})))
         for field in ("flight_cost", "charge_rate")
     )
-    known = f"−{cost} % flying, +{gain} % charging, which begins at C_S or below and ends at C_C"
+    known = f"−{cost} % flying, +{gain} % charging; charging begins at or below C_S, ends at C_C"
     test = "Battery of every UAV in every slot"
     return Check.counted(ENERGY, test, known, int(wrong.sum()), wrong.size)
 
 
 def battery_errors(log: Log) -> np.ndarray:
-    """(N,) whether a UAV slot of a log breaks a rule of the battery."""
+    """For each of the N UAV slots of a log, whether it breaks a rule of the battery."""
     s, table = log.scenario, log.uav_slots
     before = table.groupby("uav")["battery"].shift().fillna(s.flying_time)
     charging = table["charging"]

@@ -1,6 +1,6 @@
-"""The channel: a lone UAV's communication against closed forms, that of logs computed once more.
+"""Checks of the channel: single UAVs against closed forms, and communications computed again.
 
-Of the simulator the checks share the generator of random words alone, run as plain Python.
+The checks use only one part of the simulator, the generator of random words, run as plain Python.
 """
 
 from collections.abc import Sequence
@@ -15,26 +15,26 @@ from analysis.verification.checks import CHANNEL, Check
 from analysis.verification.logs import Log
 from dess import streams
 
-# Units of rounding by which two ways to compute a rate may differ: a handful of steps each, of
-# which the way from SNR [dB] to a ratio magnifies the rounding most.
+# Units in the last place by which two ways to compute a rate may differ. Each has few steps, and
+# the conversion of the SNR from dB to a ratio increases the rounding error most.
 _ROUNDINGS = 1000
 _COMMUNICATIONS = ["node", "value", "best", "known", "residual"]
 
 
 def rate_check(rates: pd.DataFrame) -> Check:
-    """Mean rates of ``lone_uav.rates`` against the integral over all shadowing."""
+    """Compare the mean rates of ``lone_uav.rates`` with the integral over all shadowing."""
     test = "Mean rate of a lone UAV at each distance: chi-square"
     known, n = "E[δ log₂(1 + SNR)] by integration", int(rates["n"].sum())
     off = float((rates["mean"] / rates["known"] - 1).abs().max())
     seen = f"within {100 * off:.2g} % at {len(rates)} distances"
-    if not (rates["error"] > 0).all():  # without shadowing nothing is left to chance
+    if not (rates["error"] > 0).all():  # without shadowing, nothing is random
         return Check.exact(CHANNEL, test, known, seen, n, off, bound=1e-9)
     square = (((rates["mean"] - rates["known"]) / rates["error"]) ** 2).sum()
     return Check(CHANNEL, test, known, seen, n, float(stats.chi2.sf(square, len(rates))))
 
 
 def shadowing_checks(deviates: np.ndarray) -> list[Check]:
-    """Shadowing of ``lone_uav.deviates`` against independent standard normal variables."""
+    """Compare the shadowing of ``lone_uav.deviates`` with independent standard normal variables."""
     n, test = deviates.size, "Correlation of a communication slot and the next"
     mean, deviation = (minus(f"{value:.3f}") for value in (deviates.mean(), deviates.std()))
     seen = f"mean {mean}, deviation {deviation}"
@@ -47,10 +47,10 @@ def shadowing_checks(deviates: np.ndarray) -> list[Check]:
 
 
 def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
-    """Every communication of the logs: the node that was served, and its data.
+    """Check the served node and the amount of data of every communication in the logs.
 
     Both are computed again from the formula, with the shadowing of that communication slot: the
-    best of the nodes that have data, and the smaller of its rate and its data.
+    node with the highest SNR of those with data, and the smaller of its rate and its data.
     """
     tables = [communications(log, seed) for log in logs]
     table = pd.concat(tables) if tables else pd.DataFrame(columns=_COMMUNICATIONS, dtype=float)
@@ -58,7 +58,10 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
     off = float((same["value"] / same["known"] - 1).abs().max()) if len(same) else 0.0
     emptied = int((same["known"] == same["residual"]).sum())
     seen = f"off by {off:.1e} of it at most; {emptied:,} times the node was emptied"
-    test, known = "Node served in a communication slot", "the one heard best, of those with data"
+    test, known = (
+        "Node served in a communication slot",
+        "the best SNR among nodes with data",
+    )
     choice = Check.counted(CHANNEL, test, known, len(table) - len(same), len(table))
     test, known = "Data of a communication", "min(R, D) with the shadowing that was drawn"
     bound = _ROUNDINGS * np.finfo(float).eps
@@ -66,7 +69,7 @@ def communication_checks(logs: Sequence[Log], seed: int) -> list[Check]:
 
 
 def communications(log: Log, seed: int) -> pd.DataFrame:
-    """Every communication of a log, computed once more.
+    """Compute every communication of a log again.
 
     Returns:
         A row per communication: ``node`` and ``value`` as logged; ``best``, the node with the
@@ -91,10 +94,10 @@ def communications(log: Log, seed: int) -> pd.DataFrame:
 
 
 def _shadowing(seed: int, log: Log, uav: np.ndarray, slot: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """(E, K) shadowing [dB] of communication slots ``n`` = 0..m-1, for all nodes.
+    """The (E, K) shadowing [dB] of communication slots ``n`` = 0..m-1, for all nodes.
 
-    Four communication slots share a block of four words; a counter of the generator holds the UAV
-    and the number of the four.
+    Four communication slots share a block of four random words. One counter word of the generator
+    is made of the UAV and the number of this group of four slots.
     """
     block = (n // 4 * 65536 + uav).astype(np.uint64)
     lane = (np.uint64(streams.SHADOWING) << np.uint64(24)) | block

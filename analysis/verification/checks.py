@@ -1,6 +1,6 @@
 """Checks of the simulator, and the verdict on all of them together.
 
-A check of chance has a p-value, an exact one an error and the bound that it must keep::
+A statistical check has a p-value; an exact check has an error and an upper bound of it::
 
     checks = [z_check(CHANNEL, "Mean", known=0, estimate=0.1, error=0.2, n=50), ...]
     table = judge(checks)
@@ -24,23 +24,23 @@ CONSERVATION, ENERGY, RECORDS = "Conservation", "Energy", "Records"
 REALISATIONS, ENGINES = "Realisations", "Engines"
 BOOKKEEPING = (CONSERVATION, ENERGY, RECORDS, REALISATIONS, ENGINES)
 
-# The chance that any check of chance fails although all that is known holds.
+# The probability that any statistical check fails although the simulator is correct.
 ALPHA = 0.01
 
 _NORMAL = stats.norm.ppf((1 + LEVEL) / 2)
 
 
 class Check(NamedTuple):
-    """A comparison with what is known; inconclusive if it has neither ``p`` nor ``error``.
+    """A comparison with a known value; inconclusive if it has neither ``p`` nor ``error``.
 
     Attributes:
         topic: The part of the simulator, one of the constants of this module.
         test: What was compared, and how.
-        known: The closed form.
-        seen: The estimate that stands beside it.
+        known: The known value or law, as text.
+        seen: The observed value, as text.
         n: Number of observations.
-        p: Probability of a deviation as large as that seen, if the closed form holds.
-        error: Deviation where there must be none.
+        p: Probability of a deviation as large as the observed one if the known value is true.
+        error: The deviation, for an exact check.
         bound: The largest error that is allowed.
     """
 
@@ -57,12 +57,12 @@ class Check(NamedTuple):
     def exact(
         cls, topic: str, test: str, known: str, seen: str, n: int, error: float, bound: float = 0.0
     ) -> Self:
-        """A check of an error; inconclusive without observations."""
+        """An exact check; inconclusive without observations."""
         return cls(topic, test, known, seen, n, error=float(error) if n else None, bound=bound)
 
     @classmethod
     def counted(cls, topic: str, test: str, known: str, wrong: int, n: int) -> Self:
-        """An exact check of n cases, of which some are wrong."""
+        """An exact check of n cases, of which ``wrong`` are wrong."""
         seen = f"otherwise {wrong:,} times" if wrong else "always"
         return cls.exact(topic, test, known, seen, n, wrong)
 
@@ -77,12 +77,12 @@ class Check(NamedTuple):
         n: int,
         digits: int = 4,
     ) -> Self:
-        """A check of an estimate that is normal around the known value.
+        """A statistical check of an estimate that is normally distributed around the known value.
 
         Args:
             topic, test, n: As above.
             known: The value in closed form.
-            estimate: What was seen.
+            estimate: The observed value.
             error: The standard error of the estimate, if the known value holds.
             digits: Decimals of the estimate as text.
         """
@@ -93,11 +93,11 @@ class Check(NamedTuple):
 
 
 def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
-    """The verdicts: by Holm over all checks of chance, by their bounds of the exact ones.
+    """The verdicts on checks: by p-values corrected by Holm, and by the bounds of exact checks.
 
     Args:
-        checks: The checks of a page; p-values of all of them are corrected together.
-        alpha: Probability that any of them is refused although all hold.
+        checks: The checks of a page; their p-values are corrected together.
+        alpha: Probability that any check is refuted although the simulator is correct.
 
     Returns:
         A row per check: its fields, ``p_adjusted`` and ``verdict``, one of ``HOLDS``, ``REFUTED``
@@ -113,10 +113,10 @@ def judge(checks: Sequence[Check], alpha: float = ALPHA) -> pd.DataFrame:
 
 
 def as_text(judged: pd.DataFrame) -> pd.DataFrame:
-    """The table of a page: a row of text per check.
+    """The table on the page: a row of text per check.
 
     Args:
-        judged: As ``judge`` returns it.
+        judged: The result of ``judge``.
     """
     return pd.DataFrame(
         {
@@ -142,10 +142,10 @@ def _reason(row: pd.Series) -> str:
 
 
 def overall(judged: pd.DataFrame) -> str:
-    """What all checks together say, as Markdown.
+    """A summary of all checks, as Markdown.
 
     Args:
-        judged: As ``judge`` returns it.
+        judged: The result of ``judge``.
     """
     refuted, open_tests = (_tests(judged, verdict) for verdict in (REFUTED, INCONCLUSIVE))
     n, exact, chance = len(judged), judged["error"].count(), judged["p"].count()
@@ -157,8 +157,8 @@ def overall(judged: pd.DataFrame) -> str:
     few = f" Too few observations for: {numbers.words(open_tests)}." if open_tests else ""
     alarm = f"any of them fails for at most one seed in {1 / ALPHA:.0f}"
     return (
-        f"{verdict}{few} {exact} are exact. {chance} are of chance, judged at "
-        f"{numbers.level(ALPHA)}: if all is as it should be, {alarm}."
+        f"{verdict}{few} {exact} are exact. {chance} are statistical, judged at a level of "
+        f"{numbers.level(ALPHA)}: if the simulator is correct, {alarm}."
     )
 
 
@@ -166,7 +166,7 @@ def on_topics(judged: pd.DataFrame, *topics: str) -> str:
     """How many checks of some topics hold, and which do not, as Markdown.
 
     Args:
-        judged: As ``judge`` returns it.
+        judged: The result of ``judge``.
         topics: Constants of this module.
     """
     rows = judged[judged["topic"].isin(topics)]

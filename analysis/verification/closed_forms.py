@@ -1,6 +1,7 @@
-"""What is known of a mission without simulating it: the channel, the draws, what intervals cover.
+"""Closed forms of what a simulation estimates: the channel, the draws, the coverage of intervals.
 
-Written from the equations with numpy and scipy; no code of the simulator has a part in it.
+The functions are written from the equations with numpy and scipy; they use no code of the
+simulator.
 """
 
 from typing import Any, NamedTuple
@@ -13,8 +14,8 @@ from dess.scenario import Scenario, ScenarioSpace
 
 World = Scenario | ScenarioSpace
 
-_FAR = 10.0  # standard deviations: no mass beyond, to the last digit
-_MANY = 50  # nodes from which the sum of their initial data is as good as normal
+_FAR = 10.0  # standard deviations; the probability beyond is below the rounding error
+_MANY = 50  # with this many nodes or more, the sum of their initial data is taken as normal
 
 
 class Moments(NamedTuple):
@@ -76,15 +77,15 @@ def initial_total(scenario: World) -> Any:
 
 
 def wilson_coverage(successes: int, missions: int, block: int, level: float = LEVEL) -> float:
-    """How often the Wilson interval of a block holds the share of successes of all missions.
+    """The probability that the Wilson interval of a block contains the share of all missions.
 
-    Exact: the successes in a block of missions that were split at random are hypergeometric.
+    It is exact, since the number of successes in a random block is hypergeometric.
 
     Args:
-        successes: Of all missions.
-        missions: How many there are.
-        block: How many a block has.
-        level: Of the interval.
+        successes: Number of successful missions.
+        missions: Number of all missions.
+        block: Number of missions in a block.
+        level: Confidence level of the interval.
     """
     numbers = np.arange(block + 1)
     ends = [wilson(x, block, level) for x in range(block + 1)]
@@ -93,10 +94,10 @@ def wilson_coverage(successes: int, missions: int, block: int, level: float = LE
 
 
 def t_coverage(missions: int, block: int, level: float = LEVEL) -> float:
-    """How often Student's t interval of a block holds the mean of all missions.
+    """The probability that Student's t interval of a block contains the mean of all missions.
 
-    A little more often than ``level``, since the block is itself a part of all; for values so many
-    that the mean of a block is normal.
+    It is a little above ``level``, because the block is itself a part of all missions. The formula
+    assumes blocks that are large enough for a normally distributed mean.
     """
     end = stats.t.ppf((1 + level) / 2, block - 1) / np.sqrt(1 - block / missions)
     return float(1 - 2 * stats.t.sf(end, block - 1))

@@ -1,4 +1,4 @@
-"""How often the intervals of blocks of missions hold the mean of all missions."""
+"""Coverage: how often the intervals of blocks of missions contain the mean of all missions."""
 
 import numpy as np
 import pandas as pd
@@ -11,12 +11,12 @@ from analysis.verification.checks import COVERAGE, Check
 
 
 def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
-    """Intervals of blocks of missions, and whether each holds the mean of all missions.
+    """Intervals of blocks of missions, and whether each contains the mean of all missions.
 
     Args:
-        values: (n,) a metric of missions; those behind the last whole block are left out.
-        size: Missions of a block.
-        share: Whether the metric is 0 or 1, and has Wilson's interval; Student's t else.
+        values: (n,) a metric of missions; those after the last complete block are left out.
+        size: Number of missions in a block.
+        share: Whether the metric is 0 or 1 and has Wilson's interval, or Student's t otherwise.
 
     Returns:
         A row per block: ``mean``, ``low``, ``high``, ``reference`` (the mean of all missions) and
@@ -31,16 +31,16 @@ def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
 
 
 def coverage_check(metric: str, values: np.ndarray, size: int, share: bool) -> Check:
-    """Compare the share of blocks whose interval holds the mean with the share that should.
+    """Compare the observed coverage of the blocks' intervals with the known coverage.
 
     Args:
-        metric: Its name on the page.
+        metric: The name of the metric on the page.
         values, size, share: As for ``blocks``.
     """
     table = blocks(values, size, share)
     n = len(table)
     test = f"{metric}: intervals of blocks of {size:,} missions"
-    if n < 2 or np.ptp(values) == 0:  # nothing to cover
+    if n < 2 or np.ptp(values) == 0:  # coverage cannot be tested
         return Check(COVERAGE, test, "", "", n)
     missions, hits = n * size, int(table["holds"].sum())
     if share:

@@ -1,7 +1,7 @@
-"""Missions that only the page of the verification needs: simulated before it, kept in a file.
+"""Missions that only the page on verification needs: simulated before the page, kept in a file.
 
-``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and a
-lone UAV with both engines; the page reads them, and simulates nothing::
+``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and
+missions of a single UAV with both engines. The page reads them and simulates nothing::
 
     make("results", results)
     missions = read("results", results)
@@ -26,22 +26,22 @@ from policies import load_team
 
 STUDY = "verification"
 FILE = Path(FOLDER, "missions.json")  # in the folder of all results
-MISSIONS = 50  # of every policy that are simulated again, spread over its replications
+MISSIONS = 50  # missions of every policy to simulate again, spread over its replications
 
-# Called with the steps done and the steps in all.
+# Called with the number of steps done and of all steps.
 Progress = Callable[[int, int], None]
 Fields = dict[str, Any]
 
 
 class CrossCheck(BaseModel):
-    """Missions beside those of a study.
+    """Missions simulated in addition to those of a study.
 
     Attributes:
         study: The key of the study, a hash of all that its records depend on.
         missions: Records by the SimPy engine, each with its ``policy``.
         uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
-        rates: As ``lone_uav.simulate_rates`` returns them.
-        slots: As ``lone_uav.simulate_slots`` returns them.
+        rates: The result of ``lone_uav.simulate_rates``.
+        slots: The result of ``lone_uav.simulate_slots``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -59,8 +59,8 @@ def simulate_missions(
     """Simulate the missions.
 
     Args:
-        results: Of the study.
-        count: Missions of every policy to simulate again; all, if there are fewer.
+        results: The results of the study.
+        count: Missions of every policy to simulate again; all of them if there are fewer.
         progress: Called after every mission.
     """
     space, seed = results.scenario(), results.store.manifest.seed
@@ -83,7 +83,7 @@ def simulate_missions(
 
 
 def _chosen(results: Results, count: int) -> Iterator[tuple[str, int]]:
-    """Policies and replications of missions of the first design point."""
+    """The policies and replications of the missions to simulate again, at the first point."""
     missions = results.missions[results.missions["point"] == 0]
     for policy in results.policies:
         replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
@@ -98,11 +98,11 @@ def _uavs(record: MissionRecord) -> Iterator[Fields]:
 
 
 def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
-    """Simulate the missions and write them, unless those of the results are in the folder.
+    """Simulate the missions and write them, unless they are already in the folder.
 
     Args:
-        folder: Holds a results folder per study.
-        results: Of the study.
+        folder: A folder that contains a results folder per study.
+        results: The results of the study.
         progress: Called after every mission.
 
     Raises:
@@ -115,11 +115,11 @@ def make(folder: str | Path, results: Results, progress: Progress | None = None)
 
 
 def write(missions: CrossCheck, folder: str | Path) -> Path:
-    """Write missions, in place of earlier ones; returns the file.
+    """Write missions, in place of earlier ones, and return the file.
 
     Args:
         missions: The missions.
-        folder: Holds a results folder per study.
+        folder: A folder that contains a results folder per study.
 
     Raises:
         InputError: If it cannot be written.
@@ -136,11 +136,11 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
     """Read missions.
 
     Args:
-        folder: Holds a results folder per study.
-        results: Of the study that the missions must belong to.
+        folder: A folder that contains a results folder per study.
+        results: The results of the study to which the missions must belong.
 
     Raises:
-        InputError: If there are none, or they are damaged or of other results.
+        InputError: If there are none, or they are damaged or belong to other results.
     """
     path = Path(folder) / FILE
     allowed = "allowed: what is made by: dess report verification"
@@ -149,5 +149,5 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
     except (OSError, ValidationError):
         raise InputError(f"{path}: missing or damaged; {allowed}") from None
     if missions.study != results.store.manifest.key:
-        raise InputError(f"{path}: of other results than those of the study; {allowed}")
+        raise InputError(f"{path}: belongs to other results than those of the study; {allowed}")
     return missions

@@ -1,7 +1,6 @@
-"""What missions draw, against the distributions of the scenario: parameters, data, cells, arrivals.
+"""Checks of random draws against the distributions of the scenario: parameters, data, arrivals.
 
-The draws of missions are arrays here, however they were simulated; no rule of the simulator has a
-part in the tests.
+The functions take the draws as arrays, and use no code of the simulator.
 """
 
 from itertools import combinations
@@ -19,18 +18,21 @@ from analysis.verification.checks import ARRIVALS, DRAWS, Check
 from analysis.verification.fits import LEAST, Fit, chi_square, poisson_fit, uniform_fit
 from dess.scenario import SAMPLED, ScenarioSpace
 
-_FEWEST = 30  # values from which their sum counts as normal
+_FEWEST = 30  # with this many values or more, their sum is taken as normal
 
 
 def arrival_fits(counts: np.ndarray, rate: float) -> list[tuple[str, Fit, float]]:
-    """Counts per node and slot, per slot, and per node over many slots: name, fit and mean.
+    """Fits of counts per node and slot, per slot, and per node over many slots.
 
-    Whether a mission has a slot depends on the slots before it alone, so the slots of missions one
-    after another are as good as those of one long mission.
+    Whether a mission has another slot depends only on the slots before it. Therefore the slots of
+    several missions, one after another, can be treated like those of one long mission.
 
     Args:
         counts: (T, K) data units that arrived, by mission slot and node.
-        rate: Mean of each (lambda); without arrivals there is nothing to fit.
+        rate: Mean of each count (lambda). Without arrivals there is nothing to fit.
+
+    Returns:
+        For each kind of count its name, the fit and the expected mean.
     """
     if not rate:
         return []
@@ -46,7 +48,7 @@ def arrival_fits(counts: np.ndarray, rate: float) -> list[tuple[str, Fit, float]
 
 
 def arrival_checks(counts: np.ndarray, rate: float) -> list[Check]:
-    """Counts per mission slot and node against independent Poisson variables.
+    """Compare counts per mission slot and node with independent Poisson variables.
 
     Args:
         counts, rate: As for ``arrival_fits``.
@@ -69,7 +71,7 @@ def arrival_checks(counts: np.ndarray, rate: float) -> list[Check]:
 
 
 def _rates_check(counts: np.ndarray, rate: float) -> Check:
-    """The totals of the nodes: each has the known rate."""
+    """Check that the total of each node has the known rate."""
     slots, nodes = counts.shape
     expected, totals = slots * rate, counts.sum(0)
     p = chi_square(totals, np.full(nodes, expected), nodes) if expected >= LEAST else None
@@ -80,7 +82,7 @@ def _rates_check(counts: np.ndarray, rate: float) -> Check:
 
 
 def _dispersion_check(totals: np.ndarray) -> Check:
-    """Variance over mean of the counts per slot; its moments are those given their sum."""
+    """Check the variance / mean of the counts per slot, by its moments conditional on the sum."""
     test, n, units = "Index of dispersion per slot", totals.size, int(totals.sum())
     if n < _FEWEST or units < _FEWEST:
         return Check(ARRIVALS, test, "1", "", n)
@@ -90,7 +92,7 @@ def _dispersion_check(totals: np.ndarray) -> Check:
 
 
 def _lag_check(totals: np.ndarray, mean: float) -> Check:
-    """Correlation of the counts of a slot and the next."""
+    """Check that the counts of successive slots are uncorrelated."""
     test, n = "Correlation of a slot and the next", totals.size - 1
     if n < _FEWEST:
         return Check(ARRIVALS, test, "0", "", max(n, 0))
@@ -99,7 +101,7 @@ def _lag_check(totals: np.ndarray, mean: float) -> Check:
 
 
 def arrived_check(missions: pd.DataFrame, space: ScenarioSpace) -> Check:
-    """All that arrived in all missions, against lambda per node and slot of their length."""
+    """Compare the arrivals of all missions with lambda per node and mission slot."""
     slots = int(missions["slots"].sum()) * len(space.nodes)
     test, rate = "Arrivals of all missions: rate per node and slot", space.arrival_rate
     mean = float(missions["arrived"].sum() / slots)
@@ -109,7 +111,7 @@ def arrived_check(missions: pd.DataFrame, space: ScenarioSpace) -> Check:
 
 
 def parameter_fits(missions: pd.DataFrame, space: ScenarioSpace) -> dict[str, Fit]:
-    """The drawn parameters of missions against their uniform distributions, by field."""
+    """Fits of the drawn parameters of missions to uniform distributions, by field."""
     ranges = {field: getattr(space, field) for field in SAMPLED}
     return {
         field: uniform_fit(missions[field].to_numpy(), low, high)
@@ -119,7 +121,7 @@ def parameter_fits(missions: pd.DataFrame, space: ScenarioSpace) -> dict[str, Fi
 
 
 def parameter_checks(missions: pd.DataFrame, space: ScenarioSpace) -> list[Check]:
-    """The drawn parameters: each uniform, all independent of each other."""
+    """Check that the drawn parameters are uniform and independent of each other."""
     fits, n = parameter_fits(missions, space), len(missions)
     checks = []
     for field, fit in fits.items():
@@ -130,7 +132,7 @@ def parameter_checks(missions: pd.DataFrame, space: ScenarioSpace) -> list[Check
 
 
 def _independence_checks(values: pd.DataFrame) -> list[Check]:
-    """The correlations of all pairs together; those of independent columns are independent."""
+    """Check that all pairs of columns are uncorrelated, by one test for all pairs."""
     pairs, n = [*combinations(values, 2)], len(values)
     if not pairs or n < _FEWEST:
         return []
@@ -142,12 +144,12 @@ def _independence_checks(values: pd.DataFrame) -> list[Check]:
 
 
 def initial_checks(starts: np.ndarray, totals: np.ndarray, space: ScenarioSpace) -> list[Check]:
-    """The initial data per node, and their sums per mission.
+    """Check the distributions of the initial data per node and of their sum per mission.
 
     Args:
         starts: (N, K) initial data of missions [data units], by node.
-        totals: (M,) initial data of missions.
-        space: What they are drawn from.
+        totals: (M,) initial data of missions [data units].
+        space: The scenario space from which they are drawn.
     """
     low, high = space.initial_data
     if low == high:
@@ -173,16 +175,16 @@ def _distribution_check(per: str, values: np.ndarray, law: Any, known: str) -> C
 
 
 def start_check(cells: np.ndarray, space: ScenarioSpace) -> Check:
-    """The start cell of the first UAV, uniform over the zone.
+    """Check that the start cell of the first UAV is uniform over the zone.
 
     Args:
         cells: (N, 2) start cells.
-        space: What they are drawn from.
+        space: The scenario space from which they are drawn.
     """
     x, y, width, height = space.zone
     offset = np.reshape(cells, (-1, 2)) - [x, y]
     in_zone = ((offset >= 0) & (offset < [width, height])).all(1)
-    number = np.where(in_zone, offset @ [1, width], -1)  # a cell beside the zone is none of it
+    number = np.where(in_zone, offset @ [1, width], -1)  # -1 for a cell outside the zone
     fit = uniform_fit(number, 0, width * height - 1)
     test, known = "Start cell of the first UAV: chi-square", f"uniform on {width * height} cells"
     return Check(DRAWS, test, known, fit.range, len(cells), fit.p)

@@ -1,4 +1,4 @@
-"""Observed numbers against those that a distribution lets expect, by the chi-square test."""
+"""Chi-square tests of observed counts against the counts that a distribution predicts."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,15 +7,15 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-LEAST = 5.0  # expected observations of a class, for the chi-square distribution to be good
+LEAST = 5.0  # expected observations that each class needs for the chi-square test to be accurate
 
 
 class Fit(NamedTuple):
-    """Observed against expected numbers.
+    """Observed and expected numbers of observations.
 
     Attributes:
         table: A row per class: ``label``, ``observed``, ``expected``.
-        p: Of the chi-square test; none if there are too few observations for two classes.
+        p: The p-value of the chi-square test; None if the observations are too few for two classes.
     """
 
     table: pd.DataFrame
@@ -28,7 +28,7 @@ class Fit(NamedTuple):
 
     @property
     def shares(self) -> str:
-        """The shares of the first classes, observed and expected, as far as a line holds them."""
+        """The observed and expected shares of the first classes, as many as fit on a line."""
         if not self.n:
             return ""
         rows, percent = self.table.head(3), 100 / self.n
@@ -38,17 +38,17 @@ class Fit(NamedTuple):
 
     @property
     def range(self) -> str:
-        """How often the rarest and the most frequent class were observed."""
+        """The numbers of observations of the rarest and the most frequent class, in words."""
         counts = self.table["observed"]
         return f"each {counts.min():,} to {counts.max():,} times"
 
 
 def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
-    """Counts against a Poisson distribution; rare counts are pooled at either end.
+    """Compare counts with a Poisson distribution; rare counts at both ends are pooled.
 
     Args:
-        counts: Numbers of any shape.
-        mean: Of the distribution, above 0.
+        counts: An array of counts, of any shape.
+        mean: Mean of the distribution, above 0.
     """
     n, law = counts.size, stats.poisson(mean)
     numbers = np.arange(int(law.ppf(1 - 1e-12)) + 1)
@@ -69,9 +69,9 @@ def poisson_fit(counts: np.ndarray, mean: float) -> Fit:
 
 
 def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
-    """Integers against the uniform distribution on ``low..high``, ends included.
+    """Compare integers with the uniform distribution on ``low..high``, both included.
 
-    A value outside has probability 0, so has the fit then.
+    A value outside has probability 0, so the p-value of the fit is 0 then.
     """
     classes = np.arange(low, high + 1)
     observed = (np.asarray(values)[:, None] == classes).sum(0)
@@ -80,7 +80,7 @@ def uniform_fit(values: np.ndarray, low: int, high: int) -> Fit:
 
 
 def chi_square(observed: np.ndarray, expected: np.ndarray, freedom: int) -> float:
-    """The p-value of numbers against those expected, by Pearson's chi-square statistic."""
+    """The p-value of observed and expected numbers by Pearson's chi-square statistic."""
     return float(stats.chi2.sf(((observed - expected) ** 2 / expected).sum(), freedom))
 
 

@@ -1,4 +1,4 @@
-"""Missions whose event logs a study has kept, as arrays per mission slot and node."""
+"""Missions whose event logs a study has stored, as arrays per mission slot and node."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A mission whose event log is kept.
+    """A mission whose event log is stored.
 
     Attributes:
         policy: The team.
-        scenario: The parameters that its replication drew.
-        mission: Its record.
+        scenario: The scenario with the parameters that the mission drew.
+        mission: The record of the mission.
         uavs: The records of its UAVs.
-        events: Its event log.
+        events: The event log.
     """
 
     policy: str
@@ -32,7 +32,7 @@ class Log:
 
     @property
     def replication(self) -> int:
-        """The number of its replication."""
+        """The replication of the mission."""
         return int(self.mission["replication"])
 
     @cached_property
@@ -52,7 +52,7 @@ class Log:
 
     @cached_property
     def first_cell(self) -> np.ndarray:
-        """(2,) the cell at which the first UAV starts."""
+        """(2,) the cell in which the first UAV starts."""
         rows = self.events[(self.events["event"] == "mission_start") & (self.events["uav"] == 0)]
         return rows[["x", "y"]].to_numpy(int)[0]
 
@@ -67,7 +67,7 @@ class Log:
 
     @cached_property
     def residuals(self) -> np.ndarray:
-        """(E, K) residual data before every event, added up in the order of the log."""
+        """(E, K) residual data before every event, summed in the order of the log."""
         flows = np.zeros((len(self.events) + 1, len(self.scenario.nodes)))
         flows[0] = self.initial
         sign = self.events["event"].map({"arrival": 1.0, "communication": -1.0}).fillna(0.0)
@@ -82,7 +82,7 @@ class Log:
 
 
 def logs_of(results: Results) -> list[Log]:
-    """The missions of the first design point whose logs a study has kept."""
+    """The missions of the first design point whose logs a study has stored."""
     logs = []
     space, replications = results.scenario(), range(results.manifest["study"]["logged"])
     missions, uavs = (
@@ -102,7 +102,7 @@ def logs_of(results: Results) -> list[Log]:
 
 
 def longest(logs: Sequence[Log]) -> list[Log]:
-    """Of every replication the log that lasts longest: policies share all that arrives in it."""
+    """The longest log of every replication; all policies meet the same arrivals in it."""
     by_replication: dict[int, Log] = {}
     for log in logs:
         other = by_replication.setdefault(log.replication, log)
@@ -112,6 +112,6 @@ def longest(logs: Sequence[Log]) -> list[Log]:
 
 
 def arrivals(logs: Sequence[Log], space: ScenarioSpace) -> np.ndarray:
-    """(T, K) data units that arrived in missions one after another, by mission slot and node."""
+    """(T, K) data units that arrived, by slot and node; missions follow one after another."""
     none = np.zeros((0, len(space.nodes)), int)
     return np.concatenate([none, *(log.arrivals for log in logs)])

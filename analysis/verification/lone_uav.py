@@ -1,7 +1,8 @@
-"""A lone UAV that hovers within reach of a single node: the channel without anybody's choice.
+"""A single UAV that hovers near a single node, to observe the channel without selection.
 
-In a mission UAVs serve the node that they hear best, so what they collect is no fair sample of
-the channel. Here there is nothing to choose, and a communication slot is one draw of the rate::
+In a mission, UAVs serve the node with the highest SNR, so the data that they collect are not a
+random sample of the channel. With one node there is no choice, and the data of every communication
+slot are one random draw of the rate::
 
     means = simulate_rates(space, seed)  # by the batch engine
     rates(space, means)  # beside the closed form
@@ -19,10 +20,10 @@ from dess.scenario import ScenarioSpace
 from dess.state import HOVER
 from dess.view import View
 
-MISSIONS, SLOTS = 200, 100  # per distance, by the batch engine
-LONG = 5000  # mission slots of the mission by the SimPy engine
+MISSIONS, SLOTS = 200, 100  # missions per distance and slots per mission, with the batch engine
+LONG = 5000  # mission slots of the mission with the SimPy engine
 
-_PLENTY = 1e9  # data units: more than anybody takes
+_PLENTY = 1e9  # data units at the node, more than the UAV can collect
 
 
 class Hovering:
@@ -31,14 +32,14 @@ class Hovering:
     name = "hovering"
 
     def act(self, view: View) -> np.ndarray:
-        """(R,) hovering."""
+        """Choose Hover for all R rows."""
         return np.full(len(view.uav), HOVER)
 
 
 def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
-    """The channel of a scenario, with one UAV and one node ``dx, dy`` cells away.
+    """A scenario with the same channel, one UAV and one node ``dx, dy`` cells away.
 
-    The mission lasts that many slots: the battery does not decrease, and the node is never empty.
+    The mission lasts ``slots`` slots. The battery does not decrease, and the node is never empty.
     """
     still: dict[str, Any] = {"uavs": 1, "flying_time": 100, "flight_cost": 0, "pads": None}
     place: dict[str, Any] = {"zone": (0, 0, 1, 1), "nodes": ((dx, dy),)}
@@ -48,15 +49,15 @@ def alone(space: ScenarioSpace, dx: int, dy: int, slots: int) -> ScenarioSpace:
 
 
 def offsets(space: ScenarioSpace) -> list[tuple[int, int]]:
-    """Offsets of the node from the UAV [cells]: none, ever greater, and across the grid."""
+    """Offsets of the node from the UAV [cells], from none up to the whole grid."""
     along = [0, *(2**k for k in range(8) if 2**k < space.grid)]
     return [*((d, 0) for d in along), (space.grid - 1, space.grid - 1)]
 
 
 def simulate_rates(space: ScenarioSpace, seed: int) -> list[float]:
-    """Mean rates at all offsets by the batch engine [data units per communication slot].
+    """Mean rates at all offsets with the batch engine [data units per communication slot].
 
-    Every offset has replications of its own: otherwise all would have the same shadowing.
+    Every offset has its own replications, because the same replications have the same shadowing.
     """
     means = []
     for number, (dx, dy) in enumerate(offsets(space)):
@@ -68,7 +69,7 @@ def simulate_rates(space: ScenarioSpace, seed: int) -> list[float]:
 
 
 def simulate_slots(space: ScenarioSpace, seed: int, slots: int = LONG) -> list[float]:
-    """Data of every communication slot of a mission by the SimPy engine [data units]."""
+    """Data of every communication slot of a mission with the SimPy engine [data units]."""
     scenario = alone(space, space.grid // 2, 0, slots)
     log = simulate(scenario, Hovering(), seed, len(offsets(space)) * MISSIONS, events=True).events
     assert log is not None
@@ -77,7 +78,7 @@ def simulate_slots(space: ScenarioSpace, seed: int, slots: int = LONG) -> list[f
 
 
 def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
-    """The rates of ``simulate_rates`` beside those of the closed form.
+    """The rates of ``simulate_rates`` together with those of the closed form.
 
     Returns:
         A row per distance: ``distance`` [m], ``n`` communication slots, ``mean`` [data units per
@@ -93,9 +94,10 @@ def rates(space: ScenarioSpace, means: Sequence[float]) -> pd.DataFrame:
 
 
 def deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
-    """Shadowing behind the data of ``simulate_slots``, in standard deviations.
+    """The shadowing in the data of ``simulate_slots``, in standard deviations.
 
-    The data of a communication slot give its SNR (eq. 9), and that its shadowing (eq. 10).
+    The SNR follows from the data of a communication slot (eq. 9), the shadowing from the SNR
+    (eq. 10).
     """
     distance = closed_forms.distance(space, space.grid // 2, 0)
     snr = closed_forms.snr_of(space, np.array(collected))
@@ -103,5 +105,5 @@ def deviates(space: ScenarioSpace, collected: Sequence[float]) -> np.ndarray:
 
 
 def _draws(space: ScenarioSpace) -> int:
-    """Communication slots per distance."""
+    """The number of communication slots per distance."""
     return MISSIONS * SLOTS * space.communication_slots

@@ -1,4 +1,4 @@
-"""Records: equal to their logs, and by both engines; realisations: the same for all policies."""
+"""Checks that records agree with event logs, engines with each other, and policies share draws."""
 
 from collections.abc import Sequence
 
@@ -14,14 +14,14 @@ from dess.scenario import SAMPLED
 
 
 def record_check(logs: Sequence[Log]) -> Check:
-    """The records of the missions whose logs are kept, added up from their logs."""
+    """Check that the event logs add up to the records of their missions."""
     wrong = sum(not (_mission_agrees(log) and _uavs_agree(log)) for log in logs)
     test = "Record of a mission against its log"
     return Check.counted(RECORDS, test, "the same", wrong, len(logs))
 
 
 def _mission_agrees(log: Log) -> bool:
-    """Whether the record of a mission is what its log adds up to."""
+    """Whether the log of a mission adds up to its record."""
     value = log.events.groupby("event")["value"].sum()
     filled = log.events.loc[log.events["event"] == "quota_filled", "uav"]
     whole = {
@@ -41,7 +41,7 @@ def _mission_agrees(log: Log) -> bool:
 
 
 def _uavs_agree(log: Log) -> bool:
-    """Whether the records of the UAVs of a mission are what its log adds up to."""
+    """Whether the log of a mission adds up to the records of its UAVs."""
     events, records = log.events, log.uavs.set_index("uav")
     fleet = records.index
     communication = events[events["event"] == "communication"].groupby("uav")["value"]
@@ -59,7 +59,7 @@ def _uavs_agree(log: Log) -> bool:
 
 
 def realisation_checks(results: Results, logs: Sequence[Log]) -> list[Check]:
-    """What policies share: every replication gives all of them the same draws."""
+    """Check that all policies meet the same random draws in every replication."""
     if len(results.policies) < 2:
         return []
     drawn = results.missions.groupby(["point", "replication"])[[*SAMPLED, "initial"]].nunique()
@@ -84,11 +84,11 @@ def _same_realisation(log: Log, other: Log) -> bool:
 
 
 def engine_check(results: Results, again: CrossCheck) -> Check:
-    """Missions of a study simulated again with the SimPy engine, compared bit for bit.
+    """Compare missions of a study, bit for bit, with the same missions by the SimPy engine.
 
     Args:
-        results: Of a study that the batch engine simulated.
-        again: Its missions by the SimPy engine.
+        results: The results of a study that the batch engine simulated.
+        again: The same missions, simulated with the SimPy engine.
     """
     differing = {
         *_differing(results.missions, pd.DataFrame(again.missions), []),
@@ -101,7 +101,7 @@ def engine_check(results: Results, again: CrossCheck) -> Check:
 
 
 def _differing(kept: pd.DataFrame, again: pd.DataFrame, keys: list[str]) -> set[tuple[str, int]]:
-    """The missions, by policy and replication, of which rows are not equal in every field."""
+    """The missions (policy and replication) whose rows differ in any field."""
     mission = ["policy", "replication"]
     rows = again[[*mission, *keys]].merge(kept[kept["point"] == 0], "left", [*mission, *keys])
     equal = (rows[[*again]].to_numpy(object) == again.to_numpy(object)).all(axis=1)

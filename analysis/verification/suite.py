@@ -26,11 +26,11 @@ from dess.scenario import ScenarioSpace
 
 @dataclass(frozen=True)
 class Suite:
-    """Results of the study of the verification, and of all studies beside it.
+    """The results of the study ``verification`` and of all other studies in the same folder.
 
     Attributes:
-        study: The study of the verification.
-        others: The other studies, by their names.
+        study: The results of the study ``verification``.
+        others: The results of the other studies, by name.
         damaged: The names of the studies that cannot be loaded.
         again: Missions that ``dess report`` has simulated for this page.
     """
@@ -42,7 +42,7 @@ class Suite:
 
     @classmethod
     def load(cls, folder: str | Path) -> Self:
-        """Load a folder that holds a results folder per study.
+        """Load a folder that contains a results folder per study.
 
         Raises:
             InputError: If the study or its cross-check is missing or damaged.
@@ -58,7 +58,7 @@ class Suite:
 
     @property
     def names(self) -> str:
-        """The studies in words, those that cannot be loaded too."""
+        """The names of the studies in words, including those that cannot be loaded."""
         unread = f" (not read, incomplete or of other code: {words(self.damaged)})"
         return words([f"`{name}`" for name in self.studies]) + (unread if self.damaged else "")
 
@@ -74,12 +74,12 @@ class Suite:
 
     @cached_property
     def realisations(self) -> list[Log]:
-        """A mission with an event log per replication, since policies share what is drawn."""
+        """One mission with an event log per replication, since policies share the draws."""
         return event_logs.longest(self.logs)
 
     @cached_property
     def missions(self) -> pd.DataFrame:
-        """The missions of one policy, since policies share what is drawn."""
+        """The missions of one policy, since policies share the draws."""
         return self._missions_of(self.study.policies[0])
 
     @cached_property
@@ -94,7 +94,7 @@ class Suite:
 
     @cached_property
     def rates(self) -> pd.DataFrame:
-        """The rates of a lone UAV, as ``lone_uav.rates`` returns them."""
+        """The rates of a single UAV, as ``lone_uav.rates`` returns them."""
         return lone_uav.rates(self.space, self.again.rates)
 
     def values(self, metric: str) -> np.ndarray:
@@ -113,7 +113,7 @@ class Suite:
         """All checks.
 
         Args:
-            block: Missions of a block whose interval is compared with the mean of all missions.
+            block: Number of missions in a block, for the checks of coverage.
         """
         space, seed, logs = self.space, self.study.store.manifest.seed, self.logs
         initial = np.array([log.initial for log in self.realisations])

@@ -50,7 +50,9 @@ def named(name: str, topic: str = "one", **values: float) -> Check:
 
 def test_the_words_of_checks_that_all_hold() -> None:
     table = judge([named("a", error=0.0), named("b", topic="two", p=0.5)])
-    assert overall(table).startswith("**2 of 2 checks hold**. 1 are exact. 1 are of chance, judged")
+    assert overall(table).startswith(
+        "**2 of 2 checks hold**. 1 are exact. 1 are statistical, judged"
+    )
     assert overall(table).endswith("one seed in 100.")
     assert on_topics(table, "two") == "**1 of 1 checks hold**."
 
