@@ -1,9 +1,10 @@
-"""A study as a research object: an RO-Crate that holds what it takes to judge and to repeat it.
+"""A study as a research object: an RO-Crate with all that is needed to judge and repeat the study.
 
-A zip with the results folder, its page, the study and its scenario as TOML files, and
-``ro-crate-metadata.json``, which says what each of them is, which code made it, and under which
-licence it may be used (RO-Crate 1.1, https://www.researchobject.org/ro-crate/specification/1.1/).
-In the unpacked folder ``dess study run study.toml --out results`` finds that all is there.
+The crate is a zip file with the results folder, its page, the study and its scenario as TOML files,
+and ``ro-crate-metadata.json``. The last file says what each of the others is, which code made it,
+and under which licence it may be used (RO-Crate 1.1,
+https://www.researchobject.org/ro-crate/specification/1.1/). In the unpacked folder, the command
+``dess study run study.toml --out results`` finds that all missions are present.
 """
 
 from collections.abc import Mapping
@@ -33,11 +34,11 @@ RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
 _SPDX = "https://spdx.org/licenses/"
 _PARQUET = "application/vnd.apache.parquet"
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the first time that a zip can have
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip file can store
 _TABLES = {
-    "missions": "A row per mission: its record.",
-    "uavs": "A row per UAV of every mission: its record.",
-    "events": "The event logs that the study keeps.",
+    "missions": "The records of the missions, a row per mission.",
+    "uavs": "The records of the UAVs, a row per UAV of every mission.",
+    "events": "The event logs that the study stores.",
 }
 
 
@@ -45,11 +46,11 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     """Write a study as a zipped RO-Crate; equal arguments give equal bytes.
 
     Args:
-        results: Of the study.
-        page: Its page.
-        path: Of the zip.
+        results: The results of the study.
+        page: The page of the results.
+        path: The zip file to write.
         published: The date of the publication.
-        licence: Of the results, an identifier of SPDX (https://spdx.org/licenses).
+        licence: The licence of the results, an SPDX identifier (https://spdx.org/licenses).
 
     Raises:
         InputError: If there is no such licence, or a file of the results is damaged.
@@ -75,10 +76,10 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
 
 
 def check_page(page: Path, results: Results) -> None:
-    """Refuse a file that is not the page of the results, as ``dess report`` wrote it.
+    """Refuse a file that is not the page of the results as ``dess report`` wrote it.
 
     Raises:
-        InputError: If it is none, shows other results, or has been altered.
+        InputError: If the file is not a page, shows other results, or has been changed.
     """
     allowed = (
         f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
@@ -93,7 +94,7 @@ def check_page(page: Path, results: Results) -> None:
 
 
 def licence_of(text: str) -> str:
-    """The identifier of a licence as SPDX writes it.
+    """The identifier of a licence, in the spelling of SPDX.
 
     Raises:
         InputError: If there is no such licence.
@@ -111,22 +112,23 @@ def licence_of(text: str) -> str:
 
 
 def study_files(manifest: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What the TOML files of a study and of its scenario hold.
+    """The contents of the TOML files of a study and of its scenario.
 
     Args:
-        manifest: Of the results, as plain data.
+        manifest: The manifest of the results, as plain data.
 
     Returns:
-        The study, whose scenario is the file ``scenario.toml`` beside it, and that scenario.
+        The study, whose scenario is the file ``scenario.toml`` in the same folder, and the
+        scenario.
     """
     study, scenario = _without_none(manifest["study"]), _without_none(manifest["scenario"])
     if study.keys() & {"precision", "selection"}:
-        del study["missions"]  # which the rule decides
+        del study["missions"]  # because the rule decides the number
     return study | {"scenario": SCENARIO}, scenario
 
 
 def _without_none(value: Any) -> Any:
-    """Data without the fields that are None, which TOML has not."""
+    """The data without fields that are None, which TOML cannot represent."""
     if isinstance(value, Mapping):
         return {key: _without_none(item) for key, item in value.items() if item is not None}
     return [_without_none(item) for item in value] if isinstance(value, list) else value
@@ -188,11 +190,11 @@ def _homepage(library: str) -> str:
 
 
 def _tables(crate: ROCrate, results: Results) -> Dataset:
-    """The results folder, without what a run may leave beside the results."""
+    """Add the results folder, without other files that a run may leave in it."""
     folder = results.store.folder
     about = {"name": "Results", "description": "A results folder, as dess study show reads it."}
     tables = crate.add_dataset(dest_path=f"{RESULTS}/", properties=about)
-    manifest = "What the results are about, and what they were made with."
+    manifest = "The manifest: the study, and what the results were made with."
     parts = [_file(crate, folder / MANIFEST, f"{RESULTS}/{MANIFEST}", manifest, "application/json")]
     for name, description in _TABLES.items():
         about = {"name": name, "description": description, "encodingFormat": _PARQUET}
@@ -225,13 +227,13 @@ def _action(
     used: list[File] | Dataset,
     made: File | Dataset,
 ) -> ContextEntity:
-    """A command that has made a part of the crate, for the unpacked crate."""
+    """Add a command that makes a part of the crate, to be run in the unpacked folder."""
     about = {"name": command, "description": f"In the unpacked folder: {command}"}
     return crate.add_action(software, f"#{name}", used, made, about)
 
 
 def _zip(folder: Path, path: Path) -> None:
-    """Zip a folder; the bytes depend on nothing but its files."""
+    """Zip a folder; the bytes depend only on its files."""
     with ZipFile(path, "w", ZIP_DEFLATED) as archive:
         for part in sorted(folder.rglob("*")):
             name = part.relative_to(folder).as_posix()

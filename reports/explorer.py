@@ -1,7 +1,8 @@
-"""The explorer: a slider per field of a grid, and the metrics of every policy beside each other.
+"""The explorer: a slider for each field of a grid, and the metrics of every policy.
 
-It shows the estimates of ``questions.summary.means``, a design point at a time. A page holds it
-once. It needs a browser's JavaScript and nothing else; without that, it shows the middle setting.
+It shows the estimates of ``questions.summary.means`` for one design point at a time. A page can
+contain one explorer. It needs only a browser with JavaScript; without JavaScript it shows the
+middle setting.
 
     explorer(load_results("results/explorer"))
 """
@@ -32,17 +33,17 @@ class Slider(NamedTuple):
 
     @property
     def start(self) -> int:
-        """The place of the value in the middle, which is shown at first."""
+        """The position of the middle value, which is shown first."""
         return len(self.values) // 2
 
     @property
     def parameter(self) -> names.Parameter:
-        """What the field is called, and its unit."""
+        """The name of the field and its unit."""
         return names.parameter(self.field)
 
     @property
     def texts(self) -> list[str]:
-        """The values in words."""
+        """The values as text."""
         return [names.value_text(value) for value in self.values]
 
 
@@ -50,7 +51,7 @@ class Grid:
     """The means of a study whose design points are all combinations of some values.
 
     Attributes:
-        results: Of the study.
+        results: The results of the study.
         sliders: The fields with two values or more.
     """
 
@@ -58,7 +59,7 @@ class Grid:
         """Find the fields of a grid.
 
         Raises:
-            InputError: If the study is no full grid of two fields or more.
+            InputError: If the study is not a full grid of two fields or more.
         """
         self.results = results
         self.sliders = [Slider(field, values) for field, values in varied(results).items()]
@@ -69,8 +70,8 @@ class Grid:
         if len(places) < 2 or not len(table) == len(table.drop_duplicates()) == settings:
             study = results.manifest["study"]["name"]
             raise InputError(
-                f"explorer: {study} is no full grid of two fields or more; allowed: a study with "
-                'kind = "grid"'
+                f"explorer: {study} is not a full grid of two fields or more; "
+                'allowed: a study with kind = "grid"'
             )
 
     @property
@@ -83,7 +84,7 @@ class Grid:
     def means(self) -> pd.DataFrame:
         """The means of the paper's metrics, by design point, policy and metric.
 
-        Design points are in the order of the sliders, of which the last one moves first.
+        Design points are in the order of the sliders; the value of the last slider varies fastest.
         """
         table = summary.means(self.results)
         table = table[table["metric"].isin([*names.METRICS])]
@@ -101,7 +102,7 @@ class Grid:
         ]
 
     def settings(self, field: str) -> list[str]:
-        """How ``--set`` has the values of a field: ``initial_data=[5, 7.5]``."""
+        """The values of a field in the form of ``--set``, such as ``initial_data=[5, 7.5]``."""
         first = self._places.reset_index().groupby(field)["index"].first()
         design = self.results.store.manifest.points
         return [f"{field}={json.dumps(design[point].values[field])}" for point in first]
@@ -111,10 +112,10 @@ def explorer(results: Results) -> HTML:
     """Sliders, a choice of policies, the three metrics of each, and a curve along a slider.
 
     Args:
-        results: Of a study whose design is a grid.
+        results: The results of a study whose design is a grid.
 
     Raises:
-        InputError: If the design is no full grid.
+        InputError: If the design is not a full grid.
     """
     grid = Grid(results)
     colours = style.policy_colours(results.policies)
@@ -129,10 +130,10 @@ def explorer(results: Results) -> HTML:
 
 
 def _data(grid: Grid) -> dict[str, Any]:
-    """What the script of the page reads: the sliders, and the estimates of every design point.
+    """The data for the script of the page: the sliders, and the estimates of every design point.
 
-    An estimate is its mean and the ends of its interval in tenths of a percent, and its number of
-    missions. They are in the order of ``Grid.means``.
+    An estimate has its mean and the ends of its interval, in tenths of a percent, and its number of
+    missions. The estimates are in the order of ``Grid.means``.
     """
     columns = ["mean", "low", "high", "n"]
     estimates = [
@@ -153,5 +154,5 @@ def _data(grid: Grid) -> dict[str, Any]:
 
 
 def _tenths(share: float) -> int:
-    """A share in tenths of a percent, as ``numbers.percent`` rounds it."""
+    """A share in tenths of a percent, rounded like ``numbers.percent``."""
     return round(10 * float(f"{100 * share:.1f}"))

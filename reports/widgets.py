@@ -1,4 +1,4 @@
-"""Sliders for Jupyter: a what-if question is set, simulated and answered in a panel.
+"""A panel of sliders for Jupyter, in which a what-if question is set, simulated and answered.
 
 what_if_panel("paper", ["ddqn", "greedy"], settings={"uavs": 5}, baseline={"uavs": 3})
 """
@@ -20,12 +20,12 @@ from analysis.sweeps.what_if import WhatIf, what_if
 from dess import InputError, ScenarioSpace, load_scenario
 from reports.pages import html
 
-# Fields that have sliders, unless others are asked for.
+# The fields that have sliders by default.
 FIELDS = (
     *("uavs", "pads", "flying_time", "charge_start", "charge_complete"),
     *("initial_data", "arrival_rate", "quota"),
 )
-STEPS = 100  # of a slider of numbers that are not whole, at least
+STEPS = 100  # smallest number of steps of a slider for numbers that are not integers
 
 Fields = Mapping[str, Any]
 
@@ -34,14 +34,15 @@ class WhatIfPanel(widgets.VBox):
     """A panel that asks a what-if question and shows the answer.
 
     Attributes:
-        baseline: Field -> its slider in the baseline; one of a range has two handles.
-        variation: The same of the variation; one that stands like that of the baseline follows it.
-        policies: Policy -> its checkbox.
+        baseline: For each field its slider in the baseline; a slider for a range has two handles.
+        variation: For each field its slider in the variation. As long as it has the same value as
+            the slider in the baseline, it follows that slider.
+        policies: For each policy its checkbox.
         missions: The number of missions of each policy, in the baseline and in the variation.
-        more: The fields that have no slider; the one that is chosen gets its sliders.
-        button: Simulates.
-        progress: How many of the missions are done.
-        output: The answer, or why there is none, as HTML.
+        more: A list of the fields without sliders; choosing a field adds its sliders.
+        button: The button that starts the simulation.
+        progress: The number of missions that are done.
+        output: The answer, or the reason why there is none, as HTML.
     """
 
     def __init__(
@@ -57,10 +58,11 @@ class WhatIfPanel(widgets.VBox):
         Args:
             sides: The scenario of the baseline and of the variation.
             fields: The fields that have sliders.
-            chosen: The policies that are chosen at first.
-            missions: The number of missions at first.
-            ask: Asks, with the values of the sliders of the baseline and of the variation, the
-                chosen policies, the missions, and what counts missions that are done.
+            chosen: The policies that are chosen at the beginning.
+            missions: The number of missions at the beginning.
+            ask: The function that simulates. It takes the values of the sliders of the baseline and
+                of the variation, the chosen policies, the number of missions, and a function that
+                counts finished missions.
         """
         self._sides, self._ask = sides, ask
         self.baseline: dict[str, widgets.Widget] = {}
@@ -85,7 +87,7 @@ class WhatIfPanel(widgets.VBox):
         """Add the sliders of a field.
 
         Raises:
-            InputError: If it holds no numbers.
+            InputError: If the field does not hold numbers.
         """
         before, after = (_slider(self._sides, side, field) for side in (0, 1))
         before.observe(_following(after), "value")
@@ -101,7 +103,7 @@ class WhatIfPanel(widgets.VBox):
             self.add(change.new)
 
     def simulate(self) -> None:
-        """Ask what the sliders say, and show the answer."""
+        """Simulate the question that the sliders describe, and show the answer."""
         teams = [team for team, box in self.policies.items() if box.value]
         self.button.disabled, self.output.value = True, ""
         self.progress.value, self.progress.max = 0, 2 * len(teams) * self.missions.value
@@ -136,19 +138,19 @@ def what_if_panel(
 ) -> WhatIfPanel:
     """A panel with sliders for fields of a scenario, in a baseline and in a variation of it.
 
-    What stands where the scenario has it is not set. The missions are kept, as of
+    A field whose slider has the value of the scenario is not set. The missions are stored as by
     ``analysis.what_if``.
 
     Args:
-        scenario: A shipped scenario, or a TOML file.
-        policies: Those that are chosen at first.
-        settings: Fields that the variation sets, where its sliders stand at first. A field without
-            a slider stays so.
-        baseline: The same of the baseline, and of the variation where ``settings`` has no other.
-        folder: Where results are kept.
-        missions: The number of missions at first.
-        seed: Of the missions.
-        fields: The fields that have sliders at first; each holds a number, or a range of numbers.
+        scenario: The name of a shipped scenario, or a TOML file.
+        policies: The policies that are chosen at the beginning.
+        settings: Fields that the variation sets; its sliders begin at these values. A field without
+            a slider keeps its value.
+        baseline: The same for the baseline, and for the variation where ``settings`` has no value.
+        folder: Folder in which results are stored.
+        missions: The number of missions at the beginning.
+        seed: Seed of the missions.
+        fields: The fields that have sliders at the beginning; each holds a number or a range.
 
     Raises:
         InputError: If the scenario, a field or a value is not allowed.
@@ -170,14 +172,14 @@ def what_if_panel(
 
 
 def _table() -> widgets.GridBox:
-    """A table for sliders, a row per field and a column per side."""
+    """A table for sliders, with a row per field and columns for baseline and variation."""
     heads = [widgets.HTML(f"<b>{text}</b>") for text in ("", *map(str.capitalize, SIDES))]
     columns = "max-content repeat(2, minmax(12rem, 22rem))"
     return widgets.GridBox(heads, layout={"grid_template_columns": columns})
 
 
 def _slider(sides: Sequence[ScenarioSpace], side: int, field: str) -> widgets.Widget:
-    """A slider that stands where a side has a field, as long as that of the other side."""
+    """A slider at the value of a field in one scenario; its range fits both scenarios."""
     least, most = sides[side].limits(field)
     ends = [end for space in sides for end in _ends(_value(space, field))]
     reach = 2 * max(map(abs, ends)) or 1
@@ -199,7 +201,7 @@ def _checkbox(team: str, chosen: bool) -> widgets.Checkbox:
 
 
 def _following(slider: widgets.Widget) -> Callable[[Any], None]:
-    """Moves a slider along with another one, as long as both stand alike."""
+    """A function that moves a slider along with another one while both have the same value."""
 
     def follow(change: Any) -> None:
         if slider.value == change.old:
@@ -209,7 +211,7 @@ def _following(slider: widgets.Widget) -> Callable[[Any], None]:
 
 
 def _value(space: ScenarioSpace, field: str) -> Any:
-    """The value of a field; the number of pads where it follows from the zone."""
+    """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
     return space.charging_pads if field == "pads" else getattr(space, field)
 
 
@@ -218,7 +220,7 @@ def _ends(value: Any) -> Iterator[float]:
 
 
 def _plain(value: Any) -> Any:
-    """The value of a slider as a scenario has it: a number, or ``[low, high]``."""
+    """The value of a slider in the form of a scenario: a number, or ``[low, high]``."""
     ends = [round(end, 10) for end in _ends(value)]
     return ends[0] if len({*ends}) == 1 else ends
 

@@ -1,11 +1,12 @@
-"""A sweep as a study: made from values of fields, kept under a name, and run.
+"""A sweep as a study: made from values of fields, stored under a name, and run.
 
     study = question({"uavs": [2, 3, 4], "pads": [1, 2, 3], "quota": [600]}, "my-sea.toml")
     results = ask(study, "results")  # in results/sweeps/uavs-pads-0123456789abcdef
 
-The name tells the question, but not the number of missions: more of them top up its folder. What a
-sweep needs and another one has is taken from there. The file of the study lies beside the folder:
-``dess study run results/sweeps/NAME.toml --out results/sweeps/NAME`` completes it.
+The name identifies the question, but not the number of missions; if more are asked for, they are
+added to the same folder. Missions that another sweep has already simulated are copied from it. The
+file of the study lies beside the folder, so that an interrupted sweep can be completed by
+``dess study run results/sweeps/NAME.toml --out results/sweeps/NAME``.
 """
 
 import json
@@ -37,12 +38,12 @@ from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 
 FOLDER = "sweeps"
-LONGEST = 60  # characters of the fields in a name
+LONGEST = 60  # largest number of characters for the fields in a name
 
-# Missions that the search of the cheapest setting may take: per setting on average, and of all;
-# and those of every setting that it begins with.
+# Missions in the search for the cheapest setting: at most, per setting on average and over all
+# settings; and with how many of every setting it begins.
 BUDGET, ALL, FIRST = 2_000, 1_000_000, 20
-LITTLE = 0.01  # of the prices: a saving that does not matter
+LITTLE = 0.01  # as a share of the prices: a saving that does not matter
 
 
 def question(
@@ -58,16 +59,16 @@ def question(
     """The study of a sweep.
 
     Args:
-        values: The values of fields of the scenario; one is fixed, several are swept.
-        scenario: A shipped scenario, or a TOML file.
+        values: For each field of the scenario its values. A field with one value is fixed.
+        scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams: ``"P"`` or ``"P,P,..."``.
-        missions: Of every policy and setting. With requirements: further ones, that check the
-            selected settings.
-        seed: Of the missions.
+        missions: Number of missions of every setting. With requirements, the number of additional
+            missions that check each selected setting.
+        seed: Seed of the missions.
         prices: Fields of ``Costs``.
-        requirements: Metric -> its least mean. With them the study looks for the cheapest setting
-            that meets them, and needs prices.
-        name: Names the study; without one, it is made of the fields and a hash.
+        requirements: For each required metric its lowest acceptable mean. With requirements the
+            study searches for the cheapest setting that meets them, and needs prices.
+        name: Name of the study. Without one, the name is made of the fields and a hash.
 
     Raises:
         InputError: If a field, a value, a policy, a price or a requirement is not allowed.
@@ -107,7 +108,7 @@ def file_of(study: Study, folder: str | Path) -> Path:
 
 
 def command(study: Study) -> str:
-    """The command that asks a sweep."""
+    """The command that runs the same sweep."""
     assert isinstance(study.design, Grid)
     fixed = {field: [value] for field, value in study.set.items()}
     values = {**fixed, **study.design.values}
@@ -139,20 +140,21 @@ def ask(
     announce: Callable[[Round], object] | None = None,
     yes: bool = False,
 ) -> Results:
-    """Write the file of a sweep, and run it as far as its missions are in no sweep of the folder.
+    """Write the file of a sweep, and simulate the missions that no sweep in the folder has.
 
     Args:
-        study: As of ``question``.
-        folder: Where results are kept.
-        workers: Processes.
-        progress: As of ``run_study``.
-        announce: As of ``run_study``.
-        yes: Whether it may take as long as it takes.
+        study: The study made by ``question``.
+        folder: Folder in which results are stored.
+        workers: Number of processes.
+        progress: As for ``run_study``.
+        announce: As for ``run_study``.
+        yes: Whether a sweep of any length is allowed.
 
     Raises:
-        InputError: If a policy cannot act in the scenario, the sweep would take long or the name is
-            that of another question, before anything is written; if the folder cannot be written.
-        ChunkError: As of ``run_study``.
+        InputError: Before anything is written, if a policy cannot act in the scenario, the sweep
+            would take long, or another question has the same name; or if the folder cannot be
+            written.
+        ChunkError: As for ``run_study``.
     """
     out = folder_of(study, folder)
     others = [path.parent for path in out.parent.glob(f"*/{MANIFEST}") if path.parent != out]
@@ -164,7 +166,7 @@ def ask(
 
 
 def write(study: Study, folder: str | Path) -> Path:
-    """Write the file of the study, which ``dess study run`` takes; its path."""
+    """Write the file of the study, which ``dess study run`` reads, and return its path."""
     path = file_of(study, folder)
     data = study.model_dump(mode="json", exclude_unset=True)
     if study.scenario not in scenario_names():
@@ -184,7 +186,7 @@ def _study(data: dict[str, Any]) -> Study:
 
 
 def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) -> dict[str, Any]:
-    """The rule that looks for the cheapest setting that meets requirements."""
+    """The rule that searches for the cheapest setting that meets the requirements."""
     prices = study.costs
     if not prices:
         raise InputError("requirements: need prices; allowed: prices, such as uav=20000")
@@ -212,7 +214,7 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
 
 
 def _spaces(study: Study) -> list[ScenarioSpace]:
-    """A scenario for every value of every field, all other fields at their first value."""
+    """A scenario for every value of every field, with all other fields at their first value."""
     design = study.design
     assert isinstance(design, Grid)
     numbers, step = [0], design.count
@@ -223,7 +225,7 @@ def _spaces(study: Study) -> list[ScenarioSpace]:
 
 
 def _name_of(study: Study, fields: Iterable[str]) -> str:
-    """The swept fields, and a hash of all that the records depend on but their number."""
+    """A name made of the swept fields, and of a hash of all that the records depend on."""
     data = study.model_dump(mode="json", exclude={"missions": True, "selection": {"check"}})
     about = {
         "version": dess.__version__,
@@ -237,7 +239,7 @@ def _name_of(study: Study, fields: Iterable[str]) -> str:
 
 
 def _check_name(study: Study, out: Path) -> None:
-    """Refuse a name that another question has."""
+    """Refuse a name that belongs to another question."""
     path = out / MANIFEST
     if path.exists():
         try:

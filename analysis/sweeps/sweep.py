@@ -1,4 +1,4 @@
-"""``analysis.sweep``: ask every combination of values of some fields, in one line.
+"""``analysis.sweep``: simulate every combination of values of some fields, in one line.
 
 results = sweep("my-sea.toml", policies=["greedy", "ddqn"], uavs=range(2, 6), pads=[1, 2, 3])
 results.table()
@@ -30,12 +30,12 @@ if TYPE_CHECKING:  # figures need the extra reports
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The answer of a sweep.
+    """The results of a sweep.
 
     Attributes:
-        study: What was asked.
+        study: The study that was run.
         path: The results folder.
-        results: The missions, ``results.missions``, as a tidy table, and all else of the folder.
+        results: The content of the folder; ``results.missions`` is a tidy table of the missions.
     """
 
     study: Study
@@ -43,18 +43,18 @@ class Sweep:
     results: Results
 
     def table(self, metric: str = PRODUCT) -> pd.DataFrame:
-        """The settings, a policy with values of the swept fields each, the best first.
+        """The settings, the best first; a setting is a policy with a value of every swept field.
 
         Args:
-            metric: Ranks them; ``cost`` is one, if there are prices.
+            metric: The metric that ranks the settings, ``cost`` included if there are prices.
 
         Returns:
-            Columns ``rank``, ``policy``, ``point``, ``n`` missions, the swept fields, every metric
-            with the ends of its 95 % interval (``success``, ``success_low``, ``success_high``), and
-            ``tied``: whether the setting may be as good as the best. With prices also the ``cost``
-            with its interval, and with requirements the ``verdict`` (``met``, ``missed`` or
-            ``open``), and whether the setting is ``selected`` as the cheapest of its policy under
-            its condition.
+            A row per setting with ``rank``, ``policy``, ``point``, ``n`` missions, the swept
+            fields, every metric with the ends of its 95 % interval (``success``, ``success_low``,
+            ``success_high``), and ``tied``: whether the setting may be as good as the best one.
+            With prices also ``cost`` with its interval. With requirements also the ``verdict``
+            (``met``, ``missed`` or ``open``), and ``selected``: whether the setting is the selected
+            one of its policy under its condition.
         """
         table = settings.ranked(self.results, metric)
         if self.study.costs is None:
@@ -67,9 +67,9 @@ class Sweep:
     def best(self, metric: str = PRODUCT) -> pd.DataFrame:
         """The best setting of every policy, the best policy first.
 
-        With requirements: the cheapest settings that meet them, one for each policy under each
-        condition (swept fields that no operator decides on, such as the arrival rate); none, where
-        no setting is known to meet them.
+        With requirements, the cheapest settings that meet them: one for each policy and condition
+        (the values of swept fields that no operator decides on, such as the arrival rate). There is
+        none where no setting is known to meet the requirements.
         """
         table = self.table(metric)
         if self.study.selection:
@@ -77,7 +77,7 @@ class Sweep:
         return table.drop_duplicates("policy", ignore_index=True)
 
     def answers(self) -> list[str]:
-        """With requirements: the cheapest fleets that meet them, and why no cheaper one does."""
+        """With requirements: the cheapest fleets that meet them, and why cheaper ones do not."""
         if not self.study.selection:
             return []
         lines = costs.answers(self.results, costs.judged(self.results))
@@ -90,22 +90,23 @@ class Sweep:
 
     @property
     def guarantee(self) -> str:
-        """With requirements: what is promised of the selected settings, in words."""
+        """With requirements: what is guaranteed about the selected settings, in words."""
         choices = (self.results.cheapest(policy) for policy in self.results.policies)
         return "; ".join(dict.fromkeys(choice.guarantee for choice in choices if choice))
 
     @property
     def command(self) -> str:
-        """The command that asks the same."""
+        """The command that runs the same sweep."""
         return command(self.study)
 
     def plot(self, x: str | None = None, hue: str | None = None, metric: str = PRODUCT) -> "Figure":
         """Curves of a metric over a swept field, with 95 % intervals, for every policy.
 
         Args:
-            x: The field; without one, the first that is swept, with the second one as ``hue``.
-            hue: A field that has a curve for each of its values.
-            metric: What is drawn.
+            x: The field on the horizontal axis. By default the first swept field, with the second
+                one as ``hue``.
+            hue: A field; there is a curve for each of its values.
+            metric: The metric on the vertical axis.
 
         Raises:
             InputError: If a field is not swept, or there is no such metric.
@@ -133,33 +134,35 @@ def sweep(
     yes: bool = False,
     **fields: Any,
 ) -> Sweep:
-    """Simulate every combination of values of fields, and keep it.
+    """Simulate every combination of values of fields, and store the missions.
 
-    Asked again, it answers at once; with more missions or other values, it simulates only what no
-    sweep in the folder has. All settings meet the same replications (common random numbers).
+    The same sweep is answered at once the next time. With more missions or other values, only the
+    missions that no sweep in the folder has are simulated. All settings use the same replications
+    (common random numbers).
 
     Args:
-        scenario: A shipped scenario, or a TOML file.
+        scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams to compare: ``"P"`` or ``"P,P,..."``.
-        missions: Of every policy and setting. With requirements: further ones, that check the
-            selected settings.
-        seed: Of the missions.
-        folder: Where results are kept, in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
-        workers: Processes. Two or more take seconds to start, and pay for long runs only.
+        missions: Number of missions of every setting. With requirements, the number of additional
+            missions that check each selected setting.
+        seed: Seed of the missions.
+        folder: Results are stored in ``FOLDER/sweeps/NAME``, with ``NAME.toml`` beside it.
+        workers: Number of processes. Two or more take seconds to start; they help in long runs.
         prices: Fields of ``analysis.study.costs.Costs``, such as ``{"uav": 20_000}``.
-        requirements: Metric -> its least mean, such as ``{"success": 0.99}``. With them, as many
-            missions are simulated as the search of the cheapest setting that meets them takes.
-        name: Of the sweep; without one, it is made of the fields and a hash.
-        progress: Whether to show a bar; or called with the number of missions done since its last
-            call.
-        yes: Whether it may take more than an hour.
-        **fields: Fields of the scenario. One value is fixed; a list, range, tuple or array of
-            several is swept. ``initial_data=[5, 20]`` is one range; see ``analysis.sweeps.values``.
+        requirements: For each required metric its lowest acceptable mean, such as ``{"success":
+            0.99}``. With requirements, as many missions are simulated as the search for the
+            cheapest setting that meets them needs.
+        name: Name of the sweep. Without one, it is made of the fields and a hash.
+        progress: Whether to show a progress bar, or a function that is called with the number of
+            missions done since its last call.
+        yes: Whether the sweep may take more than an hour.
+        **fields: Fields of the scenario. A single value is fixed; a list, range, tuple or array of
+            values is swept. ``initial_data=[5, 20]`` is one range; see ``analysis.sweeps.values``.
 
     Raises:
-        InputError: If a field, a value or a policy is not allowed, a policy cannot act in the
-            scenario, or it would take long: before anything is written.
-        ChunkError: If something could not be computed; after all that could.
+        InputError: Before anything is written, if a field, a value or a policy is not allowed, a
+            policy cannot act in the scenario, or the sweep would take long.
+        ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
     """
     values = {field: values_of(field, given) for field, given in fields.items()}
     study = question(values, scenario, policies, missions, seed, prices, requirements, name)
@@ -173,7 +176,7 @@ def sweep(
 
 @contextmanager
 def _bar(shown: bool) -> Iterator[tuple[Progress, Callable[[Round], None]]]:
-    """A bar that counts missions, once some are simulated; a rule may ask for more on the way."""
+    """A progress bar in missions, shown when some are simulated; its total may grow by a rule."""
     from tqdm.auto import tqdm
 
     bars: list[tqdm] = []

@@ -1,12 +1,12 @@
-"""The values of a field in a sweep: one that is fixed, or several that are swept.
+"""The values of a field in a sweep: one value is fixed, several are swept.
 
     values_of("uavs", range(2, 6))  # (2, 3, 4, 5)
-    values_of("initial_data", [5, 20])  # ((5, 20),): one range, which every mission draws from
+    values_of("initial_data", [5, 20])  # ((5, 20),): one range from which every mission draws
     values_of("initial_data", [[5, 10], [10, 20]])  # ((5, 10), (10, 20))
 
-A list, tuple, range or array is several values, unless it is a value of the field itself: two
-numbers of ``initial_data``, four of ``zone``, cells of ``nodes``. The fields that a mission draws,
-such as ``uavs``, take a range inside a list: ``uavs=[[1, 3]]``.
+A list, tuple, range or array means several values, unless it can be one value of the field itself:
+two numbers for ``initial_data``, four for ``zone``, cells for ``nodes``. For a field that missions
+draw at random, such as ``uavs``, a range is written inside a list: ``uavs=[[1, 3]]``.
 """
 
 import json
@@ -22,7 +22,7 @@ _LENGTHS = {"initial_data": 2, "zone": 4}  # of fields whose value is a list of 
 
 
 def values_of(field: str, given: Any) -> tuple[Any, ...]:
-    """The values of a field: one is fixed, several are swept.
+    """The values of a field, as a tuple.
 
     Args:
         field: The field.
@@ -37,7 +37,7 @@ def values_of(field: str, given: Any) -> tuple[Any, ...]:
 
 
 def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
-    """Several values of a field, or one, as TOML has them.
+    """One or several values of a field, in the types of TOML.
 
     Raises:
         InputError: If there is none, one is listed twice, or there are too many.
@@ -56,7 +56,7 @@ def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
 
 
 def _is_value(field: str, given: Any) -> bool:
-    """Whether what is given is one value of the field, and not several."""
+    """Whether ``given`` is one value of the field, and not several values."""
     if isinstance(given, np.ndarray):
         return given.ndim == 0
     if not isinstance(given, Sequence) or isinstance(given, str):
@@ -77,7 +77,7 @@ def _is_number(item: Any) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """A value as TOML has it: no numpy, no tuples."""
+    """A value in the types of TOML, without numpy types and tuples."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,4 +1,4 @@
-"""``analysis.what_if``: ask what a variation of a scenario changes, in one line.
+"""``analysis.what_if``: simulate what a variation of a scenario changes, in one line.
 
 asked = what_if({"uavs": 5}, baseline={"uavs": 3})
 asked.answer()             # in words, with intervals
@@ -30,7 +30,7 @@ class Example:
     """A replication of a policy in the baseline and in the variation.
 
     Attributes:
-        results: Of the question.
+        results: The results of the question.
         policy: The policy.
         replication: The replication.
     """
@@ -48,7 +48,7 @@ class Example:
         return answer.commands(self.results, self.policy, self.replication)
 
     def drawings(self) -> "list[tuple[Figure, str, str]]":
-        """The two missions, simulated again: a figure, its alternative text and its caption."""
+        """The two missions, simulated again: a figure, its alternative text and caption each."""
         return [self._drawing(point) for point in (BASELINE, VARIATION)]
 
     def _drawing(self, point: int) -> "tuple[Figure, str, str]":
@@ -63,10 +63,10 @@ class Example:
 
 @dataclass(frozen=True, eq=False)
 class WhatIf:
-    """A question that was asked, and its answer.
+    """A what-if question and its answer.
 
     Attributes:
-        results: The missions, ``results.missions``, as a tidy table, and all else of the folder.
+        results: The results of the question; ``results.missions`` is a tidy table of the missions.
         shown: The policy of ``typical`` and ``worst``.
     """
 
@@ -75,7 +75,7 @@ class WhatIf:
 
     @property
     def policies(self) -> list[str]:
-        """The policies, each of which is compared with itself."""
+        """The policies; each is compared with itself in the baseline and in the variation."""
         return self.results.policies
 
     @property
@@ -89,11 +89,11 @@ class WhatIf:
         return self.results.manifest["study"]["scenario"]
 
     def fields(self) -> pd.DataFrame:
-        """The fields that the variation changes, that both sides set and that missions draw."""
+        """The fields that the variation changes, that both sides set, and that missions draw."""
         return question.listed(self.results)
 
     def answer(self) -> str:
-        """Paired differences in collection ratio and communication, and the best, in Markdown."""
+        """The paired differences in collection ratio and communication, in words (Markdown)."""
         before, after = (answer.best_of_side(self.results, p) for p in (BASELINE, VARIATION))
         return (
             f"{answer.conclusions(self.table())}\n\n"
@@ -104,7 +104,7 @@ class WhatIf:
         return self.answer()
 
     def table(self) -> pd.DataFrame:
-        """The paired differences: a row per policy and metric, as of ``answer.answers``."""
+        """The paired differences, with a row per policy and metric, as ``answer.answers``."""
         return answer.answers(self.results)
 
     def amounts(self, policy: str) -> pd.DataFrame:
@@ -112,7 +112,7 @@ class WhatIf:
         return answer.listed(self.table(), policy)
 
     def pairing(self) -> pd.DataFrame:
-        """What common random numbers gained, as a table to print."""
+        """How much common random numbers narrow the intervals, as a table to print."""
         return answer.pairing(self.table())
 
     def plot(self) -> "Figure":
@@ -139,16 +139,16 @@ class WhatIf:
         return figures.spread(self._differences())
 
     def winners(self) -> str:
-        """In what shares of the missions the variation is ahead, or behind, in words."""
+        """The shares of the missions in which the variation is better or worse, in words."""
         return answer.winners(self._differences())
 
     def typical(self) -> Example:
-        """The replication whose difference is the median."""
+        """The replication that has the median of the differences."""
         replication = answer.typical(self.results, self.shown)
         return Example(self.results, self.shown, replication)
 
     def worst(self) -> Example:
-        """The replication that has the worst mission of the variation."""
+        """The replication with the worst mission of the variation."""
         return Example(self.results, self.shown, answer.worst(self.results, self.shown))
 
     def command(self) -> str:
@@ -156,7 +156,7 @@ class WhatIf:
         return question.command(self.results)
 
     def as_toml(self) -> str:
-        """The question as the file of a study, to add rows to."""
+        """The question as the TOML file of a study, to which rows can be added."""
         return question.as_toml(self.results)
 
     def _differences(self) -> dict[str, pd.Series]:
@@ -175,26 +175,27 @@ def what_if(
     shown: str | None = None,
     progress: Progress | None = None,
 ) -> WhatIf:
-    """Simulate a baseline and a variation of it in the same realisations, and compare them.
+    """Simulate a baseline and a variation of it with common random numbers, and compare them.
 
-    The missions are kept in ``FOLDER/what-if``. Asked again, it answers at once; with more missions
-    it simulates only those that are missing.
+    The missions are stored in ``FOLDER/what-if``. The same question is answered at once the next
+    time; with more missions, only those that are missing are simulated.
 
     Args:
         settings: Fields of the scenario that the variation sets.
-        baseline: Fields of the scenario that are set in both, where ``settings`` does not.
-        scenario: A shipped scenario, or a TOML file.
+        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
+            first.
+        scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``.
-        missions: Number of missions of each, at least 2.
-        seed: Of the missions.
-        folder: Where results are kept.
-        workers: Processes. Two or more take seconds to start, and pay for long runs only.
-        shown: The policy of ``typical`` and ``worst``; without one, the best in the variation.
+        missions: Number of missions of each policy on each side, at least 2.
+        seed: Seed of the missions.
+        folder: Folder in which results are stored.
+        workers: Number of processes. Two or more take seconds to start; they help in long runs.
+        shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
         progress: Called with the number of missions done since its last call.
 
     Raises:
-        InputError: If a field, a value or a policy is unknown or not allowed, or a policy cannot
-            act in the scenario: before anything is written.
+        InputError: Before anything is written, if a field, a value or a policy is unknown or not
+            allowed, or a policy cannot act in the scenario.
     """
     study = question.question(settings, baseline, scenario, policies, missions, seed)
     question.check_policy(study, shown or study.policies[0])

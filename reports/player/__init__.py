@@ -1,8 +1,8 @@
-"""A mission to play in its page, slot by slot: buttons, and a slider over the mission slots.
+"""A player that shows a mission slot by slot in a page, with buttons and a slider.
 
-A page shows ``library()`` once, before its first ``player``, and then requests nothing. A player
-is a plotly figure with a frame per mission slot: frame t shows the mission after t slots, frame 0
-its start, the last one its end.
+A page contains ``library()`` once, before its first ``player``; then it needs no network. A player
+is a plotly figure with a frame per mission slot: frame t shows the mission after t slots, from its
+start at frame 0 to its end.
 
     display(library())
     display(player(log, scenario, "player-1", "One UAV"))
@@ -22,17 +22,18 @@ from reports.player.playback import Playback
 from reports.player.trace import Json
 
 READING = (
-    "A disc is the data that is left at a node, the ring around it the most that the node ever "
-    "held. A numbered dot is a UAV with its last moves, and with a line to the node that it "
-    "served in most of the slot's communication slots; it turns pale when its mission is over. A "
-    "yellow square is a UAV that charges, an empty one a UAV that waits for a pad. The upright "
-    "lines in the curves stand at the slot that is shown; a tick ends the row of a UAV that "
-    "filled its quota, a cross that of one that did not."
+    "A disc shows the data that is left at a node, and the ring around it the largest amount that "
+    "the node ever had. A numbered dot is a UAV. Its last moves are drawn behind it, and a line "
+    "leads to the node that it served in most communication slots of the slot. The dot turns pale "
+    "when the mission of the UAV is over. A full yellow square is a UAV that charges, an empty "
+    "square a UAV that waits for a pad. The vertical lines in the panels mark the slot that is "
+    "shown. At the end of the row of a UAV, a tick means that it filled its quota, a cross that it "
+    "did not."
 )
 
 
 def library() -> HTML:
-    """The library plotly.js: once in a page, before its players."""
+    """The library plotly.js, which a page needs once, before its players."""
     # A paused animation rejects its promise without a reason, which the console would report.
     quiet = """window.addEventListener("unhandledrejection", (event) => {
         if (event.reason === undefined) event.preventDefault();
@@ -43,17 +44,17 @@ def library() -> HTML:
 def player(
     events: Events, scenario: Scenario, name: str, title: str = "", caption: str = ""
 ) -> HTML:
-    """A mission to play, to pause and to step through, slot by slot.
+    """A player of a mission: it can be played, paused and shown slot by slot.
 
     Args:
         events: The event log (a data frame, or the columns, of ``dess.record.EventLog``).
-        scenario: The mission's scenario.
-        name: The player's id, unique in its page: letters, digits and hyphens.
+        scenario: The scenario of the mission.
+        name: The id of the player, unique in its page: letters, digits and hyphens.
         title: The text above the map.
-        caption: The text below the figure; ``READING`` says how to read it.
+        caption: The text below the figure; ``READING`` explains how to read it.
 
     Raises:
-        InputError: If the log is not that of a whole mission of this scenario.
+        InputError: If the log is not that of a complete mission of this scenario.
     """
     html = to_html(
         _figure(Playback(pd.DataFrame(events), scenario)),
@@ -63,7 +64,7 @@ def player(
         post_script=layout.arranging(),
         full_html=False,
         default_height="auto",
-        validate=False,  # a test does
+        validate=False,  # a test validates the figure
         div_id=name,
     )
     below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
@@ -72,7 +73,7 @@ def player(
 
 
 def _figure(playback: Playback) -> Json:
-    """The figure as plotly's JSON; later traces lie above earlier ones."""
+    """The figure as plotly's JSON; later traces are drawn above earlier ones."""
     still = [mission_map.rings(playback), *panels.at_rest(playback)]
     moving = [*mission_map.moving(playback), *panels.moving(playback)]
     numbers = list(range(len(still), len(still) + len(moving)))

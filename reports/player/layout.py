@@ -10,12 +10,12 @@ from reports.player.panels import BATTERY, CHARGING, PANELS, ranges
 from reports.player.playback import Playback
 from reports.player.trace import Json
 
-WIDE = 720  # width [px] from which on the curves stand beside the map, not below it
+WIDE = 720  # width [px] from which the curves are beside the map, and not below it
 MARGINS = {"l": 44, "r": 38, "t": 6, "b": 40}
 FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif'
 SECONDS_PER_SLOT = {"Play": 0.3, "Fast": 0.1}
 
-# What all axes, notes, controls and traces have, unless they say otherwise.
+# Defaults of all axes, notes, controls and traces.
 _AXIS = {
     "fixedrange": True,
     "constrain": "domain",
@@ -59,7 +59,7 @@ _WIDE: tuple[int, _Boxes] = 584, {
 
 
 def layout(playback: Playback) -> Json:
-    """All but the traces and the frames."""
+    """The plotly layout: everything except the traces and the frames."""
     return {
         "template": _TEMPLATE,
         "showlegend": False,
@@ -74,7 +74,7 @@ def layout(playback: Playback) -> Json:
 
 
 def arranging() -> str:
-    """The script that puts the curves beside the map where there is room, else below."""
+    """The script that puts the curves beside the map if there is room, and otherwise below."""
     layouts = {"narrow": _arrangement(*_NARROW), "wide": _arrangement(*_WIDE)}
     return f"""
         const plot = document.getElementById("{{plot_id}}"), layouts = {json.dumps(layouts)};
@@ -92,7 +92,7 @@ def arranging() -> str:
 
 
 def _arrangement(height: int, boxes: _Boxes) -> Json:
-    """The height of the whole plot [px] and what to hand to ``Plotly.relayout``."""
+    """The height of the whole plot [px] and the arguments of ``Plotly.relayout``."""
     change: Json = {"autosize": True}
     for name, (left, right, top, bottom) in boxes.items():
         if name == "controls":
@@ -167,12 +167,12 @@ def _annotations(playback: Playback) -> list[Json]:
 
 
 def _note(text: str, x: tuple[float, str], y: tuple[float, str], **style: Any) -> Json:
-    """A text right of a point, given by a number and its axis."""
+    """A text to the right of a point, which is given by coordinates and their axes."""
     return {"text": text, "x": x[0], "xref": x[1], "y": y[0], "yref": y[1], **style}
 
 
 def _animate(seconds: float) -> Json:
-    """Options of ``Plotly.animate``: how long a slot lasts."""
+    """The options of ``Plotly.animate`` for a duration of a slot [s]."""
     duration = round(1000 * seconds)
     return {
         "mode": "immediate",
@@ -183,7 +183,7 @@ def _animate(seconds: float) -> Json:
 
 
 def _buttons() -> Json:
-    """Play, slow and fast, and pause."""
+    """The buttons: play slowly, play fast, and pause."""
     calls: Json = {label: [None, _animate(seconds)] for label, seconds in SECONDS_PER_SLOT.items()}
     calls["Pause"] = [[None], _animate(0)]
     return {
@@ -198,7 +198,7 @@ def _buttons() -> Json:
 
 
 def _slider(end: int) -> Json:
-    """A step per mission slot."""
+    """The slider, with a step per mission slot."""
     shown = {"size": 15, "color": INK}
     return {
         **_CONTROL,

@@ -9,7 +9,7 @@ from analysis.figures.style import INK, MUTED, ZONE_EDGE
 from reports.player.playback import Playback
 from reports.player.trace import Json, Moving, lines, markers, rounded
 
-TRAIL = 12  # moves that a UAV draws behind it
+TRAIL = 12  # number of last moves that are drawn behind a UAV
 NODE_SIZE, UAV_SIZE, PAD_SIZE = 25, 16, 21  # diameters, and the side of a square [px]
 STATUS = 5  # panel of the status line
 
@@ -23,7 +23,7 @@ def rings(playback: Playback) -> Json:
 
 
 def moving(playback: Playback) -> list[Moving]:
-    """All that changes on the map, from bottom to top."""
+    """All changing parts of the map, from the bottom layer to the top layer."""
     return [
         *_trails(playback),
         *_links(playback),
@@ -35,7 +35,7 @@ def moving(playback: Playback) -> list[Moving]:
 
 
 def _discs(name: str, playback: Playback, **marker: Any) -> Json:
-    """A disc per node; its area is its size [data units]."""
+    """A disc per node, whose area is proportional to ``size`` [data units]."""
     most = max(float(playback.residual.max(axis=None)), 1e-9)
     area: Json = {"sizemode": "area", "sizeref": 2 * most / NODE_SIZE**2, "opacity": 1}
     x, y = zip(*playback.scenario.nodes, strict=True)
@@ -43,7 +43,7 @@ def _discs(name: str, playback: Playback, **marker: Any) -> Json:
 
 
 def _nodes(playback: Playback) -> Moving:
-    """Discs as large as the residual data."""
+    """The discs of the nodes' residual data."""
     style = _discs("nodes", playback, color=playback.node_colours, line={"width": 0})
     text = "node %{pointNumber}: %{marker.size:.1f} data units<extra></extra>"
     style |= {"hovertemplate": text, "hoverinfo": "all"}
@@ -52,7 +52,7 @@ def _nodes(playback: Playback) -> Moving:
 
 
 def _trails(playback: Playback) -> Iterator[Moving]:
-    """The last moves: always as many points, so that they glide from frame to frame."""
+    """The last moves, always with the same number of points, so that plotly animates smoothly."""
     times = np.arange(playback.end + 1)
     past = np.maximum(times[:, None] - np.arange(TRAIL + 1), 0)
     for uav, colour in enumerate(playback.uav_colours):
@@ -62,7 +62,7 @@ def _trails(playback: Playback) -> Iterator[Moving]:
 
 
 def _links(playback: Playback) -> Iterator[Moving]:
-    """A line from each UAV to the node that it serves, of no length where it serves none."""
+    """A line from each UAV to the node that it serves; its length is 0 if it serves none."""
     nodes, colours = np.array(playback.scenario.nodes), [*playback.node_colours, MUTED]
     cells = np.stack([playback.fleet["x"], playback.fleet["y"]], 2)
     served = playback.fleet["node"]
@@ -89,7 +89,7 @@ def _squares(playback: Playback) -> Iterator[Moving]:
 
 
 def _uavs(playback: Playback) -> Moving:
-    """Numbered dots."""
+    """The UAVs as numbered dots."""
     line = {"width": 1.5, "color": "white"}
     style = {
         **markers(
@@ -130,5 +130,5 @@ def statuses(playback: Playback) -> list[str]:
 
 
 def counted(count: int, what: str) -> str:
-    """``1 pad``, ``16 pads``."""
+    """A number and its noun, as ``1 pad`` or ``16 pads``."""
     return f"{count} {what}{'s' * (count != 1)}"

@@ -15,7 +15,7 @@ def ranges(playback: Playback) -> dict[int, list[float]]:
     """The ends of each panel's y axis, from its bottom to its top."""
     most = max(float(playback.residual.sum(axis=1).max()), 1.0)
     uavs = playback.scenario.uavs
-    room = 0.6 + max(0, 3 - uavs) / 2  # a single row is not blown up
+    room = 0.6 + max(0, 3 - uavs) / 2  # so that a single row does not fill the panel
     return {
         BATTERY: [0, 103],
         RESIDUAL: [0, round(1.05 * most, 2)],
@@ -24,12 +24,12 @@ def ranges(playback: Playback) -> dict[int, list[float]]:
 
 
 def at_rest(playback: Playback) -> list[Json]:
-    """The curves."""
+    """The curves, which do not change while the mission is played."""
     return [*_battery(playback), *_residual(playback), *_charging(playback)]
 
 
 def moving(playback: Playback) -> list[Moving]:
-    """An upright line through each panel, and dots on the battery curves, at the slot shown."""
+    """At the present slot, a vertical line through each panel and dots on the battery curves."""
     times = range(playback.end + 1)
     cursors = [
         Moving(
@@ -79,7 +79,7 @@ def _charging(playback: Playback) -> Iterator[Json]:
 
 
 def _bars(slots: pd.Series, row: int) -> tuple[list[int | None], list[float | None]]:
-    """The outlines of a bar per run of consecutive slots; plotly's own bars do not animate."""
+    """The outlines of a bar per series of consecutive slots; plotly cannot animate its own bars."""
     x: list[int | None] = []
     y: list[float | None] = []
     for _, run in slots.groupby((slots.diff() != 1).cumsum()):

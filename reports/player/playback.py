@@ -1,4 +1,4 @@
-"""The state of a mission after every mission slot, from its event log: what a player shows."""
+"""The state of a mission after every mission slot, computed from its event log for a player."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Traces of a plotly figure as JSON, at rest and moving."""
+"""Traces of a plotly figure as JSON, both fixed and changing ones."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -22,7 +22,7 @@ class Moving:
 
 
 def lines(name: str, colour: str | None = None, width: float = 1.5, panel: int = 1) -> Json:
-    """The style of a trace of lines in a panel; plotly drops no point of a line that moves."""
+    """The style of a trace of lines in a panel; plotly keeps all points of a changing line."""
     line = {"color": colour, "width": width, "simplify": False}
     return {**_on_axes(panel), "name": name, "mode": "lines", "line": line}
 

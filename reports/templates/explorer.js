@@ -9,7 +9,7 @@ const colours = [...metrics[0].querySelectorAll("tr")].map((row) => row.dataset.
 const dashes = ["none", "7 4", "2 3", "9 3 2 3"];
 const curve = root.querySelector(".curve svg");
 
-// The estimate of a policy and a metric where the sliders are: mean, low, high [0.1 %], missions.
+// The estimate of a policy and a metric at the present setting: mean, low, high [0.1 %], missions.
 function estimate(positions, policy, metric) {
     const point = positions.reduce((sum, position, n) => sum * sliders[n].values.length + position, 0);
     return estimates[(point * boxes.length + policy) * metrics.length + metric];
@@ -62,7 +62,7 @@ function axes(slider, position) {
     ];
 }
 
-// The means of a policy along a slider, the other sliders where they are.
+// The means of a policy along a slider, with the other sliders at their present values.
 function means(positions, along, policy, shift, metric) {
     const colour = colours[policy], count = sliders[along].values.length, marks = [];
     const moved = (place) => positions.map((position, n) => n === along ? place : position);

@@ -1,1 +1,1 @@
-"""Tools that make data which is shipped with the packages; run with ``python -m``."""
+"""Tools that make the shipped learning curves and model cards; run them with ``python -m``."""

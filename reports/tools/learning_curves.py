@@ -1,8 +1,9 @@
 """Ablation of the learner's settings: trainings that differ in one setting, with equal budgets.
 
-Trains the variants of ``VARIANTS``, which start from the shipped config ``quick``, with several
-training seeds, and writes the learning curves. A training whose curve exists is not run again. The
-final metrics are those of the selected weights on missions that no training and no selection used.
+The tool trains every variant in ``VARIANTS``, a change of the shipped config ``quick``, with
+several training seeds, and writes the learning curves. A training whose curve exists is not run
+again. The final metrics are those of the selected weights, on missions that were used neither for
+training nor for selecting weights.
 
     export OMP_NUM_THREADS=1
     python -m reports.tools.learning_curves --out runs/learning --seeds 1 2 3
@@ -56,7 +57,7 @@ VARIANTS = _variants()
 
 
 def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, float]]:
-    """The curve of a training, and the metrics of its selected weights on unseen missions."""
+    """Train once; return the curve, and the metrics of the selected weights on new missions."""
     training = Training(config, device_of("cpu"))
     training.run(config.ticks)
     policy = training.policy(training.best)
@@ -66,7 +67,7 @@ def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, 
 
 
 def table(curves: pd.DataFrame) -> str:
-    """Per variant the final metrics, the mean of its training seeds and their range, in percent."""
+    """For each variant the final metrics in percent: mean and range over the training seeds."""
     lines = [
         "| variant | training seeds | success | collection ratio | product | lowest, highest |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -87,7 +88,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="folder of the curves")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS)
-    parser.add_argument("--missions", type=int, default=1000, help="of the final evaluation")
+    parser.add_argument(
+        "--missions", type=int, default=1000, help="missions of the final evaluation"
+    )
     parser.add_argument("--gather", type=Path, help="only gather all curves into this file")
     parser.add_argument("--table", type=Path, help="only print what the curves of a file say")
     arguments = parser.parse_args()

@@ -1,6 +1,6 @@
 """Write the computed part of a model card, policies/trained/NAME/README.md.
 
-Replaces the text between the two marks and keeps the text around them.
+The tool replaces the text between two marks in the file, and keeps the text around them.
 
     python -m reports.tools.model_cards policies/trained/ddqn --command "dess train ddqn --out DIR"
 """
@@ -27,12 +27,12 @@ BEGIN, END = (
     "<!-- computed by reports/tools/model_cards.py -->",
     "<!-- end of the computed part -->",
 )
-# The seed of the missions of model cards; no training and no selection of weights uses it.
+# The seed of the missions of model cards, which neither training nor selection of weights uses.
 EVALUATION_SEED = 20_261_121
 
 
 def _row(name: str, missions: np.ndarray) -> str:
-    """Success, collection ratio and product of missions with their intervals, as a table row."""
+    """A table row with success, collection ratio and product, and their intervals."""
     ends = [interval_of(metric, missions[metric]) for metric in METRICS]
     return f"| {name} | {' | '.join(numbers.interval(*interval) for interval in ends)} |"
 

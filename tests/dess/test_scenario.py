@@ -321,5 +321,7 @@ def test_limits_follow_the_zone_and_may_be_none() -> None:
 
 @pytest.mark.parametrize("field", ["zone", "nodes", "forbid_swaps", "zone_cells"])
 def test_what_is_no_number_has_no_limits(field: str) -> None:
-    with pytest.raises(InputError, match=f"field: '{field}' is no number; allowed: .*pads.*uavs"):
+    with pytest.raises(
+        InputError, match=f"field: '{field}' is not a number; allowed: .*pads.*uavs"
+    ):
         ScenarioSpace.of().limits(field)

@@ -177,5 +177,5 @@ def test_what_is_no_grid_is_refused(design: Any, tmp_path: Path) -> None:
     changes = {"design": design} if design else {}
     study = small_study(tmp_path, policies=["random"], missions=2, **changes)
     results = run_study(study, tmp_path / "results")
-    with pytest.raises(InputError, match="trial is no full grid of two fields or more; allowed"):
+    with pytest.raises(InputError, match="trial is not a full grid of two fields or more; allowed"):
         explorer(results)

@@ -152,7 +152,7 @@ def test_no_policy_is_refused_in_a_line(panel: WhatIfPanel) -> None:
 
 @pytest.mark.parametrize(
     ("fields", "line"),
-    [(["zone"], "'zone' is no number; allowed: .*quota"), (["uav"], "'uav' is no number")],
+    [(["zone"], "'zone' is not a number; allowed: .*quota"), (["uav"], "'uav' is not a number")],
 )
 def test_a_field_that_has_no_slider_is_refused(folder: Path, fields: list[str], line: str) -> None:
     with pytest.raises(InputError, match=f"field: {line}"):
