@@ -271,7 +271,7 @@ class ScenarioSpace(_Constants):
             **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
         }
         if field not in self.numeric:
-            raise InputError(f"field: {field!r} is no number{one_of(field, self.numeric)}")
+            raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
         if field in bounded:
             return bounded[field]
         metadata = ScenarioSpace.model_fields[field].metadata
