@@ -24,8 +24,8 @@ def double_dqn_target(
     Args:
         reward: (B,) discounted sum of the rewards until the later state.
         discount: (B,) factor of the later state's value; 0 after termination.
-        online: (B, A) Q-values of the later state by the online network, which select the action.
-        target: (B, A) Q-values by the target network, which evaluate it.
+        online: (B, A) Q-values of the later state by the online network; they select the action.
+        target: (B, A) Q-values by the target network; they give the value of that action.
         allowed: (B, A) mask of the actions allowed in the later state.
 
     Returns:
@@ -37,19 +37,26 @@ def double_dqn_target(
 
 @torch.no_grad()
 def soft_update(target: nn.Module, online: nn.Module, rate: float) -> None:
-    """Move the target network's weights toward the online ones: rate (tau) 1 copies (eq. 28)."""
+    """Move the weights of the target network towards the online weights (eq. 28).
+
+    Args:
+        target: The target network, changed in place.
+        online: The online network.
+        rate: The share of the way, tau in the paper; 1 copies the weights.
+    """
     torch._foreach_lerp_(list(target.parameters()), list(online.parameters()), rate)
 
 
 class Learner:
-    """Networks and optimizer.
+    """The networks and the optimizer of a training.
 
     Attributes:
         online: The network that is trained.
-        target: The target network, a slow copy.
-        average: A still slower copy that is evaluated and saved; None if ``average_rate`` is 1.
-        optimizer: Adam.
-        device: The device of all of them.
+        target: The target network, whose weights follow those of ``online`` slowly.
+        average: A copy that follows still more slowly, and that is evaluated and saved; None if
+            ``average_rate`` is 1.
+        optimizer: The optimizer Adam.
+        device: The device on which all of them are.
     """
 
     def __init__(
@@ -67,17 +74,17 @@ class Learner:
 
     @property
     def evaluated(self) -> nn.Module:
-        """The network to evaluate: the slow average, without one the online network."""
+        """The network that is evaluated: ``average`` or, without one, ``online``."""
         return self.online if self.average is None else self.average
 
     def values(
         self, network: nn.Module, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
-        """(R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
+        """The (R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
         return network(*self._observe(states, missions, uavs))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
-        """One gradient step on a minibatch; returns loss, mean Q-value and gradient norm."""
+        """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm."""
         settings = self.settings
         allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
         reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale

@@ -1,10 +1,10 @@
-"""The Q-networks: the paper's on maps, a dueling one on a vector, and one with a row per node.
+"""The Q-networks: the paper's for maps, a dueling one for vectors, and one for rows per node.
 
     values = DuelingNetwork(inputs=454, hidden=(512, 512))(vector)     # (R, 5)
 
-All weights are float32. With ``precision`` bfloat16 the hidden layers compute in bfloat16 during
-training, by autocast; the output layers, and all layers in evaluation mode, compute in the type of
-the weights.
+All weights are float32. If ``precision`` is bfloat16, the hidden layers compute in bfloat16 during
+training (autocast). The output layers always, and all layers in evaluation mode, compute in the
+type of the weights.
 """
 
 from collections.abc import Sequence
@@ -17,15 +17,16 @@ from dess.state import ACTION_NAMES
 
 ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5
-NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # width of a map that two convolutions reduce to one cell
+NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # smallest width of a map: two convolutions leave one cell
 DENSE = (256, 256, 256)
 
 
 class PaperNetwork(nn.Module):
     """The paper's network: convolutions on both maps, then dense layers (Section VI-A).
 
-    Two convolutions (16 kernels of 5 x 5, no padding) on the local map and two, with other weights,
-    on the global map; then three dense layers of 256 on their outputs and the own flying time.
+    The local map passes two convolutions (16 kernels of 5 x 5, no padding), and the global map two
+    others with their own weights. Their outputs and the UAV's own flying time pass three dense
+    layers of 256 units.
     """
 
     def __init__(
@@ -64,7 +65,11 @@ class PaperNetwork(nn.Module):
 
 
 class DuelingNetwork(nn.Module):
-    """Dense layers on a vector, then a value V and advantages A: ``Q = V + A - mean A``."""
+    """A dueling network: dense layers, then a value V and advantages A; ``Q = V + A - mean A``.
+
+    Source: Z. Wang et al., Dueling network architectures for deep reinforcement learning, ICML
+    2016.
+    """
 
     def __init__(
         self, inputs: int, hidden: Sequence[int], precision: torch.dtype = torch.float32
@@ -93,7 +98,7 @@ class DuelingNetwork(nn.Module):
 
 
 class NodeNetwork(nn.Module):
-    """A dueling network with the same layers for every node, then max- and mean-pooled."""
+    """A dueling network that applies the same layers to every node and pools the outputs."""
 
     def __init__(
         self,
@@ -134,7 +139,7 @@ class NodeNetwork(nn.Module):
 
 
 def _hidden_precision(network: nn.Module, precision: torch.dtype, inputs: Tensor) -> torch.autocast:
-    """Compute in bfloat16 if that is the precision, and only while training."""
+    """A context that computes in bfloat16 if that is the precision and the network is training."""
     enabled = network.training and precision == torch.bfloat16
     return torch.autocast(inputs.device.type, torch.bfloat16, enabled=enabled)
 
@@ -150,7 +155,7 @@ def _convolutions(channels: int) -> nn.Sequential:
 
 
 def _convolved(width: int) -> int:
-    """The width after two convolutions without padding."""
+    """The width of a map after two convolutions without padding."""
     return width - 2 * (KERNEL_SIZE - 1)
 
 

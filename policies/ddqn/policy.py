@@ -11,9 +11,9 @@ from dess.errors import InputError
 from dess.view import View
 from policies.ddqn.observations.states import Layout, compact_states, masks
 
-# The rounding of sums depends on the number of rows evaluated together and must not affect actions:
-# if the two best values differ by less than CLOSE, they are computed again in double precision and
-# rounded to DECIMALS.
+# The rounding errors of a network depend on the number of rows that it evaluates together, but the
+# action must not. So if the two best values differ by less than CLOSE, the values are computed
+# again in double precision and rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-3, 9
 
 
@@ -22,13 +22,14 @@ class DDQN:
 
     Attributes:
         name: The name under which results are stored.
-        observation: The network's input: ``encode(states, missions, uavs)``.
-        network: Q-values of the five actions.
+        observation: The encoder of the network's input: ``encode(states, missions, uavs)``.
+        network: The network that computes the Q-values of the five actions.
         exact: The same network in double precision, for close decisions; None during training.
         guarded: Whether the return guard masks the actions.
         layout: The grid, zone and nodes of the training.
         weights: A hash of the weights, stored with results; empty during training.
-        learner: An identifier of the training's settings but for the seed; empty during training.
+        learner: An identifier of the settings of the training without the seed; empty during
+            training.
     """
 
     exact: nn.Module | None = None
@@ -43,10 +44,11 @@ class DDQN:
 
     @torch.inference_mode()
     def act(self, view: View) -> np.ndarray:
-        """(R,) actions for the rows of the view.
+        """Choose the (R,) actions for the rows of the view.
 
         Raises:
-            InputError: If the missions have another grid, zone or nodes than the training.
+            InputError: If the missions have another grid, other zone or other nodes than the
+                training.
         """
         self._require_layout(view)
         states = compact_states(view.state, self.guarded)
@@ -78,7 +80,7 @@ class DDQN:
 
 
 def _values(network: nn.Module, parts: Iterable[np.ndarray]) -> np.ndarray:
-    """(R, 5) values, in the precision and on the device of the network's weights."""
+    """The (R, 5) values, in the precision and on the device of the network's weights."""
     weight = next(network.parameters())
     return network(*(torch.from_numpy(part).to(weight) for part in parts)).cpu().numpy()
 

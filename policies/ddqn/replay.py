@@ -1,8 +1,9 @@
-"""The replay memory shared by all UAVs: compact states in the order in which they happened.
+"""The replay memory, shared by all UAVs: compact states in the order of time.
 
-A ring of T slots x N environments. Row t of an environment holds the state before the slot, the
-action of each UAV and its reward; the state after n slots is row t + n. So a state is stored once,
-whatever n is. Each mission has one last row, after its end, in which no UAV acts.
+The memory is a ring buffer of T slots x N environments. Row t of an environment has the state
+before the slot, and the action and reward of each UAV. The state after n slots is in row t + n, so
+every state is stored only once, for every n. Each mission has a last row after its end, in which no
+UAV acts.
 """
 
 from typing import NamedTuple
@@ -17,13 +18,13 @@ class Batch(NamedTuple):
     """A minibatch of B n-step transitions.
 
     Attributes:
-        state: The compact states of the memory; ``rows`` selects the states, ``later`` the states
-            after n slots or at the end of the UAV's mission.
-        rows: (B,) missions of ``state``.
-        later: (B,) missions of ``state``.
+        state: The compact states of the memory.
+        rows: (B,) indices in ``state`` of the states in which the UAVs acted.
+        later: (B,) indices in ``state`` of the states after n slots, or at the end of the UAV's
+            mission.
         uav: (B,) index of the UAV.
-        action: (B,) its action.
-        reward: (B,) float32, discounted sum of its rewards until the later state.
+        action: (B,) action of the UAV.
+        reward: (B,) float32, discounted sum of the UAV's rewards until the later state.
         discount: (B,) float32, factor of the later state's value; 0 if the UAV terminated.
     """
 
@@ -37,12 +38,12 @@ class Batch(NamedTuple):
 
 
 class ReplayMemory:
-    """A ring of the last T slots of N environments.
+    """A ring buffer of the last T slots of N environments.
 
     Attributes:
         capacity: T [mission slots per environment].
-        count: Slots added so far; the last ``capacity`` of them are stored.
-        arrays: The arrays of the memory by name.
+        count: Number of slots added so far; the last ``capacity`` of them are stored.
+        arrays: The arrays of the memory, by name.
     """
 
     def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int):
@@ -95,10 +96,10 @@ class ReplayMemory:
         The last slot of a truncated mission is excluded.
 
         Args:
-            size: Transitions (B).
+            size: Number of transitions (B).
             n_step: n of the n-step return.
             discount: Discount factor gamma per slot.
-            generator: Source of the draw.
+            generator: Random generator of the draw.
 
         Raises:
             ValueError: If fewer than ``n_step + 1`` slots have been added, or none of them holds a
@@ -140,10 +141,10 @@ class ReplayMemory:
 def _returns(
     rows, uavs, n_step, discount, num_envs, rewards, terminated, truncated, later, total, factor
 ):
-    """n-step returns, which end with the UAV's mission.
+    """Compute n-step returns, which end when the UAV's mission ends.
 
-    Truncation is not termination: the return ends before the truncated slot, with the value of the
-    last state in which the UAV chose an action.
+    Truncation does not count as termination: the return then ends before the truncated slot, with
+    the value of the last state in which the UAV chose an action.
     """
     size = len(rewards)
     for b in range(len(rows)):

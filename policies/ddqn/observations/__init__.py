@@ -1,1 +1,1 @@
-"""What the networks see of a state: kinds of observations."""
+"""The kinds of observations: how a state is encoded as the input of a network."""

@@ -1,7 +1,7 @@
 """The paper's observation (a): a local and a pooled global map, both centred on the UAV.
 
-Section III-D, eq. 19-22. Few cells are not zero, so both maps are written directly from the zone,
-the nodes and the UAVs; the centred map of eq. 19 is never built.
+It follows Section III-D, eq. 19-22. Since few cells are not zero, both maps are written directly
+from the zone, the nodes and the UAVs, without building the centred map of eq. 19.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ CROP, POOL = 17, 3
 
 
 class Maps:
-    """Encodes states as the paper's local and global maps and the own flying time.
+    """Encodes states as the paper's local and global maps and the UAV's own flying time.
 
     The M x M map is moved into one of ``2 M - 1`` cells a side, with the UAV in the middle and
     zeros outside. The local map is the ``crop`` x ``crop`` cells in the middle. A cell of the
@@ -35,14 +35,14 @@ class Maps:
         width: Width of the global map, ``(2 M - 1) // pool``.
     """
 
-    version = 1  # of the meaning of the numbers: weights of another version do not fit
+    version = 1  # of the encoding; weights trained with another version cannot be used
 
     def __init__(self, layout: Layout, crop: int = CROP, pool: int = POOL) -> None:
         """Make an encoder for one layout.
 
         Raises:
-            InputError: If ``crop`` is not an odd number up to ``2 M - 1``, or ``pool`` not a number
-                of 1 to ``2 M - 1``.
+            InputError: If ``crop`` is not an odd number of 1 to ``2 M - 1``, or ``pool`` is not a
+                number of 1 to ``2 M - 1``.
         """
         centred = 2 * layout.grid - 1
         if not (1 <= crop <= centred and crop % 2):

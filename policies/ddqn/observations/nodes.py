@@ -1,7 +1,7 @@
-"""Observation (b) with a row per node: the vector, and the position of every node to the UAV.
+"""Observation (b) with a row per node: the vector, and the position of every node from the UAV.
 
-With the same layers for all nodes, a network learns the value of a node five slots to the east
-once, not once per node.
+A network that applies the same layers to all nodes learns only once what, for example, a node five
+slots to the east is worth, and not once for every node.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ class Nodes:
         shapes: The shapes of its arrays per row: (F,) and (K, 22).
     """
 
-    version = 1  # of the meaning of the numbers: weights of another version do not fit
+    version = 1  # of the encoding; weights trained with another version cannot be used
 
     def __init__(self, layout: Layout):
         self.layout, self._vector = layout, Vector(layout)

@@ -31,11 +31,11 @@ _MOST = np.iinfo(np.int16).max
 
 
 class CompactStates(NamedTuple):
-    """S missions x I UAVs x K nodes, each mission at one time.
+    """The states of S missions, each at one time, with up to I UAVs and K nodes.
 
     Attributes:
         missions: (S, 2) int16, columns ``CHARGE_START`` and ``CHARGE_COMPLETE``.
-        uavs: (S, I, 10) int16, columns ``X`` to ``MASK``; zeros for an absent UAV.
+        uavs: (S, I, 10) int16, columns ``X`` to ``MASK``; zeros where a mission has fewer UAVs.
         residual: (S, K) float32 [data units].
     """
 
@@ -70,7 +70,7 @@ def layout_of(space: ScenarioSpace) -> Layout:
 
 
 def empty_states(count: int, uavs: int, nodes: int) -> CompactStates:
-    """Zeroed compact states of that many missions, UAVs per mission and nodes."""
+    """Compact states filled with zeros, for that many missions, UAVs per mission and nodes."""
     return CompactStates(
         np.zeros((count, MISSION_COLUMNS), np.int16),
         np.zeros((count, uavs, UAV_COLUMNS), np.int16),
@@ -83,8 +83,8 @@ def compact_states(state: State, guarded: bool) -> CompactStates:
 
     Args:
         state: The state of B missions.
-        guarded: Whether the mask of actions is that of the return guard (``policies.guard``);
-            if not, it has the moves that stay on the grid.
+        guarded: True for the mask of the return guard (``policies.guard``), False for the mask of
+            all legal actions.
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     _fill(state.missions, state.uavs, state.residual, guarded, states)
@@ -125,6 +125,6 @@ def _fill(missions, uavs, residual, guarded, out):
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
-    """(R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
+    """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
     bits = states.uavs[missions, uavs, MASK]
     return (bits[:, None] >> np.arange(5) & 1).astype(bool)

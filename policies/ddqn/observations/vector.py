@@ -1,9 +1,9 @@
 """Observation (b): a compact vector, with more information than the paper's observation.
 
 It adds the slots until the quota is filled, the charging latch, C_S and C_C, the slots to the
-parking cell, which UAVs must charge, and which cells around are occupied. Nodes enter by index, so
-a network is valid for one layout only. The number of teammates is free: the two nearest are
-described one by one, and all of them affect the data that is left for this UAV.
+parking cell, which UAVs must charge, and which cells around are occupied. Every node has its own
+entry, so a network is valid for one layout only. The number of teammates may vary: the two nearest
+are described one by one, and all of them affect the data that is left for this UAV.
 """
 
 import numpy as np
@@ -31,12 +31,12 @@ MATES = 2  # teammates described one by one, the nearest first
 _OWN = 16
 _NODE = 4
 _MATE = 11
-# Nearness of a node to a cell: exp(-slots / scale), for each scale [slots]; and the divisors of the
-# sums of data times nearness.
+# The nearness of a node to a cell is exp(-slots / scale), for each scale [slots]. The sums of data
+# times nearness are divided by these divisors.
 SCALES = np.array([1.2, 4.0, 12.0])
 _NORMS = np.array([10.0, 25.0, 80.0])
-DATA_UNIT = 10.0  # data units that count as one
-_FAR = 10.0  # slots of lead over the teammates that count as one
+DATA_UNIT = 10.0  # data are divided by this [data units]
+_FAR = 10.0  # leads over the teammates are divided by this [slots]
 
 
 class Vector:
@@ -47,7 +47,7 @@ class Vector:
         shapes: The shapes of its arrays per row: one vector (F,).
     """
 
-    version = 1  # of the meaning of the numbers: weights of another version do not fit
+    version = 1  # of the encoding; weights trained with another version cannot be used
 
     def __init__(self, layout: Layout):
         self.layout = layout
@@ -126,7 +126,7 @@ def _own(mission, team, i, data, line):
 
 @kernel
 def spare_slots(me, home, slots):
-    """Spare slots if the UAV visits a node, then charges if it must; 20 or more count as one."""
+    """The spare slots / 20, within -1..1, if the UAV visits a node and then charges if it must."""
     left = me[BATTERY] - 1 - home if me[MUST_CHARGE] else me[NEEDED]
     return min(max((left - slots) / 20.0, -1.0), 1.0)
 
