@@ -159,7 +159,7 @@ class _Constants(BaseModel):
         low, high = self.initial_data
         if not 0 <= low <= high:
             raise ValueError(
-                f"initial_data: {[low, high]} is no range; allowed: a number >= 0 "
+                f"initial_data: {[low, high]} is not a range; allowed: a number >= 0 "
                 "or [low, high] with 0 <= low <= high"
             )
         return self

@@ -53,7 +53,7 @@ class Evidence(Origin):
         policies = [team.policy for team in self.policies]
         for mission in self.sample:
             if mission.policy not in policies:
-                raise ValueError(f"sample: {mission.policy} is no policy of the study")
+                raise ValueError(f"sample: {mission.policy} is not a policy of the study")
             if missing := [n for n in MISSION_RECORD.names or () if n not in mission.record]:
                 raise ValueError(f"sample: a record has no {missing[0]}")
         return self

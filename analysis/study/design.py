@@ -61,7 +61,7 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
             numbers = "integers" if field in INTEGERS else "numbers"
             shown = list(ends) if isinstance(ends, tuple) else repr(ends)
             raise ValueError(
-                f"{field}: {shown} is no range; allowed: [low, high], {numbers} with low <= high"
+                f"{field}: {shown} is not a range; allowed: [low, high], {numbers} with low <= high"
             )
     return ranges
 
@@ -79,7 +79,7 @@ def _is_range(field: str, ends: Any) -> bool:
 
 def _is_power_of_two(number: int) -> int:
     if number & (number - 1):
-        raise ValueError(f"{number} is no power of two; allowed: 1, 2, 4, 8, ...")
+        raise ValueError(f"{number} is not a power of two; allowed: 1, 2, 4, 8, ...")
     return number
 
 

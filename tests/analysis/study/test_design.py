@@ -238,7 +238,7 @@ BAD = {
         "seed: -1 is out of range; allowed: an integer 0.."
     ],
     HEAD + 'saltelli"\nbase = 1': ["saltelli: base: 1 is out of range; allowed: an integer 2.."],
-    HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is no power of two; allowed: 1, 2, 4"],
+    HEAD + 'saltelli"\nbase = 24': ["saltelli: base: 24 is not a power of two; allowed: 1, 2, 4"],
     HEAD + 'saltelli"\nbase = 4\nreplications = 0': ["replications: 0 is out of range"],
     HEAD + f'saltelli"\nbase = 4\nreplications = {MAX_REPLICATION + 2}': ["replications: "],
 }
@@ -257,7 +257,10 @@ NO_RANGES = {
     f"arrival_rate = [0, {10**400}]": "arrival_rate: [0, 10000",
 }
 BAD |= {
-    f"kind = 'latin-hypercube'\nsize = 8\nranges = {{{text}}}": [f"ranges: {what}", "is no range"]
+    f"kind = 'latin-hypercube'\nsize = 8\nranges = {{{text}}}": [
+        f"ranges: {what}",
+        "is not a range",
+    ]
     for text, what in NO_RANGES.items()
 }
 
