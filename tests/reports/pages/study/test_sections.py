@@ -123,5 +123,5 @@ def test_a_metric_or_baseline_that_is_none_is_refused(tmp_path):
         with pytest.raises(InputError, match=f"metric: {metric!r} is unknown; allowed: success"):
             words.metric_of(results, metric)
     for point in (2, -1, "x"):
-        with pytest.raises(InputError, match=f"baseline: {point!r} is no design .*: 0..1$"):
+        with pytest.raises(InputError, match=f"baseline: {point!r} is not a design .*: 0..1$"):
             words.setting(results, point)
