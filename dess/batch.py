@@ -61,7 +61,8 @@ def simulate_batch(
         change them.
 
     Raises:
-        InputError: If the seed or a replication is out of range.
+        InputError: If the seed or a replication is out of range, or if the team has more policies
+            than the largest fleet has UAVs.
         ValueError: If a policy does not return actions.
     """
     numbers = _numbers(replications)
@@ -71,7 +72,6 @@ def simulate_batch(
         raise ValueError(
             f"workers and batch_size must be at least 1, not {workers} and {batch_size}"
         )
-    team = team_of(policy)
     if isinstance(scenario, Scenario | ScenarioSpace):
         scenario = [scenario] * len(numbers)
     if len(scenario) != len(numbers):
@@ -80,6 +80,7 @@ def simulate_batch(
     row = {identity: number for number, identity in enumerate(distinct)}
     kinds = np.array([row[id(space)] for space in scenario], np.int64)
     spaces = spaces_of([*distinct.values()])
+    team = team_of(policy, spaces)
     records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
     stop = Event()
 

@@ -65,12 +65,14 @@ def simulate(
         The record of the mission.
 
     Raises:
-        InputError: If the seed or the replication is out of range.
+        InputError: If the seed or the replication is out of range, or if the team has more policies
+            than the largest fleet has UAVs.
         ValueError: If a policy does not return actions.
     """
     check_seed(seed, replication)
     log = EventLog() if events else None
-    return MissionModel(spaces_of([scenario])[0], team_of(policy), seed, replication, log).run()
+    space = spaces_of([scenario])[0]
+    return MissionModel(space, team_of(policy, [space]), seed, replication, log).run()
 
 
 class ChargingZone(simpy.Resource):

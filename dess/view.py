@@ -4,7 +4,7 @@ view = View(state, world, mission, uav)   # one row per UAV that must act
 view.own["battery"], view.residual, view.legal
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,9 @@ import numpy as np
 
 from dess.channel import World
 from dess.code.kernels import kernel
+from dess.errors import InputError
 from dess.rules import on_grid
+from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
 
 
@@ -99,16 +101,41 @@ def acting_rows(missions, uavs, policies, number):
     return rows_mission[:count], rows_uav[:count]
 
 
-def team_of(policy: Any) -> list[Any]:
+def team_of(policy: Any, spaces: Sequence[ScenarioSpace]) -> list[Any]:
     """The team of one policy, or of a list or tuple of policies.
 
+    Args:
+        policy: The policy or policies.
+        spaces: The scenarios that the team is to act in.
+
     Raises:
+        InputError: If there are more policies than UAVs in the largest fleet of all scenarios.
         ValueError: If the sequence is empty.
     """
     team = list(policy) if isinstance(policy, list | tuple) else [policy]
     if not team:
         raise ValueError("a team needs at least one policy")
+    if spaces:
+        check_team(len(team), spaces)
     return team
+
+
+def check_team(policies: int, spaces: Iterable[ScenarioSpace]) -> None:
+    """Refuse a team in which some policy would never act.
+
+    Args:
+        policies: The number of policies in the team.
+        spaces: The scenarios that the team is to act in.
+
+    Raises:
+        InputError: If there are more policies than UAVs in the largest fleet of all scenarios.
+    """
+    fleet = max(space.uavs[1] for space in spaces)
+    if policies > fleet:
+        raise InputError(
+            f"policy: the team has {policies} policies, but the largest fleet has {fleet} "
+            f"UAV{'s' * (fleet > 1)}; allowed: {fleet} at most"
+        )
 
 
 def decide(team: Sequence[Any], state: State, world: World) -> None:

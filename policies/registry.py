@@ -157,13 +157,18 @@ def _importable(path: Path) -> str:
     return path.stem
 
 
-def load_team(text: str) -> list[Policy]:
+def load_team(text: str, uavs: int | None = None) -> list[Policy]:
     """Load the policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
+
+    Args:
+        text: The team.
+        uavs: The size of the largest fleet, if the policies that never act in it are to be left
+            out, as at some design points of a study; all are loaded by default.
 
     Raises:
         InputError: If one of them is unknown.
     """
-    return [load(name.strip()) for name in text.split(",")]
+    return [load(name.strip()) for name in text.split(",")[:uavs]]
 
 
 def _outside_description(point: EntryPoint) -> str:

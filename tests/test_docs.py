@@ -55,6 +55,8 @@ def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
     """The subcommand that arguments name, and those that are left for it."""
     command: Any = typer.main.get_command(cli.app)
     while hasattr(command, "commands"):
+        if not arguments and command.invoke_without_command:  # such as dess policies
+            break
         assert arguments, "no subcommand"
         name, *arguments = arguments
         assert name in command.commands, f"dess has no command {name}"

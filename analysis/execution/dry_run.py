@@ -162,7 +162,8 @@ def check_policies(study: Study) -> None:
     places = [*{(space.grid, space.zone, space.nodes): space for space in spaces}.values()]
     for policy in study.policies:
         try:
-            simulate_batch(places, load_team(policy), study.seed, len(places))
+            team = load_team(policy, max(space.uavs[1] for space in places))
+            simulate_batch(places, team, study.seed, len(places))
         except InputError:
             raise
         except Exception:  # the run will record it as a failure
@@ -196,10 +197,11 @@ def _seconds_per_mission(study: Study, team: int, clock: Callable[[], float]) ->
         spaces = [study.point(place).scenario for place in places]
         begin = clock()
         if study.engine == "batch":
-            simulate_batch(spaces, policies, TRIAL_SEED, missions)
+            fleet = max(space.uavs[1] for space in spaces)
+            simulate_batch(spaces, policies[:fleet], TRIAL_SEED, missions)
         else:
             for replication, space in enumerate(spaces):
-                simulate(space, policies, TRIAL_SEED, replication)
+                simulate(space, policies[: space.uavs[1]], TRIAL_SEED, replication)
         return (clock() - begin) / missions
 
     trial(1)  # compiles

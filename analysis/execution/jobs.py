@@ -43,14 +43,14 @@ class MissionsJob:
 
     def run(self, progress: Progress | None = None) -> Records:
         """Simulate the missions; ``progress`` gets the number of missions since its last call."""
-        team = load_team(self.policy)
+        team = load_team(self.policy, max(space.uavs[1] for space in self.spaces))
         rows = [(space, r) for space, r, _ in self._missions()]
         spaces, replications = [list(column) for column in zip(*rows, strict=True)]
         if self.engine == "batch":
             return simulate_batch(spaces, team, self.seed, replications, progress=progress)
         records = empty_records(len(rows), max(space.uavs[1] for space in self.spaces))
         for row, (space, replication) in enumerate(rows):
-            record = simulate(space, team, self.seed, replication)
+            record = simulate(space, team[: space.uavs[1]], self.seed, replication)
             records.missions[row] = record.metrics
             records.uavs[row, : len(record.uavs)] = record.uavs
             if progress:
@@ -97,7 +97,8 @@ class LogJob:
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Simulate the mission with the SimPy engine."""
-        team, replication = load_team(self.policy), self.mission.replications[0]
+        team = load_team(self.policy, self.space.uavs[1])
+        replication = self.mission.replications[0]
         log = simulate(self.space, team, self.seed, replication, events=True).events
         assert log is not None
         return log.columns()

@@ -30,6 +30,7 @@ from analysis.study.study import Study, load_study
 from dess import InputError, simulate_batch
 from dess.record import Records
 from dess.scenario import ScenarioSpace
+from dess.view import check_team
 from policies import load_team
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
@@ -305,10 +306,12 @@ def evaluate(
         clock: Returns the time [s].
 
     Raises:
-        InputError: If a policy is unknown or a number out of range.
+        InputError: If a policy is unknown, a number is out of range, or the team has more policies
+            than the largest fleet has UAVs.
     """
     check_workers(workers)
     policies = load_team(team)
+    check_team(len(policies), [scenario])
     if engine == "batch":
         simulate_batch(scenario, policies, seed, 1)  # compiles
         begin = clock()

@@ -284,9 +284,7 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
     check_metric(results, metric)
     if policy is None:
         return missions
-    if policy not in results.policies:
-        allowed = one_of(policy, results.policies)
-        raise InputError(f"policy: {policy!r} is not in the study{allowed}")
+    results.check_policy(policy)
     return missions[missions["policy"] == policy]
 
 

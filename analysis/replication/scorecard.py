@@ -86,7 +86,13 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
 
 
 def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> list[Row]:
-    """The claims of a section with what the results of one policy say, whatever it is."""
+    """The claims of a section with what the results of one policy say, whatever it is.
+
+    Raises:
+        InputError: If the study of the section is there, and without the policy.
+    """
+    if section.study in studies:
+        studies[section.study].check_policy(policy)
     return _rows(section, margin(studies), [partial(evidence_of_policy, studies, policy=policy)])
 
 

@@ -40,7 +40,7 @@ def mission_of(
     Raises:
         InputError: If there is no such policy, or it cannot act in the scenario.
     """
-    record = simulate(space, load_team(policy), seed, replication, events=True)
+    record = simulate(space, load_team(policy, space.uavs[1]), seed, replication, events=True)
     assert record.events is not None
     events = pd.DataFrame(record.events.columns())
     return Resimulated(sample_scenario(space, seed, replication), record, events)

@@ -96,11 +96,13 @@ class Results:
 
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected as the best for a policy, with its guarantee."""
+        self.check_policy(policy)
         rule = self.store.manifest.selection
         return rule.choice(self._samples(policy)) if isinstance(rule, Selection) else None
 
     def cheapest(self, policy: str) -> CheapestChoice | None:
         """The cheapest settings of a policy that meet the requirements of the study."""
+        self.check_policy(policy)
         manifest = self.store.manifest
         if not isinstance(manifest.selection, Cheapest):
             return None
@@ -110,16 +112,24 @@ class Results:
         manifest = self.store.manifest
         return self.store.samples(parts_of(manifest, self.policies.index(policy)))
 
+    def check_policy(self, policy: str) -> None:
+        """Refuse a policy that is not in the study.
+
+        Raises:
+            InputError: If it is not.
+        """
+        if policy not in self.policies:
+            raise InputError(
+                f"policy: {policy!r} is not in the study{one_of(policy, self.policies)}"
+            )
+
     def cell(self, policy: str, point: int) -> Cell:
         """The cell of a policy at a design point, with its key.
 
         Raises:
             InputError: If the study has no such policy or point.
         """
-        if policy not in self.policies:
-            raise InputError(
-                f"policy: {policy!r} is not in the study{one_of(policy, self.policies)}"
-            )
+        self.check_policy(policy)
         points = len(self.store.manifest.points)
         if not 0 <= point < points:
             raise InputError(f"point: {point} is not in the study; allowed: 0..{points - 1}")

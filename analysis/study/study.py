@@ -106,6 +106,7 @@ class Study(StrictTable):
                 f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
             )
         self._check_budget()
+        self._check_teams()
         return self
 
     def _check_rule(self) -> None:
@@ -131,6 +132,18 @@ class Study(StrictTable):
                 f"selection.budget: {self.selection.budget} is less than the first missions of all "
                 f"design points; allowed: {least} or more"
             )
+
+    def _check_teams(self) -> None:
+        """No policy of a team may be without a UAV at every design point."""
+        if self.size > MANY_POINTS:
+            return
+        fleet = max(point.scenario.uavs[1] for point in self.points)
+        for team in self.policies:
+            if team.count(",") >= fleet:
+                raise ValueError(
+                    f"policies: {team} has more policies than the largest fleet has UAVs; "
+                    f"allowed: {fleet} at most"
+                )
 
     def _check_rows(self, rows: Sequence[DesignPoint]) -> None:
         for row in rows:

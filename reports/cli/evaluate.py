@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from reports.cli import console
+from reports.cli import completion, console
 from reports.cli.settings import (
     JsonOption,
     ScenarioOption,
@@ -27,6 +27,7 @@ def evaluate(
         list[str],
         typer.Option(
             metavar="P[,P...]",
+            autocompletion=completion.policies,
             help="A policy, or several that the UAVs follow in turn; repeatable.",
         ),
     ],
@@ -46,11 +47,12 @@ def evaluate(
     """Simulate many missions and print the means of their metrics with 95 % intervals."""
     from analysis.execution.runner import evaluate
     from dess.state import check_seed
+    from dess.view import check_team
     from policies import load_team
 
     space = load_space(scenario, settings)
     for team in policy:
-        load_team(team)
+        check_team(len(load_team(team)), [space])
     check_seed(seed, missions - 1)
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
         evaluations = [

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reports.cli import console
+from reports.cli import completion, console
 from reports.cli.settings import JsonOption, SetOption, load_space
 
 policies = typer.Typer(invoke_without_command=True)
@@ -28,6 +28,7 @@ def show_policy(
         str,
         typer.Argument(
             metavar="NAME|DIR|FILE.py:CLASS",
+            autocompletion=completion.policies,
             help="A policy, by name, folder of a training or file.",
         ),
     ],
@@ -60,7 +61,12 @@ def list_scenarios(context: typer.Context) -> None:
 @scenarios.command("show")
 def show_scenario(
     name: Annotated[
-        str, typer.Argument(metavar="NAME|FILE", help="A shipped scenario or a TOML file.")
+        str,
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="A shipped scenario or a TOML file.",
+            autocompletion=completion.scenarios,
+        ),
     ],
     settings: SetOption = None,
     as_json: JsonOption = False,
@@ -95,7 +101,12 @@ def list_studies(context: typer.Context) -> None:
 
 @studies.command("show")
 def show_study(
-    name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A study or a TOML file.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|FILE", help="A study or a TOML file.", autocompletion=completion.studies
+        ),
+    ],
     as_json: JsonOption = False,
 ) -> None:
     """Show a study: every field, as its file would set it."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess import InputError
-from reports.cli import console
+from reports.cli import completion, console
 from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
 
 if TYPE_CHECKING:
@@ -141,6 +141,7 @@ def timing(
         list[str] | None,
         typer.Option(
             metavar="P[,P...]",
+            autocompletion=completion.policies,
             help="Policies to measure; repeatable.  [default: those of the study comparison]",
         ),
     ] = None,

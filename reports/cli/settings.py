@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dess.errors import InputError, one_of
+from reports.cli import completion
 
 if TYPE_CHECKING:
     from dess import ScenarioSpace
@@ -26,7 +27,10 @@ PARAMETER = (
 ScenarioOption = Annotated[
     str,
     typer.Option(
-        "--scenario", metavar="NAME|FILE", help="The name of a shipped scenario, or a TOML file."
+        "--scenario",
+        metavar="NAME|FILE",
+        autocompletion=completion.scenarios,
+        help="The name of a shipped scenario, or a TOML file.",
     ),
 ]
 SetOption = Annotated[
@@ -34,6 +38,7 @@ SetOption = Annotated[
     typer.Option(
         SET,
         metavar="KEY=VALUE",
+        autocompletion=completion.fields,
         help="Set a field of the scenario to a value in TOML syntax; repeatable.",
     ),
 ]

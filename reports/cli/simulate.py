@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dess import InputError
-from reports.cli import console
+from dess.errors import InputError, one_of
+from reports.cli import completion, console
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def simulate(
         str | None,
         typer.Option(
             metavar="P[,P...]",
+            autocompletion=completion.policies,
             help="A policy, or several that the UAVs follow in turn.  [default: greedy, or that "
             "of the study]",
         ),
@@ -102,7 +103,7 @@ def simulate(
     else:
         space = load_space(scenario, settings)
         asked = _Asked(space, policy or "greedy", seed, replication or 0, scenario)
-    team = load_team(asked.policy)
+    team = load_team(asked.policy, asked.space.uavs[1] if of else None)
     check_seed(asked.seed, asked.replication)
     _check_suffix("--figure", figure, FIGURES, "picture")
     _check_suffix("--animation", animation, ANIMATIONS, "animation")
@@ -180,7 +181,8 @@ def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T
     if given is None:
         raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
     if given not in there:
-        raise InputError(f"--{option}: {given!r} is not in the study; allowed: {allowed}")
+        end = one_of(given, there) if isinstance(given, str) else f"; allowed: {allowed}"
+        raise InputError(f"--{option}: {given!r} is not in the study{end}")
     return given
 
 

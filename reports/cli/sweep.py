@@ -9,7 +9,7 @@ import typer
 
 from dess.code.libraries import MissingLibraryError, needs
 from dess.files import check_folder
-from reports.cli import console
+from reports.cli import completion, console
 from reports.cli.ranges import all_settings, all_values
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
@@ -39,13 +39,18 @@ def sweep(
         typer.Option(
             "--set",
             metavar="KEY=VALUES",
+            autocompletion=completion.fields,
             help="The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with "
             "one value is fixed; repeatable.",
         ),
     ] = None,
     policy: Annotated[
         list[str] | None,
-        typer.Option(metavar="P,P,...", help="Policies to compare; repeatable.  [default: greedy]"),
+        typer.Option(
+            metavar="P,P,...",
+            autocompletion=completion.policies,
+            help="Policies to compare; repeatable.  [default: greedy]",
+        ),
     ] = None,
     missions: Annotated[
         int,

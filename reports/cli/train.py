@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from reports.cli import console
+from reports.cli import completion, console
 
 if TYPE_CHECKING:
     from policies.ddqn.training import Training
@@ -21,7 +21,11 @@ app = typer.Typer()
 def train(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME|FILE", help="The name of a shipped config, or a TOML file."),
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="The name of a shipped config, or a TOML file.",
+            autocompletion=completion.configs,
+        ),
     ],
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the training.")],
     resume: Annotated[

@@ -134,7 +134,9 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
     lines, numbers = [], chosen(len(evidence.sample), missions, seed)
     for mission in (evidence.sample[number] for number in numbers):
         policy, values, replication = mission.policy, mission.values, mission.replication
-        record = simulate(evidence.space(values), load_team(policy), evidence.seed, replication)
+        space = evidence.space(values)
+        team = load_team(policy, space.uavs[1])
+        record = simulate(space, team, evidence.seed, replication)
         if changed := difference(record, mission.record):
             command = commands.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
@@ -146,8 +148,8 @@ def _check_logs(store: Store, missions: int, seed: int) -> Check:
     manifest, logged, lines = store.manifest, store.logged, []
     numbers = chosen(len(logged), missions, seed)
     for cell, replication in (logged[number] for number in numbers):
-        team = load_team(manifest.policies[cell.team].policy)
         space = manifest.scenarios[cell.point]
+        team = load_team(manifest.policies[cell.team].policy, space.uavs[1])
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None

@@ -62,6 +62,7 @@ def _equal(one: Records, other: Records) -> bool:
 def test_both_engines_give_the_same_record(
     space: ScenarioSpace, team: Sequence[Any], seed: int, numbers: list[int]
 ) -> None:
+    team = team[: space.uavs[1]]
     records = simulate_batch(space, team, seed, numbers, batch_size=2)
     for job, replication in enumerate(numbers):
         assert _is(records, job, simulate(space, team, seed, replication))
@@ -287,6 +288,21 @@ def test_uav_i_has_policy_i_modulo_the_team(run: Any) -> None:
     run(ScenarioSpace.of(BUSY, uavs=5), team, 0)
     assert team[0].asked_for == {0, 2, 4}
     assert team[1].asked_for == {1, 3}
+
+
+@pytest.mark.parametrize("run", [simulate, simulate_batch])
+def test_a_policy_that_would_never_act_is_refused(run: Any) -> None:
+    team = [_Watcher(name) for name in "abc"]
+    line = "policy: the team has 3 policies, but the largest fleet has 2 UAVs; allowed: 2 at most"
+    with pytest.raises(InputError, match=line):
+        run(ScenarioSpace.of(BUSY, uavs=[1, 2]), team, 0)
+    run(ScenarioSpace.of(BUSY, uavs=[1, 3]), team, 0)
+
+
+def test_the_largest_fleet_of_several_scenarios_counts() -> None:
+    team = [_Watcher("a"), _Watcher("b")]
+    simulate_batch([ScenarioSpace.of(BUSY, uavs=n) for n in (1, 2)], team, 0, 2)
+    assert team[1].asked_for == {1}
 
 
 class _Spy(_Watcher):

@@ -125,7 +125,8 @@ def ask(
     """
     for policy in study.policies:
         for point in study.points:
-            simulate_batch(point.scenario, load_team(policy), study.seed, 1)
+            team = load_team(policy, point.scenario.uavs[1])
+            simulate_batch(point.scenario, team, study.seed, 1)
     out = Path(folder) / NAME / key_of(study)
     others = sorted(p.parent for p in out.parent.glob(f"*/{MANIFEST}") if p.parent != out)
     return run_study(study, out, workers, progress=progress, reuse=others)

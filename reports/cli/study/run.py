@@ -7,7 +7,7 @@ import typer
 
 from dess.code.libraries import needs
 from dess.files import check_folder
-from reports.cli import console
+from reports.cli import completion, console
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import PAGES, RESULTS, WorkersOption
@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 def run(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME|FILE", help="The name of a shipped study, or a TOML file."),
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="The name of a shipped study, or a TOML file.",
+            autocompletion=completion.studies,
+        ),
     ],
     out: Annotated[
         Path | None,
@@ -39,7 +43,9 @@ def run(
     policy: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="P[,P...]", help="Policies in place of those of the study; repeatable."
+            metavar="P[,P...]",
+            autocompletion=completion.policies,
+            help="Policies in place of those of the study; repeatable.",
         ),
     ] = None,
     dry_run: Annotated[

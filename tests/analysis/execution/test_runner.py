@@ -1,11 +1,12 @@
 import shlex
+import subprocess
 import sys
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from analysis import evaluate, load_results, load_study, run_study
+from analysis import evaluate, load_results, load_study, resimulate, run_study
 from analysis.execution import jobs, runner
 from analysis.questions.sensitivity import sensitivity
 from analysis.study.study import CHECK
@@ -15,7 +16,7 @@ from dess.state import END_NAMES
 from policies import load_team
 from reports import cli
 from reports.cli.settings import setting
-from tests.analysis.small import files_of, grid, small_study
+from tests.analysis.small import environment, files_of, grid, small_study
 
 
 def assert_same(ours, other):
@@ -355,3 +356,42 @@ def test_there_is_at_least_one_worker(tmp_path):
     with pytest.raises(InputError, match="workers: 0 is out of range"):
         evaluate(study.points[0].scenario, "greedy", workers=0)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("engine", ["batch", "events"])
+def test_a_team_may_be_larger_than_the_fleet_of_some_points(engine, tmp_path):
+    values = {"policies": ["greedy,tour,random"], "missions": 3, "engine": engine}
+    study = small_study(tmp_path, design=grid(uavs=[1, 3]), logged=1, **values)
+    results = run_study(study, tmp_path / "out", workers=1)
+    (team,) = results.policies
+    alone = evaluate(study.points[0].scenario, "greedy", 3, study.seed)
+    of_one = results.missions.query("point == 0")
+    assert (of_one["reward"].to_numpy() == alone.records.missions["reward"]).all()
+    assert resimulate(results, team, 0, 2).record.uavs.shape == (1,)
+    again = ["simulate", "--of", str(tmp_path / "out"), "--point", "0", "--replication", "2"]
+    assert cli.main(again) == 0
+    with pytest.raises(InputError, match="more policies than the largest fleet has UAVs; allowed"):
+        small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy,tour,random"])
+
+
+def test_a_policy_of_a_file_runs_in_workers_and_an_edited_file_is_noticed(tmp_path):
+    """The command in new processes, since a process keeps the modules that it has imported."""
+    small_study(tmp_path)
+    file = tmp_path / "still_policy.py"
+    code = "class Still:\n    name = 'still'\n    def act(self, view):\n"
+    code += "        return [4] * len(view)\n"
+    file.write_text(code)
+    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "out"]
+    command += ["--policy", "still_policy.py:Still"]
+
+    def run(*options):
+        asked = {"cwd": tmp_path, "env": environment(), "capture_output": True, "text": True}
+        return subprocess.run([*command, *options], **asked)
+
+    assert run("--missions", "40", "--workers", "2").returncode == 0
+    (team,) = load_results(tmp_path / "out").store.manifest.policies
+    assert (team.policy, team.members[0].name) == ("still_policy.py:Still", "still")
+    file.write_text(code.replace("[4]", "[0]"))
+    again = run("--missions", "50")
+    assert again.returncode == 2
+    assert "made by other code of still_policy" in again.stderr

@@ -18,6 +18,7 @@ from analysis.replication.scorecard import Finding, Row, departures, of_policy, 
 from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from dess import InputError
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
@@ -279,6 +280,14 @@ def test_any_policy_is_judged_by_the_same_rules(
     assert [row.findings for row in of_ddqn] == [row.findings[:1] for row in expected]
     others = of_policy(studies, "greedy", claims.FIG_5)
     assert {row.findings[0].policy for row in others} == {"greedy"}
+
+
+def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
+    with pytest.raises(InputError, match=r"policy: 'gredy' is not in the study \(did you mean gre"):
+        of_policy(studies, "gredy", claims.FIG_5)
+    for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
+        with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
+            ask("absent")
 
 
 def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:

@@ -306,7 +306,9 @@ def test_foreign_files_stay(out, tmp_path):
 
 def test_a_long_team_has_a_short_folder(tmp_path):
     team = ",".join(["greedy", "random"] * 30)
-    results = run_study(small_study(tmp_path, policies=[team], missions=1), tmp_path / "out")
+    fleet = {"zone": [0, 0, 8, 8], "uavs": 60}
+    study = small_study(tmp_path, policies=[team], missions=1, set=fleet)
+    results = run_study(study, tmp_path / "out")
     assert results.policies == [team]
     assert len(load_results(tmp_path / "out").missions) == 1
 

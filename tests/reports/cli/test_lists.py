@@ -3,6 +3,11 @@
 import subprocess
 import sys
 
+import pytest
+
+import dess as dess_package
+from analysis import load_study
+from dess import ScenarioSpace, load_scenario
 from policies.registry import trained_names
 from tests.analysis.small import environment
 
@@ -32,3 +37,83 @@ def test_the_help_imports_nothing_heavy():
     assert (done.returncode, done.stderr) == (0, "")
     for command in ("simulate", "evaluate", "study", "report", "policies", "scenarios", "studies"):
         assert f"  {command}" in done.stdout
+
+
+def test_a_scenario_is_shown_field_by_field(dess, dess_json):
+    code, out, err = dess("scenarios", "show", "fig1", "--set", "uavs=2")
+    assert (code, err) == (0, "")
+    rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
+    assert rows["uavs"].split()[1:3] == ["2", "[1,"]
+    assert "an integer 1..16 or [low, high]" in rows["uavs"]
+    assert {*ScenarioSpace.model_fields} <= {*rows}
+    shown = dess_json("scenarios", "show", "small.toml")
+    fields = {field.pop("name"): field for field in shown["fields"]}
+    assert [*fields] == [*ScenarioSpace.model_fields]
+    assert fields["cell_size"] == {
+        "meaning": "side of a cell (c)",
+        "unit": "m",
+        "allowed": "a number above 0",
+        "default": 800.0,
+        "value": 800.0,
+    }
+    assert (fields["quota"]["value"], fields["quota"]["default"]) == (60, 440)
+    assert fields["flying_time"]["value"] == [20, 30]
+    assert fields["pads"]["allowed"] == "an integer 1..6"
+
+
+def test_a_scenario_of_ones_own_may_have_a_description(dess, dess_json, tmp_path):
+    (tmp_path / "mine.toml").write_text('description = "my bay"\nuavs = 2\n')
+    assert dess_json("scenarios", "show", "mine.toml")["description"] == "my bay"
+    assert load_scenario(tmp_path / "mine.toml") == load_scenario("paper", uavs=2)
+    code, out, _ = dess("scenarios")
+    assert code == 0
+    assert all(len(line.split(maxsplit=1)[1]) > 20 for line in out.splitlines())
+
+
+def test_a_policy_is_shown_with_its_card(dess, dess_json, tmp_path):
+    code, out, _ = dess("policies", "show", "greedy")
+    assert code == 0
+    assert "any scenario; of the shipped ones bay, fig1, fig4, paper" in out
+    assert "Fly to the node with the most residual data" in out
+    shown = dess_json("policies", "show", "ddqn")
+    assert shown["scenarios"] == ["fig4", "paper"]
+    assert shown["trained_on"]["uavs"] == [1, 3]
+
+
+def test_a_study_is_shown_as_its_file_sets_it(dess, dess_json, tmp_path):
+    code, out, _ = dess("studies", "show", "fig4")
+    assert code == 0
+    (tmp_path / "again.toml").write_text(out)
+    assert load_study(tmp_path / "again.toml").model_dump() == load_study("fig4").model_dump()
+    assert dess_json("studies", "show", "fig4")["missions"] == load_study("fig4").missions
+
+
+@pytest.mark.parametrize("module", ["dess", "reports"])
+def test_a_package_is_the_command(module):
+    command = [sys.executable, "-m", module, "--version"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == f"dess {dess_package.__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "completed"),
+    [
+        ("dess sim", ["simulate"]),
+        ("dess scenarios show fig", ["fig1", "fig4"]),
+        ("dess policies show near", ["nearest"]),
+        ("dess simulate --scenario pap", ["paper"]),
+        ("dess simulate --policy greedy,tou", ["greedy,tour"]),
+        ("dess simulate --set charge_", ["charge_rate=", "charge_start=", "charge_complete="]),
+        ("dess study run fig", ["fig1", "fig4", "fig5"]),
+        ("dess evaluate --policy nea", ["nearest"]),
+        ("dess sweep --set qu", ["quota="]),
+        ("dess train qui", ["quick"]),
+    ],
+)
+def test_the_shell_completes_names(words, completed):
+    asked = {"_DESS_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": "9"}
+    asked["COMP_CWORD"] = str(len(words.split()) - 1)
+    command = [sys.executable, "-m", "dess"]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment() | asked)
+    assert (done.stdout.split(), done.stderr) == (completed, "")

@@ -35,7 +35,7 @@ REFUSED = {
     "uavs": "'uavs' is not KEY=VALUES; allowed: a field",
     "uavs=": "uavs: has no values",
     "uavs=2,,3": "'uavs=2,,3' is not KEY=VALUES",
-    "uavs=two": "--set: uavs: 'two' has the wrong form; allowed: number of UAVs",
+    "uavs=two": "--set: uavs: 'two' has the wrong form; allowed: an integer or [low, high]",
     "uavs=1]\nquota=[2": "is not KEY=VALUES",
     "arrival_rate=0.1,lots": "arrival_rate: 'lots' is not a number; allowed: a number 0..100",
     "uavs=2,3,2": "uavs: 2 is listed twice",

@@ -1,0 +1,46 @@
+"""Completion of names in the shell: what ``--install-completion`` asks for while somebody types.
+
+Each function gets the beginning of a word and returns the words that it may become.
+"""
+
+from collections.abc import Iterable
+
+
+def policies(start: str) -> list[str]:
+    """Names of policies; of a team ``P,P,...`` the last one."""
+    from policies import names
+
+    before, comma, last = start.rpartition(",")
+    return [f"{before}{comma}{name}" for name in _beginning(names(), last)]
+
+
+def scenarios(start: str) -> list[str]:
+    """Names of shipped scenarios."""
+    from dess import scenario_names
+
+    return _beginning(scenario_names(), start)
+
+
+def studies(start: str) -> list[str]:
+    """Names of shipped studies."""
+    from analysis import study_names
+
+    return _beginning(study_names(), start)
+
+
+def configs(start: str) -> list[str]:
+    """Names of shipped configs of trainings."""
+    from policies.ddqn.config import config_names
+
+    return _beginning(config_names(), start)
+
+
+def fields(start: str) -> list[str]:
+    """Fields of a scenario, as ``--set`` takes them."""
+    from dess import ScenarioSpace
+
+    return [f"{name}=" for name in _beginning(ScenarioSpace.model_fields, start)]
+
+
+def _beginning(names: Iterable[str], start: str) -> list[str]:
+    return [name for name in names if name.startswith(start)]
