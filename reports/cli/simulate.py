@@ -181,7 +181,7 @@ def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T
     if given is None:
         raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
     if given not in there:
-        end = one_of(given, there) if isinstance(given, str) else f"; allowed: {allowed}"
+        end = one_of(given, map(str, there)) if isinstance(given, str) else f"; allowed: {allowed}"
         raise InputError(f"--{option}: {given!r} is not in the study{end}")
     return given
 
