@@ -87,11 +87,13 @@ def moved(path: str, text: str) -> str:
 
 
 def shown(path: str) -> str:
-    """The page that shows a file of the repository."""
+    """The page that shows a file of the repository; the search leaves it out."""
     text = (ROOT / path).read_text("utf-8")
     if path.endswith(".md"):
-        return moved(path, text)
-    return f"# {path}\n\n````{PurePosixPath(path).suffix[1:]}\n{text}````\n"
+        text = moved(path, text)
+    else:
+        text = f"# {path}\n\n````{PurePosixPath(path).suffix[1:]}\n{text}````\n"
+    return f"---\nsearch: {{exclude: true}}\n---\n{text}"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:

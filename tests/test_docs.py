@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 import typer.main
 import yaml
+from PIL import Image
 
 import dess
 import policies
@@ -28,6 +29,7 @@ ROOT = Path(__file__).parents[1]
 PATHS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in PATHS}
 README, OWN_POLICY = PAGES["README.md"], PAGES["docs/how-to/own-policy.md"]
+POLICIES = PAGES["docs/concepts/policies.md"]
 
 
 def blocks(text: str, language: str) -> list[str]:
@@ -138,15 +140,15 @@ def test_nox_sessions_exist() -> None:
     assert {"tests", "reports"} <= named <= set(defined)
 
 
-def test_the_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
-    arguments = next(a for a in command_lines("dess") if "--figure" in a)
-    place = arguments.index("--figure") + 1
-    picture = ROOT / arguments[place]
-    assert f'src="{arguments[place]}"' in README
-    assert picture.stat().st_size < 300_000
-    again = [*arguments[:place], str(tmp_path / "again.png"), *arguments[place + 1 :]]
-    assert cli.main(again) == 0
-    assert (tmp_path / "again.png").read_bytes()[:24] == picture.read_bytes()[:24]  # type and size
+def test_the_moving_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
+    (text,) = re.findall(r"`dess (simulate .*--animation .*?)`", README)
+    *arguments, name = shlex.split(text)
+    picture = ROOT / name
+    assert f'src="{name}"' in README
+    assert picture.stat().st_size < 600_000
+    assert cli.main([*arguments, str(tmp_path / "again.gif")]) == 0
+    with Image.open(picture) as shown, Image.open(tmp_path / "again.gif") as again:
+        assert (again.size, again.n_frames) == (shown.size, shown.n_frames)
 
 
 # --- links and names ---
@@ -249,8 +251,10 @@ def shown(interval: dict[str, float]) -> Any:
     return pytest.approx([100 * interval[key] for key in ("mean", "low", "high")], abs=0.06)
 
 
-def test_the_readmes_table_is_what_its_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    printed = table(README, "policy")
+def test_the_table_of_policies_is_what_its_command_prints(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    printed = table(POLICIES, "policy | success")
     assert printed.pop("paper") == [[pytest.approx(100 * paper.TABLE_IV[m])] for m in METRICS]
     arguments = next(a for a in command_lines("dess") if "--missions" in a and "1000" in a)
     rows = evaluated(arguments, capsys)
@@ -259,9 +263,16 @@ def test_the_readmes_table_is_what_its_command_prints(capsys: pytest.CaptureFixt
         assert printed[row["policy"]] == [shown(row[m]) for m in METRICS]
 
 
+def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
+    rows = re.findall(r"^ +\| .*(?:`(\w+)`|the (paper)'s).*?\| (.*) \|$", README, re.M)
+    assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "paper"]
+    for name, other, cells in rows:
+        assert re.search(rf"^\| `?{name or other}`? \| {re.escape(cells)} \|$", POLICIES, re.M)
+
+
 @pytest.mark.slow
 def test_the_table_by_fleet_is_what_its_commands_print(capsys: pytest.CaptureFixture[str]) -> None:
-    printed = table(PAGES["docs/concepts/policies.md"], "policy")
+    printed = table(POLICIES, "policy | I = 1")
     by_fleet = [a for a in command_lines("dess") if "tour" in a and a[2].startswith("uavs=")]
     assert len(by_fleet) == 3
     for column, arguments in enumerate(by_fleet):
