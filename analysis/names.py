@@ -93,7 +93,7 @@ class Field(NamedTuple):
     """A field of a scenario, as the model declares it, and its value in a scenario.
 
     Attributes:
-        name: The name, as of ``--set``.
+        name: The name, as in ``--set``.
         meaning: What it is, with the symbol of the paper in parentheses.
         unit: Its unit; empty for counts and for what is no number.
         allowed: The values that it may have, in words.

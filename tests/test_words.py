@@ -18,8 +18,6 @@ PRIVATE = {
     r"nobody": "no UAV, no reader",
     r"anew": "again",
     r"reckons? with": "takes into account",
-    r"told": "said, given",
-    r"wanted": "needed",
     r"as of ``": "as for, the result of",
     r"alike": "equal, the same",
 }
@@ -58,5 +56,5 @@ def test_no_private_word_is_used(floor: str) -> None:
 
 
 def test_a_private_word_would_be_found() -> None:
-    for text in ("two lanes", "as it was told", "as of ``compare``", "a lucky mission"):
+    for text in ("two lanes", "as of ``compare``", "a lucky mission"):
         assert any(pattern.search(text) for pattern in PATTERNS), text
