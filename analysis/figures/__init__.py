@@ -1,1 +1,1 @@
-"""One function per figure."""
+"""Figures; each function returns one figure."""

@@ -1,4 +1,4 @@
-"""Figures of one policy against another in the same missions, and of what decisions cost."""
+"""Figures that compare two policies in the same missions, and figures of decision times."""
 
 from collections.abc import Sequence
 
@@ -19,13 +19,13 @@ from analysis.questions.missions import LoggedMission
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
 
-# Blue is ahead, orange behind, on all figures; an inconclusive mean is hollow.
+# In all figures, blue means better, orange worse, and a hollow mark inconclusive.
 COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: style.MUTED}
-EDGE = 0.005  # share of the missions that lies beyond each end of the distribution's axis
+EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
 
 
 def maps(missions: Sequence[LoggedMission]) -> list[list[tuple[Figure, str, str]]]:
-    """Missions drawn, those of one replication together, with alternative texts and captions."""
+    """Maps of missions, those of one replication together, with alternative texts and captions."""
     replications = dict.fromkeys(mission.row["replication"] for mission in missions)
     return [
         [_map(mission) for mission in missions if mission.row["replication"] == replication]
@@ -40,12 +40,12 @@ def _map(mission: LoggedMission) -> tuple[Figure, str, str]:
 
 
 def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
-    """The mean difference along a parameter, a dot with its interval per bin.
+    """The mean difference along a parameter: for each bin a dot with its interval.
 
     Args:
-        table: Rows of ``questions.regions.along``: all of them, for the same axis everywhere.
+        table: All rows of ``questions.regions.along``, so that all figures have the same axis.
         field: The parameter.
-        overall: The mean difference of all missions, drawn as a dashed line.
+        overall: The mean difference over all missions, drawn as a dashed line.
     """
     rows = table[table["field"] == field].sort_values("position")
     with style.look():
@@ -68,7 +68,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
 
 
 def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
-    """The mean difference over two parameters: blue where it is ahead, orange where behind.
+    """The mean difference over two parameters: blue where it is positive, orange where negative.
 
     Args:
         table: Rows of ``questions.regions.across``. Inconclusive means are in brackets.
@@ -103,10 +103,10 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
 
 
 def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
-    """In what share of the missions the difference is no larger than a value.
+    """The distribution function of the difference: the share of the missions up to each value.
 
-    The band holds the whole curve at 95 % (Dvoretzky, Kiefer and Wolfowitz). The axis ends where
-    ``EDGE`` of the missions lie beyond.
+    The 95 % band is for the complete curve (Dvoretzky, Kiefer and Wolfowitz). A share of ``EDGE``
+    of the missions is beyond each end of the axis.
 
     Args:
         missions: Rows of ``questions.head_to_head.duels``.
@@ -142,14 +142,14 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
 
 
 def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
-    """What a decision costs, by policy: of one mission at a time, and in the batch.
+    """The time of a decision, by policy: for one mission at a time, and in the batch.
 
-    A dot is the median of the calls with the UAVs of one mission, its line goes to the quantile
-    that 95 % of them keep below; a diamond is a UAV's share of a call with those of many missions.
+    A dot is the median of the calls for the UAVs of one mission, and its line ends at the 95 %
+    quantile. A diamond is the time per UAV in calls for the UAVs of many missions.
 
     Args:
-        costs: Those of an ``execution.decision_time.Timing``.
-        policies: All policies of the study: they give every policy its colour on all pages.
+        costs: The times of an ``execution.decision_time.Timing``.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     colours = style.policy_colours([*policies, *(cost.policy for cost in costs)])
     with style.look():
@@ -175,7 +175,7 @@ def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
 
 
 def _ends(table: pd.DataFrame) -> tuple[float, float]:
-    """An axis for all intervals, and 0."""
+    """The ends of an axis that contains all intervals and 0."""
     low, high = min(table["low"].min(), 0.0), max(table["high"].max(), 0.0)
     room = max(0.06 * (high - low), 0.002)
     return low - room, high + room

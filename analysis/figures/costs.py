@@ -1,4 +1,4 @@
-"""Figures of what settings cost: cost against a metric, with the Pareto front."""
+"""Figures of the costs of settings: cost against a metric, with the Pareto front."""
 
 import pandas as pd
 from matplotlib.axes import Axes
@@ -8,22 +8,22 @@ from matplotlib.ticker import FuncFormatter, LogLocator, PercentFormatter
 from analysis.figures import style
 from analysis.names import COST, metric_name
 
-WIDE = 20.0  # the ratio of costs from which on their axis is logarithmic
-MANY = 10_000  # costs from which on they are in thousands
-MOST_NAMES = 6  # settings on the front that are named
+WIDE = 20.0  # if the costs differ by this factor, their axis is logarithmic
+MANY = 10_000  # costs above this are written in thousands
+MOST_NAMES = 6  # largest number of settings on the front that are named
 FAINT = 0.15  # the opacity of a setting that is not on the front
 
 
 def front(table: pd.DataFrame, metric: str, currency: str, required: float | None = None) -> Figure:
     """Cost against a metric under one condition, with 95 % intervals and the front.
 
-    The larger and darker a setting is, the more probable it is that it is on the front.
+    The larger and darker a mark, the higher the probability that the setting is on the front.
 
     Args:
         table: Rows of ``questions.costs.front``.
         metric: The metric of the front.
-        currency: Of the costs.
-        required: The least mean of the metric that is required, for a line.
+        currency: The currency of the costs.
+        required: The required mean of the metric, drawn as a line.
     """
     colours = style.policy_colours(table["policy"])
     with style.look():
@@ -66,7 +66,7 @@ def _names(rows: pd.DataFrame, metric: str, ax: Axes) -> None:
 
 
 def _costs_axis(costs: pd.Series, currency: str, ax: Axes) -> None:
-    """Costs at round values, in thousands if large; logarithmic where they differ a lot."""
+    """A cost axis with round values: in thousands if large, logarithmic if they differ much."""
     least, most = costs.min(), costs.max()
     if least > 0 and most / least > WIDE:
         ax.set_xscale("log")

@@ -1,4 +1,4 @@
-"""Figures of trainings: the paper's Fig. 3, the variants' ends, and the curve of one training.
+"""Figures of trainings: the paper's Fig. 3, the variants' final metrics, and single trainings.
 
 Each returns a figure of its own; nothing touches pyplot's state.
 """
@@ -19,10 +19,10 @@ from analysis.names import METRICS
 from analysis.questions.learning.curves import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
-# What is evaluated while training, and its name.
+# The metrics that are evaluated while training, and their names.
 NAMES = {REWARD: "Cumulative reward", **EVALUATED}
 
-# A variant whose trainings all reach less than this share of the baseline lies off the axis.
+# A variant is off the axis if all of its trainings reach less than this share of the baseline.
 OFF = 0.5
 
 
@@ -30,8 +30,8 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     """A metric against the training step, over several trainings: Fig. 3.
 
     A thick line is the mean of the exponential moving averages over the trainings of a variant, a
-    band its interval, a thin line one training. A phase before the last is dotted, and a vertical
-    line stands where the last begins.
+    band is its interval, and a thin line is one training. Phases before the last one are dotted,
+    and a vertical line marks the beginning of the last phase.
 
     Args:
         curves: Curves, as of ``analysis.questions.learning.curves``.
@@ -58,13 +58,15 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
 
 
 def trainings_caption(counts: Sequence[int]) -> str:
-    """What ``trainings`` shows of variants with so many trainings each."""
+    """The caption of ``trainings`` for the given numbers of trainings of the variants."""
     level = numbers.level(BAND)
     if min(counts) >= FEWEST:
         n = numbers.words([str(count) for count in counts])
         band = f"Bands: {level} by Student's t over n = {n} trainings."
     else:
-        band = f"No band: over n = {min(counts)}, one of {level} would be of no use."
+        band = (
+            f"There is no band, since a band of {level} over n = {min(counts)} would be too wide."
+        )
     return (
         f"Thick: mean of the exponential moving averages (weight of the newest evaluation {ALPHA:g}"
         f"); thin: single trainings; dotted: phase I. {band}"
@@ -72,7 +74,7 @@ def trainings_caption(counts: Sequence[int]) -> str:
 
 
 def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str) -> Figure:
-    """What every variant reaches: its trainings as dots, their mean with interval as a diamond.
+    """The final metric of every variant: trainings as dots, their mean with interval as a diamond.
 
     Args:
         table: Rows of ``analysis.questions.learning.ablation.ablation``.
@@ -106,11 +108,11 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
 
 
 def training(curve: pd.DataFrame, name: str) -> Figure:
-    """What one training reached in its evaluations, by training step, and the weights kept.
+    """The evaluations of one training by training step, with a mark at the selected weights.
 
     Args:
-        curve: The curve of the training, with ``is_best`` where weights were kept.
-        name: Of the policy.
+        curve: The curve of the training, with ``is_best`` where weights were selected.
+        name: The name of the policy.
     """
     kept = curve[curve["is_best"]].iloc[-1]
     with style.look():
@@ -121,7 +123,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
                 ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
                         label="" if n else EVALUATED[metric])  # fmt: skip
         ax.plot(kept["updates"], kept[metric], "*", color=style.INK, markersize=13, zorder=5,
-                label=f"weights kept: {kept[metric]:.1%}")  # fmt: skip
+                label=f"selected weights: {kept[metric]:.1%}")  # fmt: skip
         _phases(curve, ax)
         ax.set(title=name, ylim=(-0.02, 1.04))
         ax.yaxis.set_major_formatter(PercentFormatter(1))
@@ -131,15 +133,15 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
 
 
 def training_caption(seed: int, missions: int) -> str:
-    """What ``training`` shows of a training of a seed, with evaluations of so many missions."""
+    """The caption of ``training`` for a training seed and a number of missions per evaluation."""
     return (
-        f"n = 1 training, of seed {seed}, which has no interval; every evaluation is over "
-        f"{missions:,} missions. The star: the weights that were kept, by the best moving average."
+        f"n = 1 training with seed {seed}, which has no interval. Every evaluation has "
+        f"{missions:,} missions. The star marks the selected weights, which have the best moving average."
     )
 
 
 def _ends(table: pd.DataFrame, values: pd.Series, floor: float) -> tuple[float, float]:
-    """The ends of the axis: all that is not below the floor, intervals included."""
+    """The ends of an axis that contains all values and intervals above the floor."""
     drawn = pd.concat([values, table["low"], table["high"]])
     drawn = drawn[drawn >= floor]
     room = 0.06 * (drawn.max() - drawn.min()) or 0.01
@@ -179,7 +181,7 @@ def _mean(
 
 
 def _phases(curve: pd.DataFrame, ax: Axes) -> None:
-    """A line where the last phase begins, if there is one before it."""
+    """A vertical line at the beginning of the last phase, if there is a phase before it."""
     before = curve.loc[curve["phase"] != curve["phase"].iloc[-1], "updates"]
     if before.empty:
         return

@@ -17,16 +17,17 @@ from analysis.figures import style
 from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
 from dess.scenario import Scenario, ScenarioSpace
 
-# Width of the band [cells] over which the UAVs of a mission are spread where they share a path.
+# Width [cells] over which UAVs on the same path are drawn side by side.
 SPREAD = 0.4
 
 
 def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     """The map of a mission, with the legend of the paper's Table I.
 
-    Arrows are moves, crosses hovering slots, both in the colour of the node that is served in most
-    of the slot's communication slots; grey where none is. Stars are charging slots. UAVs are
-    numbered at their start (diamond) and end (dot) and, where they share a path, shifted apart.
+    An arrow is a move and a cross a slot in which the UAV hovers; both have the colour of the node
+    that is served in most of the slot's communication slots, or grey if none is served. A star is
+    a slot in which the UAV charges. UAVs are numbered at their start (diamond) and end (dot), and
+    drawn side by side where they share a path.
     """
     slots = uav_slots(events)
     # The last is that of node -1, which is none.
@@ -100,7 +101,7 @@ def residual(events: Events, scenario: Scenario, ax: Axes) -> None:
 
 
 def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
-    """UAVs that charge, stacked in their colours, and those that wait for a pad, over time."""
+    """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
     slots, edges = uav_slots(events), np.arange(duration(events) + 1)
     base = np.zeros(len(edges))
     for state in ("charging", "waiting"):
@@ -128,7 +129,7 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
 
 
 def mission_figure(events: Events, scenario: Scenario) -> Figure:
-    """A mission: its map, and under it battery, residual data and charging zone over time."""
+    """A mission: its map, and below it the batteries, residual data and charging over time."""
     with style.look():
         figure = Figure(figsize=(5.6, 11), dpi=style.DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
@@ -169,7 +170,7 @@ def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
 
 
 def _trail(slots: pd.DataFrame, colour: str, ax: Axes) -> None:
-    """The whole way of a UAV as a pale band under its arrows."""
+    """The path of a UAV as a pale band below its arrows."""
     x, y = ([slots[f"from_{axis}"].iloc[0], *slots[axis]] for axis in ("x", "y"))
     ax.plot(x, y, color=colour, alpha=0.16, linewidth=4.5, solid_joinstyle="round", zorder=2)
 
@@ -179,7 +180,7 @@ def _moves(moves: pd.DataFrame, colours: np.ndarray, name: str, ax: Axes) -> Non
     ax.quiver(
         moves["from_x"],
         moves["from_y"],
-        (moves["x"] - moves["from_x"]).round(),  # one cell, whatever the shift
+        (moves["x"] - moves["from_x"]).round(),  # one cell, without the shift of paths
         (moves["y"] - moves["from_y"]).round(),
         color=colours[moves["node"]],
         angles="xy",
@@ -237,7 +238,7 @@ def _map_legend(ax: Axes) -> None:
 def _margin_note(text: str, level: float, ax: Axes) -> None:
     """A note in the right margin, at a level of the y axis."""
     note = style.note_at_right(text, level, ax, 8.5)
-    note.set_in_layout(False)  # maps of one gallery are equally large, whatever the notes say
+    note.set_in_layout(False)  # so that all maps of a gallery have the same size
 
 
 def _time_axis(events: Events, ax: Axes) -> None:

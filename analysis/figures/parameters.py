@@ -1,4 +1,4 @@
-"""Figures of scenario parameters: the paper's Fig. 5, and what the metrics are sensitive to.
+"""Figures of scenario parameters: the paper's Fig. 5, and sensitivity indices.
 
 Each returns a figure of its own; nothing touches pyplot's state.
 """
@@ -24,14 +24,14 @@ def effect(
 ) -> Figure:
     """The metrics against a parameter: a part of Fig. 5.
 
-    A panel per metric, with the same axis for every parameter of the table, and one with the
-    changes from the first value, on an axis of its own.
+    There is a panel per metric, with the same axis for every parameter of the table, and a panel
+    with the differences from the first value, which has its own axis.
 
     Args:
         table: Rows of ``questions.main_effects.effects``, of the policies to draw.
         field: The parameter.
-        changes: Per policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
-        policies: All policies of the study: they give every policy its colour on all pages.
+        changes: For each policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
     """
     rows = table[table["field"] == field]
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
@@ -45,7 +45,10 @@ def effect(
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         for policy, shift in zip(changes, style.shifts(len(changes), half_width), strict=True):
             _changes(changes[policy], shift, style.dot(policy, colours), axes[3])
-        axes[3].set(title=f"Change of the last, from {values[0]} on", ylabel="points")
+        axes[3].set(
+            title=f"Paired difference of the last metric from its value at {values[0]}",
+            ylabel="points",
+        )
         axes[3].yaxis.set_major_formatter(FuncFormatter(style.signed_points))
         axes[3].set(xlim=(-0.4, len(values) - 0.6), xlabel=parameter(field).label)
         axes[3].set_xticks(range(len(values)), values)
@@ -56,11 +59,11 @@ def effect(
 
 
 def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
-    """Sobol indices of every parameter as bars with intervals, the noise in a row of its own.
+    """Sobol indices of every parameter as bars with intervals; the noise has its own row.
 
     Args:
         rows: Rows of ``analysis.questions.summary.sensitivities`` of a policy and a metric.
-        title: Of the figure.
+        title: The title of the figure.
     """
     rows = rows.reset_index(drop=True)
     colour = style.palette()[0]
@@ -84,7 +87,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
 
 
 def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
-    """Differences to the first value, whose own difference is 0."""
+    """The differences from the first value; its own difference is 0."""
     rows = pairs[pairs["first"] == 0].sort_values("second")
     bars = np.concatenate([np.zeros((2, 1)), style.arms(rows, "difference")], axis=1)
     spots = np.array([0, *rows["second"]]) + shift
@@ -93,7 +96,7 @@ def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """An axis for all intervals of a metric, and no shorter than ten points."""
+    """The ends of an axis for all intervals of a metric, at least ten points long."""
     low, high = rows["low"].min(), rows["high"].max()
     room = max(0.06 * (high - low), 0.005)
     return min(low - room, high - 0.1), high + room

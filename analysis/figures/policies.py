@@ -1,4 +1,4 @@
-"""Figures of the metrics of policies in a study: one policy per row, and against the fleet.
+"""Figures of the metrics of policies in a study: a row per policy, or by the number of UAVs.
 
 Each returns a figure of its own; nothing touches pyplot's state.
 """
@@ -17,12 +17,12 @@ _PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
 
 
 def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
-    """A metric of every policy: means with intervals, and the paper's figure as a line.
+    """A metric of every policy: means with intervals, and the paper's number as a line.
 
     Args:
         summary: Rows of ``analysis.summary`` by ``policy``.
         metric: One of ``METRICS``.
-        printed: The paper's figure.
+        printed: The paper's number.
     """
     rows = summary[summary["metric"] == metric].reset_index(drop=True)
     colours = style.policy_colours(rows["policy"])
@@ -49,7 +49,7 @@ def by_fleet(
     Args:
         summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
         metric: One of ``METRICS``.
-        printed: The paper's figures by number of UAVs.
+        printed: The paper's numbers by number of UAVs.
     """
     rows = summary[summary["metric"] == metric]
     colours = style.policy_colours(summary["policy"])

@@ -30,9 +30,9 @@ from analysis.names import (
 from analysis.questions import settings
 from analysis.results.tables import Results
 
-MOST_PANELS = 12  # values of a third field that have a panel of their own
+MOST_PANELS = 12  # largest number of values of a third field with their own panels
 MOST_TICKS = 12
-MARK = "#d55e00"  # of the best cell, and those that are not significantly worse
+MARK = "#d55e00"  # colour that marks the best cell and cells that are not significantly worse
 COLUMNS = 3  # of panels
 
 
@@ -47,10 +47,10 @@ def plot(
 
     Args:
         results: The study.
-        x: The field; all fields but ``x`` and ``hue`` are averaged over the design.
-        hue: A field with a curve per value, in a panel per policy.
+        x: The field; means are taken over all fields except ``x`` and ``hue``.
+        hue: A field with a curve for each value; then there is a panel for each policy.
         metric: The metric.
-        policy: The policy; all, if not given.
+        policy: The policy; by default all policies.
 
     Raises:
         InputError: If there is no such field, metric or policy.
@@ -91,11 +91,11 @@ def heat_map(
 
     Args:
         results: The study.
-        x: The field of the columns; fields that are not named are averaged over the design.
+        x: The field of the columns; means are taken over fields that are not named.
         y: The field of the rows.
         metric: The metric.
-        policy: The policy; that of the best setting, if not given.
-        facet: A third field, with a panel per value: ``shown`` says which.
+        policy: The policy; by default that of the best setting.
+        facet: A third field, with a panel for each of the values that ``shown`` selects.
 
     Raises:
         InputError: If there is no such field, metric or policy.
@@ -134,12 +134,12 @@ def heat_map(
 
 
 def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
-    """The partial dependence of a metric on every varied field, a panel each, with intervals.
+    """The partial dependence of a metric on every varied field, with intervals, in several panels.
 
     Args:
         results: The study; its design varies one field or more.
         metric: The metric.
-        policy: The policy; all, if not given.
+        policy: The policy; by default all policies.
     """
     effects = settings.main_effects(results, metric, policy)
     fields = settings.by_influence(effects)
@@ -160,12 +160,12 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
 
 
 def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
-    """The mean of a metric at every design point against every varied field, a panel each.
+    """The mean of a metric at every design point, against every varied field in several panels.
 
     Args:
         results: The study; its design varies one field or more.
         metric: The metric.
-        policy: The policy; all, if not given.
+        policy: The policy; by default all policies.
     """
     table = settings.ranked(results, metric, policy)
     values = settings.varied(results)
@@ -211,7 +211,7 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
 
 
 def shown(values: Sequence[Any]) -> list[Any]:
-    """The values of a third field that ``heat_map`` has a panel for: evenly spread, if many."""
+    """The values of a third field with a panel in ``heat_map``; evenly spaced if there are many."""
     places = np.linspace(0, len(values) - 1, min(MOST_PANELS, len(values)))
     return [values[round(place)] for place in places]
 
@@ -219,7 +219,7 @@ def shown(values: Sequence[Any]) -> list[Any]:
 def _curves(
     rows: pd.DataFrame, x: str, looks: dict[str, tuple[str, str]], values: Sequence[Any], ax: Axes
 ) -> None:
-    """Means with intervals along the values of a field: numbers at their places, others evenly."""
+    """Means with intervals along a field; values that are not numbers are evenly spaced."""
     places, names = _axis(values)
     spots = rows[x].map(dict(zip(values, places, strict=True))).astype(float)
     gap = float(np.diff(places).min()) if len(places) > 1 else 1.0
@@ -237,7 +237,7 @@ def _cells(
     columns: int,
     ax: Axes,
 ) -> Any:
-    """The cells of a panel, coloured; framed where they may be the best, with a star on it."""
+    """The coloured cells of a panel: a star on the best, a frame on those that may be as good."""
     means = np.full(shape, np.nan)
     means[rows["row"], rows["column"]] = rows["mean"]
     shades = "YlGnBu_r" if metric in LESS_IS_BETTER else "YlGnBu"
@@ -262,7 +262,7 @@ def _cells(
 
 
 def _panels(count: int) -> tuple[Figure, np.ndarray]:
-    """A panel per field, two beside each other, with one axis of values."""
+    """A panel per field, two in a row, with the same axis of values."""
     columns = min(2, count)
     lines = ceil(count / columns)
     figure, axes = style.panels(0.9 + 2.3 * lines, lines, "y", ncols=columns, sharey=True,
@@ -278,14 +278,14 @@ def _label(field: str) -> str:
 
 
 def _axis(values: Sequence[Any]) -> tuple[list[float], list[str]]:
-    """Where values are on an axis, and the names of those that are no numbers."""
+    """The positions of values on an axis, and the names of those that are not numbers."""
     if is_numeric_dtype(pd.Series(values)):
         return [*map(float, values)], []
     return [*map(float, range(len(values)))], [*map(value_text, values)]
 
 
 def _name_ticks(axis: XAxis | YAxis, values: Sequence[Any], most: int, first: float = 0.0) -> None:
-    """Names of values at places one apart; of every second or third alone if they are many."""
+    """Ticks with the names of values; only every second or third one if there are many."""
     places = range(0, len(values), ceil(len(values) / most))
     names = [value_text(values[place]) for place in places]
     axis.set_ticks([place + first for place in places], names)
@@ -300,7 +300,7 @@ def _places(column: pd.Series, values: Sequence[Any]) -> pd.Series:
 
 
 def _graded(values: Sequence[Any]) -> dict[str, tuple[str, str]]:
-    """Colours from light to dark and markers, for values in their order."""
+    """Colours from light to dark, and markers, for values in their order."""
     shades = sns.color_palette("flare", len(values)).as_hex()
     return {value_text(v): (shades[k], "os^vPX*"[k % 7]) for k, v in enumerate(values)}
 
@@ -315,5 +315,5 @@ def _of_metric(axis: Axis, metric: str) -> None:
 
 
 def _short(value: float, metric: str) -> str:
-    """A value in a cell."""
+    """A value as it is written in a cell."""
     return f"{100 * value:.1f}" if metric in METRICS else f"{value:,.0f}"

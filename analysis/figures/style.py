@@ -27,7 +27,7 @@ from analysis.numbers import minus
 INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
 SEA, ZONE, ZONE_EDGE = "#f3f8fb", "#ffe08a", "#d9a400"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
-# Policies that look the same in all figures, whichever others are drawn.
+# Policies that look the same in all figures, whatever other policies are drawn.
 KNOWN_POLICIES = (
     *("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"),
     "random-unguarded",
@@ -67,7 +67,7 @@ def panels(
     """A new figure with its axes, one below the other.
 
     Args:
-        height: Of the figure [inches].
+        height: The height of the figure [inches].
         rows: The number of axes.
         values: The axes that have grid lines.
         options: Further arguments of ``Figure.subplots``.
@@ -80,7 +80,7 @@ def panels(
 
 
 def grid_of(values: Literal["x", "y", "xy"], ax: Axes) -> None:
-    """Grid lines for the axes of values alone, and no frame; names stand beside no axis line."""
+    """Draw grid lines only for axes of values, and neither a frame nor a line for axes of names."""
     ax.xaxis.grid("x" in values)
     ax.yaxis.grid("y" in values)
     sns.despine(ax=ax, left=values == "x")
@@ -97,7 +97,7 @@ def node_colours(count: int) -> list[str]:
 
 
 def uav_colours(count: int) -> list[str]:
-    """A dark colour per UAV, the same in a fleet of any size; they come again after eight."""
+    """A dark colour per UAV, the same for fleets of any size; colours repeat after eight UAVs."""
     return [UAVS[uav % len(UAVS)] for uav in range(count)]
 
 
@@ -116,7 +116,7 @@ def policy_colours(policies: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def dot(policy: str, colours: Mapping[str, tuple[str, str]]) -> dict:
-    """How the means of a policy are drawn, as arguments of ``Axes.errorbar``."""
+    """The style of the means of a policy, as arguments of ``Axes.errorbar``."""
     colour, marker = colours[policy]
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
 
@@ -141,9 +141,9 @@ def policy_means(
     Args:
         rows: A row per ``policy`` and value of ``x``, with ``mean``, ``low`` and ``high``.
         x: The column.
-        looks: The policies to draw, as of ``policy_colours``.
+        looks: The policies to draw, as ``policy_colours`` returns them.
         half_width: Half the distance between the outer policies at a value.
-        ax: Where to draw.
+        ax: The axes to draw on.
         options: Further arguments of ``Axes.errorbar``.
     """
     for policy, shift in zip(looks, shifts(len(looks), half_width), strict=True):
@@ -153,7 +153,7 @@ def policy_means(
 
 
 def shifts(count: int, half_width: float) -> np.ndarray:
-    """(count,) offsets from ``-half_width`` to ``half_width``; marks at one value stay apart."""
+    """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
     return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
 
 

@@ -1,4 +1,4 @@
-"""Figures of the verification: what was seen beside what is known, and what a slot consists of.
+"""Figures of the verification: observed and known values, and the parts of a mission slot.
 
 Each returns a figure of its own; nothing touches pyplot's state.
 """
@@ -20,18 +20,18 @@ from analysis.verification.fits import Fit
 from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
-SHOWN = 60  # blocks of a caterpillar
+SHOWN = 60  # number of blocks in a caterpillar plot
 
 
 def fit(observed: Fit, title: str, label: str) -> Figure:
-    """Observed against expected numbers, and how far they are apart in standard errors.
+    """Observed and expected numbers of observations, and their difference in standard errors.
 
-    Where the expected numbers range over more than two powers of ten, their axis is logarithmic.
+    If the expected numbers differ by more than a factor of 100, their axis is logarithmic.
 
     Args:
-        observed: The classes.
-        title: Of the figure.
-        label: What the classes are.
+        observed: The classes with their numbers.
+        title: The title of the figure.
+        label: The label of the classes.
     """
     table, spots = observed.table, np.arange(len(observed.table))
     n = table["expected"].sum()
@@ -60,7 +60,7 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """The mean rate against the distance: closed form, simulation and their difference.
 
     Args:
-        table: As ``lone_uav.rates`` has it.
+        table: The result of ``lone_uav.rates``.
         space: The scenario.
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
@@ -104,16 +104,19 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
 
 
 def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
-    """The intervals of the first blocks of missions, those that miss the mean of all marked.
+    """The intervals of the first blocks; those that do not contain the mean of all are marked.
 
     Args:
-        blocks: As ``analysis.verification.coverage.blocks`` has them.
-        title: Of the figure.
+        blocks: The result of ``analysis.verification.coverage.blocks``.
+        title: The title of the figure.
     """
     shown = blocks.head(SHOWN)
     with style.look():
         figure, ax = style.panels(3.6, values="y")
-        looks = ((True, SEEN, "o", "holds the mean of all"), (False, MISS, "X", "misses it"))
+        looks = (
+            (True, SEEN, "o", "contains the mean of all"),
+            (False, MISS, "X", "does not contain it"),
+        )
         for holds, colour, marker, name in looks:
             rows = shown[shown["holds"] == holds]
             ax.vlines(rows.index + 1, rows["low"], rows["high"], color=colour,
@@ -130,12 +133,13 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
 
 
 def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
-    """The order of events of a mission slot: boxes one below the other, and the way back up.
+    """The order of events in a mission slot: a column of boxes, and an arrow back to the first.
 
     Args:
-        steps: What happens and how, the first before the first slot, the others in every slot.
-        repeated: When another slot begins.
-        end: What follows when none does.
+        steps: The name and description of every step; the first step happens once, before the first
+            slot, the others in every slot.
+        repeated: The condition for another slot.
+        end: What follows after the last slot.
     """
     height, gap = 1.0, 0.35
     tops = [-(height + gap) * number for number in range(len(steps) + 1)]
@@ -163,7 +167,7 @@ def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
 
 
 def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
-    """Deviations in standard errors, and a band that holds all of them in 95 % of such figures."""
+    """Deviations in standard errors, and a band that contains all in 95 % of such figures."""
     band = stats.norm.ppf(1 - (1 - LEVEL) / 2 / max(len(deviations), 1))
     ax.axhspan(-band, band, color=KNOWN, alpha=0.45, linewidth=0)
     ax.axhline(0, color=style.INK, linewidth=0.9)

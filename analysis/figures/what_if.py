@@ -1,4 +1,4 @@
-"""Figures of a what-if question: the variation beside its baseline."""
+"""Figures of a what-if question: the variation and its baseline."""
 
 from collections.abc import Mapping, Sequence
 
@@ -21,7 +21,7 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     Args:
         table: Rows of ``questions.what_if_answer.means``.
         metric: One of ``METRICS``.
-        settings: Of baseline and variation: what is set, in words.
+        settings: What the baseline and the variation set, in words.
     """
     rows = table[table["metric"] == metric]
     colours = style.policy_colours(rows["policy"])
@@ -54,7 +54,7 @@ def gains(answers: pd.DataFrame) -> Figure:
                         linestyle="", label=policy, **style.dot(policy, colours))  # fmt: skip
         ax.axvline(0, color=style.INK, linewidth=0.9, zorder=1)
         ax.set_yticks(range(len(METRICS)), map(_broken, METRICS.values()))
-        ax.set(title="Variation − baseline, mission by mission", xlabel="percentage points",
+        ax.set(title="Variation − baseline (paired differences)", xlabel="percentage points",
                ylim=(len(METRICS) - 0.5, -0.5))  # fmt: skip
         style.points_axis(ax.xaxis, 7)
         style.legend_below(figure, ax)
@@ -62,10 +62,10 @@ def gains(answers: pd.DataFrame) -> Figure:
 
 
 def spread(differences: Mapping[str, pd.Series]) -> Figure:
-    """The distribution of the paired differences of every policy: all, and those in the middle.
+    """The distribution of the paired differences of every policy: all, and the central part.
 
     Args:
-        differences: Per policy, as of ``questions.what_if_answer.differences``.
+        differences: For each policy the result of ``questions.what_if.answer.differences``.
     """
     colours = style.policy_colours(differences)
     tails = (1 - MIDDLE) / 2
@@ -74,7 +74,7 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     room = max(0.04 * (high - low), 0.002)
     with style.look():
         figure, axes = style.panels(5.6, 2, sharey=True)
-        titles = ("Share of missions with that difference or less", "The same, near the middle")
+        titles = ("Share of missions with that difference or less", "The central part of it")
         for ax, title in zip(axes, titles, strict=True):
             for number, (policy, gaps) in enumerate(differences.items()):
                 values = np.sort(gaps.to_numpy(float))
@@ -93,7 +93,7 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
 
 
 def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """An axis for all intervals, no shorter than five points."""
+    """The ends of an axis for all intervals, at least five points long."""
     low, high = rows["low"].min(), rows["high"].max()
     room = max(0.08 * (high - low), (0.05 - (high - low)) / 2, 0.005)
     return low - room, high + room

@@ -1,1 +1,1 @@
-"""What people ask of results, answered in tidy tables."""
+"""Questions about results, answered by functions that return tidy tables."""

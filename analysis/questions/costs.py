@@ -1,12 +1,13 @@
-"""What the settings of a study cost, and which is the cheapest that meets requirements.
+"""The costs of the settings of a study, and the cheapest setting that meets requirements.
 
     results = load_results("results/fleets")  # of a study with a table [costs]
-    front(results, "success")  # cost against success, with the probability to be on the front
+    front(results, "success")  # cost and success, with the probability of being on the front
     judged(results, {"success": 0.99})  # which settings meet that, and the cheapest of them
 
-A setting is a policy at a design point. What an operator decides on, such as the numbers of UAVs
-and pads, is the fleet; all other fields that the design varies are conditions, which a fleet has to
-meet. Fleets are compared under one condition at a time, and over all of them by ``everywhere``.
+A setting is a policy at a design point. The fields that an operator decides on, such as the numbers
+of UAVs and pads, make up the fleet. All other fields that the design varies are conditions under
+which the fleet has to work. Fleets are compared under one condition at a time, and under all
+conditions together by ``everywhere``.
 """
 
 from collections.abc import Mapping
@@ -26,8 +27,8 @@ from analysis.study.costs import PARTS, Costs
 from dess.errors import InputError, one_of
 
 MET, MISSED, OPEN = "met", "missed", "open"
-VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # in tables
-_UNITS = {"uavs": "UAV", "pads": "pad"}  # of which a fleet has a number
+VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables
+_UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
 
 
 def priced(results: Results) -> pd.DataFrame:
@@ -35,8 +36,8 @@ def priced(results: Results) -> pd.DataFrame:
 
     Returns:
         A row per policy and design point: ``condition`` and ``fleet`` in words, ``policy``,
-        ``point``, the varied fields, per metric and for ``cost`` the mean and the ends of its 95 %
-        interval, as of ``settings.ranked``, and ``n`` missions.
+        ``point``, the varied fields, for every metric and for ``cost`` the mean and the ends of its
+        95 % interval (as in ``settings.ranked``), and ``n`` missions.
 
     Raises:
         InputError: If the study has no prices.
@@ -70,15 +71,16 @@ def parts(results: Results) -> pd.DataFrame:
 
 
 def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
-    """Cost against a metric: which settings no other one dominates, under each condition.
+    """The Pareto front of cost and a metric: the settings that no other one dominates.
 
     Args:
         results: The study.
         metric: A column of the missions; more is better.
 
     Returns:
-        The rows of ``priced``, with ``on_front``, by the estimates, and ``probability``, that the
-        setting is on the front of the true means, as of ``stats.front.membership``.
+        The rows of ``priced`` with two more columns. ``on_front`` tells whether the setting is on
+        the front of the estimates, under its condition. ``probability`` is the probability that it
+        is on the front of the true means (``stats.front.membership``).
 
     Raises:
         InputError: If the study has no prices, or there is no such metric.
@@ -100,17 +102,18 @@ def judged(results: Results, requirements: Mapping[str, float] | None = None) ->
 
     Args:
         results: The study.
-        requirements: Metric -> least mean, between 0 and 1; those of the study's selection, if not
-            given.
+        requirements: For each required metric its lowest acceptable mean, between 0 and 1. By
+            default those of the study's selection.
 
     Returns:
-        The rows of ``priced``, with ``verdict``: ``met``, ``missed`` or ``open``; and ``selected``,
-        of each policy under each condition the cheapest that is met. Both are those of the study's
-        selection, with its guarantee; for other requirements they are by the 95 % intervals: met,
-        if all of them are wholly above, missed, if one is wholly below.
+        The rows of ``priced`` with two more columns: ``verdict`` (``met``, ``missed`` or ``open``),
+        and ``selected``, which is true for the cheapest setting of each policy under each condition
+        whose verdict is ``met``. Both are those of the study's selection, with its guarantee. For
+        other requirements they follow from the 95 % intervals: met if all intervals are completely
+        above the requirements, missed if one is completely below.
 
     Raises:
-        InputError: If the study has no prices, or the requirements are none.
+        InputError: If the study has no prices, or the requirements are missing or not allowed.
     """
     rule, table = results.store.manifest.selection, priced(results)
     if isinstance(rule, Cheapest) and requirements in (None, rule.requirements):
@@ -133,7 +136,7 @@ def judged(results: Results, requirements: Mapping[str, float] | None = None) ->
 
 
 def checks(results: Results) -> pd.DataFrame:
-    """The selected settings in missions that did not select them.
+    """The check of the selected settings on missions that were not used for the selection.
 
     Returns:
         A row per policy and selected design point, with the columns of ``priced``.
@@ -142,16 +145,17 @@ def checks(results: Results) -> pd.DataFrame:
 
 
 def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
-    """The fleets over all conditions; empty, if there is but one condition.
+    """The fleets under all conditions together; empty if there is only one condition.
 
     Args:
         results: The study.
-        table: As of ``judged``.
+        table: The result of ``judged``.
 
     Returns:
         A row per policy and fleet that the design has under every condition, the cheapest first:
-        ``policy``, ``fleet``, ``cost``, the mean over the conditions, ``verdict`` over all of them,
-        and ``selected``, of each policy the cheapest that is met everywhere.
+        ``policy``, ``fleet``, ``cost`` (the mean over the conditions), ``verdict`` under all
+        conditions, and ``selected``, which is true for the cheapest fleet of each policy that meets
+        the requirements under every condition.
     """
     conditions = table["condition"].nunique()
     rows = []
@@ -175,12 +179,12 @@ def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
 def answers(
     results: Results, table: pd.DataFrame, requirements: Mapping[str, float] | None = None
 ) -> list[str]:
-    """The cheapest setting of every policy under every condition, and why no cheaper one, in words.
+    """In words: the cheapest setting for each policy and condition, and why no cheaper one.
 
     Args:
         results: The study.
-        table: As of ``judged``.
-        requirements: As of ``judged``.
+        table: The result of ``judged``.
+        requirements: As for ``judged``.
     """
     rule, currency = results.store.manifest.selection, _prices(results).currency
     given = requirements or (rule.requirements if isinstance(rule, Cheapest) else {})
@@ -195,13 +199,13 @@ def answers(
 
 
 def selections(results: Results) -> pd.DataFrame:
-    """What was selected, for a study that selects the cheapest settings; as ``summary`` has it.
+    """What was selected by a study that searches for the cheapest settings.
 
     Returns:
-        A row per policy and condition, and one for all of them, if there are several: ``policy``,
-        ``condition`` in words, ``point`` (none, if no setting is selected, or for all conditions),
-        ``setting``, the fleet in words, ``missions`` of the policy, ``left`` (settings that may be
-        as good), ``guaranteed`` and ``guarantee``.
+        A row per policy and condition and, if there are several conditions, one for all of them:
+        ``policy``, ``condition`` in words, ``point`` (None if no setting is selected, or for all
+        conditions), ``setting`` (the fleet in words), ``missions`` of the policy, ``left`` (number
+        of settings that may be as good), ``guaranteed`` and ``guarantee``.
     """
     conditions, fleets = (_words(results, decisions) for decisions in (False, True))
     rows = []
@@ -246,9 +250,9 @@ def _answer_everywhere(fleets: pd.DataFrame, rows: pd.DataFrame, currency: str) 
     """The answer for one policy over all conditions.
 
     Args:
-        fleets: Its rows of ``everywhere``.
-        rows: Its rows of ``judged``.
-        currency: Of the costs.
+        fleets: The rows of ``everywhere`` for the policy.
+        rows: The rows of ``judged`` for the policy.
+        currency: The currency of the costs.
     """
     best = fleets[fleets["selected"]]
     if best.empty:
@@ -273,14 +277,14 @@ def _what(row: pd.Series, currency: str) -> str:
 
 
 def _metrics(row: pd.Series, wanted: Mapping[str, float]) -> str:
-    """The metrics of a setting, beside what is required of them."""
+    """The metrics of a setting with the requirements, in words."""
     return numbers.words(
         [f"{_name(m)} {_interval(row, m)} ({numbers.level(q)} required)" for m, q in wanted.items()]
     )
 
 
 def _why_not(row: pd.Series, wanted: Mapping[str, float]) -> str:
-    """Why a cheaper setting is not selected."""
+    """Why a cheaper setting is not selected, in words."""
     if row["verdict"] == MET:
         return "meets the requirements as well, and saves less than the indifference"
     short = {m: q for m, q in wanted.items() if row[f"{m}_low"] < q}
@@ -325,7 +329,7 @@ def _checked(requirements: Mapping[str, float] | None) -> Mapping[str, float]:
 
 
 def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
-    """(k, n) values of the settings of some rows; nan where one has not a replication."""
+    """The (k, n) values of the settings of k rows; nan where a setting lacks a replication."""
     missions = results.missions[results.missions["point"].isin(rows["point"])]
     wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
     keys = pd.MultiIndex.from_frame(rows[["policy", "point"]])

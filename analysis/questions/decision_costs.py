@@ -1,6 +1,6 @@
-"""What the decisions of a study's policies cost in time, as tables and remarks to print.
+"""The time that a study's policies take to decide, as tables and sentences to print.
 
-The times were measured by ``execution.decision_time``: a page reads them, and measures nothing.
+The times were measured by ``execution.decision_time``; a page reads them and measures nothing.
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ _SHORT = 12  # characters of a hash that are shown
 
 
 def timed(times: Timing, policies: Sequence[str]) -> list[Cost]:
-    """The costs of the policies that were timed, in this order; all costs, if none of them was."""
+    """The times of the given policies, in their order; all times if none of them was measured."""
     costs = {cost.policy: cost for cost in times.costs}
     return [costs[policy] for policy in policies if policy in costs] or times.costs
 
 
 def listed(times: Timing, costs: Sequence[Cost]) -> pd.DataFrame:
-    """Costs of a timing as a table to print, a row per policy.
+    """The measured times as a table to print, with a row per policy.
 
-    The last column is the speed of a UAV that crosses a cell in the time of a slow call.
+    The last column is the speed of a UAV that crosses one cell in the time of a slow call.
     """
     one, many, fast = "One mission, a call", "Many missions", "Fast enough up to"
     cell_size = times.space.cell_size
@@ -51,7 +51,7 @@ def remarks(times: Timing, results: Results, pair: Pair) -> str:
     sentences = [
         f"{times.missions:,} missions of the scenario {times.scenario}, with cells of "
         f"{times.space.cell_size:g} m, were timed on a processor {times.processor} (number of "
-        f"threads: {times.threads}); of {ROUNDS} rounds of the batch engine, the middle one counts."
+        f"threads: {times.threads}); of {ROUNDS} rounds of the batch engine, the median counts."
     ]
     if pair.policy in costs and pair.baseline in costs:
         ratio = costs[pair.policy].median / costs[pair.baseline].median
@@ -68,7 +68,7 @@ def remarks(times: Timing, results: Results, pair: Pair) -> str:
 
 
 def origin(times: Timing) -> pd.DataFrame:
-    """With what the decisions were timed, as a table to print."""
+    """What the times were measured with, as a table to print."""
     rows = {
         "Scenario": times.scenario,
         "Missions": f"{times.missions:,}",

@@ -1,10 +1,10 @@
-"""Two results folders, mission by mission: what a change of code, weights or libraries did.
+"""Compare two results folders, mission by mission: the effect of changed code or weights.
 
     found = diff(load_results("results/before"), load_results("results/after"))
     found.identical, found.changed, effects(found)
 
-A mission is in both if policy, scenario, seed and replication are the same. It then has the same
-realisation of all random draws in both, so that whatever differs is an effect of the change.
+A mission is in both folders if policy, scenario, seed and replication are the same. Then it has the
+same random draws in both, so that every difference is an effect of the change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,15 +23,15 @@ from analysis.stats.paired import compare
 from dess import InputError
 from dess.record import MISSION_RECORD, UAV_RECORD
 
-_KEYS = ["team", "scenario", "replication"]  # what missions of one seed are matched by
+_KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
 _MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]
 _UAV_FIELDS = [*(UAV_RECORD.names or ())]
-_ORDER = [PRODUCT, RATIO, REWARD]  # of missions by how much they have changed
+_ORDER = [PRODUCT, RATIO, REWARD]  # metrics by whose changes missions are sorted
 
 
 @dataclass(frozen=True, eq=False)
 class Diff:
-    """What differs between two results folders.
+    """The differences between two results folders.
 
     Attributes:
         a: The results of A.
@@ -40,7 +40,8 @@ class Diff:
             those that differ in the records of the mission and of its UAVs, empty if none does),
             ``replication``, and with ``_a`` and ``_b`` each ``policy``, ``point`` and the fields of
             ``MISSION_RECORD``.
-        alone: The missions that only one has: ``only_in`` (``A`` or ``B``), ``what``, ``missions``.
+        alone: The missions that only one folder has: ``only_in`` (``A`` or ``B``), ``what`` they
+            are, and the number ``missions``.
     """
 
     a: Results
@@ -65,9 +66,9 @@ class Diff:
 def diff(a: Results, b: Results) -> Diff:
     """Compare two results, mission by mission.
 
-    If each has a single policy, these are compared whatever their names; otherwise those of the
-    same name are. Two design points are the same if their whole scenarios are. The missions that
-    check a selection are compared as well.
+    If each has a single policy, the two policies are compared, whatever their names are; otherwise
+    policies of the same name are compared. Two design points are the same if their scenarios are
+    equal in all fields. Missions that check a selection are compared as well.
 
     Raises:
         InputError: If the seeds differ, or no mission is in both.
@@ -100,15 +101,16 @@ _ALLOWED = "results folders that share policies, scenarios and replications"
 
 
 def effects(found: Diff, by: Sequence[str] = ("policy_a",)) -> pd.DataFrame:
-    """By how much the missions differ, over those that both have: paired differences B - A.
+    """The paired differences B - A over the missions that both folders have.
 
     Args:
-        found: The missions.
-        by: What forms groups of them: ``policy_a``, or ``policy_a`` and ``point_a``.
+        found: The result of ``diff``.
+        by: The columns that form groups: ``policy_a``, or ``policy_a`` and ``point_a``.
 
     Returns:
-        A row per group, the one with most missions that differ first, and metric: the columns
-        ``by``, ``missions``, ``differ``, ``metric`` and what follows it in ``analysis.compare``.
+        A row per group and metric, the group with most differing missions first: the columns
+        ``by``, ``missions``, ``differ`` (number of missions that differ), ``metric``, and the
+        columns that follow ``metric`` in ``analysis.compare``.
     """
     groups = found.missions.assign(differ=found.missions["fields"] != "").groupby([*by])
     counts = groups["differ"].agg(missions="size", differ="sum").reset_index()
@@ -138,7 +140,7 @@ def most_changed(found: Diff, missions: int) -> pd.DataFrame:
 
 
 def origins(found: Diff) -> list[str]:
-    """How what the two results were made with differs, a line for each part of it."""
+    """In what the origins of the two results differ, with a line for each part."""
     a, b = found.a.store.manifest, found.b.store.manifest
     modules = sorted({*differing(a.code, b.code), *differing(b.code, a.code)})
     teams = {(row.policy_a, row.policy_b): None for row in _policies(found).itertuples()}
@@ -158,7 +160,7 @@ def origins(found: Diff) -> list[str]:
 
 
 def at_hand(results: Results) -> str:
-    """Whether the code, weights and libraries of this process made the results, in words."""
+    """In words: whether the code, weights and libraries of this process made the results."""
     try:
         changes = results.store.manifest.changes_here
     except InputError as error:
@@ -179,7 +181,7 @@ def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _missions(results: Results, teams: Mapping[str, str], scenarios: np.ndarray) -> pd.DataFrame:
-    """All missions with what they are matched by; of design points that are the same, one's."""
+    """All missions with the columns that match them; equal design points count once."""
     rows = pd.concat([results.missions, results.checks], ignore_index=True)
     rows = rows[["policy", "point", "replication", *_MISSION_FIELDS]]
     rows = rows.assign(team=rows["policy"].map(teams), scenario=scenarios[rows["point"]])
@@ -199,7 +201,7 @@ def _uavs(results: Results, missions: pd.DataFrame, numbered: pd.DataFrame) -> p
 
 
 def _differing_fields(missions: pd.DataFrame, uavs: pd.DataFrame) -> np.ndarray:
-    """The names of the fields that differ, for every mission; ``uav quota`` is one of a UAV."""
+    """For every mission the names of the fields that differ; fields of UAVs are ``uav quota``."""
     differ = np.zeros((len(missions), len(_MISSION_FIELDS) + len(_UAV_FIELDS)), bool)
     for column, name in enumerate(_MISSION_FIELDS):
         differ[:, column] = _differs(missions, name)
@@ -211,7 +213,7 @@ def _differing_fields(missions: pd.DataFrame, uavs: pd.DataFrame) -> np.ndarray:
 
 
 def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
-    """Where a field of A and B is not the same bit for bit."""
+    """For every mission, whether a field of A and B differs in any bit."""
     a, b = (pairs[f"{name}_{side}"] for side in "ab")
     if not pd.api.types.is_numeric_dtype(a):
         return (a != b).to_numpy()
@@ -222,7 +224,7 @@ def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
 def _alone(
     side: str, results: Results, missions: pd.DataFrame, others: pd.DataFrame
 ) -> pd.DataFrame:
-    """What only one side has: whole policies, whole design points, replications of a cell."""
+    """What only one side has: complete policies, complete design points, or replications."""
     found = missions[_KEYS].merge(others[_KEYS], how="left", indicator="found")["found"]
     rows = missions[found.to_numpy() != "both"]
     scenario = f"the scenario of study {results.manifest['study']['name']}"

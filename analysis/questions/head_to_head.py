@@ -1,7 +1,7 @@
-"""Two policies in the same missions: how far one is ahead of the other, and where it is worst.
+"""Two policies in the same missions: mean differences, and the missions with the worst results.
 
-For studies of one design point that draws its scenarios. Both policies meet the same realisations,
-so they are compared mission by mission:
+The functions are for studies with one design point whose missions draw their parameters. Both
+policies meet the same random draws, so they are compared mission by mission:
 
     pair = pair_of(results)           # the best learned policy and the best baseline
     missions = duels(results, pair)   # a row per mission, with the difference of the two
@@ -27,7 +27,7 @@ from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_b
 from dess.errors import InputError, one_of
 
 AHEAD, BEHIND = "ahead", "behind"
-OF_BASELINE = "_baseline"  # ends the names of the baseline's metrics
+OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
 
 _VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 _ROUNDING = 1e-12  # the largest difference between equal results
@@ -37,9 +37,9 @@ class Pair(NamedTuple):
     """Two policies to compare.
 
     Attributes:
-        policy: The policy whose lead over the other is shown.
+        policy: The policy that is compared with the other one.
         baseline: The other policy.
-        candidates: Number of pairs that these data chose it from.
+        candidates: Number of pairs among which this pair was chosen, by the same data.
     """
 
     policy: str
@@ -48,19 +48,20 @@ class Pair(NamedTuple):
 
 
 def pair_of(results: Results, learned: str | None = None, heuristic: str | None = None) -> Pair:
-    """The best learned policy of a study, and the best of the others.
+    """The best learned policy of a study, and the best of the other policies.
 
-    The best by collection ratio and communication. A learner of several trainings counts by their
-    mean, and its first training stands for it: the best of several is not the learner. Where all
-    policies have learned, or none has, the best two.
+    Policies are ranked by mean collection ratio and communication. A learner with several trainings
+    is ranked by their mean and represented by its first training, because the best of several
+    trainings would give a biased picture of the learner. If all policies are learned, or none is,
+    the best two policies are compared.
 
     Args:
         results: The study.
-        learned: A policy to take for the first, whatever it is.
-        heuristic: A policy to take for the second.
+        learned: The first policy, in place of the best learned one.
+        heuristic: The second policy, in place of the best of the others.
 
     Raises:
-        InputError: If the study has no two policies, or not the ones that are named.
+        InputError: If the study has fewer than two policies, or lacks a policy that is named.
     """
     for name, given in (("learned", learned), ("heuristic", heuristic)):
         if given is not None and given not in results.policies:
@@ -82,18 +83,18 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
 
 
 def introduction(results: Results, pair: Pair, missions: pd.DataFrame) -> str:
-    """Which policies a pair is of, and in how many missions of ``duels`` it is compared."""
+    """In words: the two policies of a pair, and the number of missions of ``duels``."""
     policy, baseline, candidates = pair
     return (
-        f"**{policy}** is {role(results, policy)}, **{baseline}** {role(results, baseline)}; these "
-        f"data chose them from {candidates} {'pair' if candidates == 1 else 'pairs'}. They are "
-        f"compared in the same {len(missions):,} missions. Differences are {policy} minus "
-        f"{baseline}: above 0, {policy} is ahead."
+        f"**{policy}** is {role(results, policy)}, **{baseline}** is {role(results, baseline)}; "
+        f"they were chosen among {candidates} {'pair' if candidates == 1 else 'pairs'} by these data. "
+        f"They are compared in the same {len(missions):,} missions. Differences are {policy} minus "
+        f"{baseline}; a positive difference means that {policy} is better."
     )
 
 
 def role(results: Results, policy: str) -> str:
-    """What a policy is in a study, such as ``training 1 of 3 of the best learner of the study``."""
+    """The role of a policy in a study, such as ``training 1 of 3 of the best learner ...``."""
     trained, baselines = _ranked(results)
     for rank, trainings in enumerate(trained):
         if policy in trainings:
@@ -132,11 +133,11 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
 
 
 def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
-    """The policy against the baseline in every metric, over all missions of ``duels``.
+    """The policy compared with the baseline in every metric, over all missions of ``duels``.
 
     Returns:
-        A row per metric, as of ``stats.paired.compare``; ``p_adjusted`` also for the choice
-        of the pair.
+        A row per metric, as ``stats.paired.compare`` returns it; ``p_adjusted`` also corrects for
+        the choice of the pair.
     """
     parts = [
         pd.DataFrame({metric: missions[metric + end] for metric in METRICS}).assign(
@@ -158,15 +159,15 @@ def learners_against_baseline(results: Results) -> pd.DataFrame:
 
 
 def verdict(difference: float, p_adjusted: float) -> str:
-    """Whether a policy is ``AHEAD`` or ``BEHIND``, or whether that is ``INCONCLUSIVE``."""
+    """Whether a policy is significantly ``AHEAD`` or ``BEHIND``, or this is ``INCONCLUSIVE``."""
     return _VERDICTS[position_by_test(difference, p_adjusted)]
 
 
 def pairing(comparison: pd.DataFrame) -> str:
-    """How many times as many missions it would take without common ones, for as narrow intervals.
+    """How many times as many independent missions would give equally narrow intervals.
 
     Args:
-        comparison: Rows of ``overall``.
+        comparison: The rows of ``overall``.
     """
     reduction = comparison.set_index("metric").loc[PRODUCT, "variance_reduction"]
     return f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
@@ -204,7 +205,7 @@ def new_training(comparison: Any) -> str:
 
 
 def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
-    """In how many missions of ``duels`` a policy is ahead or behind, or fails alone: to print."""
+    """A table to print: in how many missions each policy is ahead, and fails alone."""
     gap, n = missions["difference"], len(missions)
     more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
     counts = {
@@ -224,13 +225,13 @@ def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
 def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     """The missions of ``duels`` with the policy's lowest collection ratio and communication.
 
-    The worst first; of equal ones, first those that collected the smaller part.
+    The worst mission is first; among equal ones, the one with the lowest collection ratio.
     """
     return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
 
 
 def drawn(missions: pd.DataFrame, pair: Pair, count: int = 2) -> list[tuple[str, int]]:
-    """The missions to draw, by policy and replication: the worst of ``duels``, by both policies."""
+    """The missions to draw: the worst of ``duels``, each with both policies."""
     replications = worst(missions, count)["replication"]
     return [(policy, int(n)) for n in replications for policy in (pair.policy, pair.baseline)]
 

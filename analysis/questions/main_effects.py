@@ -1,7 +1,7 @@
-"""The main effects of scenario parameters: metrics along the values of each, and their shape.
+"""The main effects of scenario parameters: how metrics change with each parameter.
 
-For designs that vary one parameter at a time (the paper's Fig. 5). All values of a parameter meet
-the same replications, so they are compared mission by mission:
+The functions are for designs that vary one parameter at a time, like the paper's Fig. 5. All values
+of a parameter are simulated in the same replications, so they are compared mission by mission:
 
     table = effects(results)
     pairs = changes(results, table, "greedy", "uavs", PRODUCT)
@@ -34,15 +34,16 @@ ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``changes`` by parameter a
 
 @dataclass(frozen=True)
 class Shape:
-    """How a metric goes along the values of a parameter.
+    """How a metric changes along the values of a parameter.
 
-    Two values differ if their Holm-adjusted p-value is at most 1 - ``LEVEL``. Without any that do
-    it stays level; if all differences have one sign it rises or falls; if no two before a value
-    fall and no two behind it rise, it rises to that value, then falls; and the other way round.
+    Two values differ significantly if their Holm-adjusted p-value is at most 1 - ``LEVEL``. If no
+    two values differ, the metric stays level. If all significant differences have the same sign, it
+    rises or falls. If there is a value such that no significant difference before it is a fall and
+    none after it is a rise, the metric rises, then falls; and correspondingly for a valley.
 
     Attributes:
         words: One of ``LEVELS``, ``RISES``, ``FALLS``, ``PEAK``, ``VALLEY``, ``IRREGULAR``.
-        peaks: Positions of the values that the highest point may be at.
+        peaks: Positions of the values at which the maximum may lie.
     """
 
     words: str
@@ -75,7 +76,7 @@ def effects(results: Results) -> pd.DataFrame:
 def changes(
     results: Results, table: pd.DataFrame, policy: str, field: str, metric: str
 ) -> pd.DataFrame:
-    """Every two values of a parameter, compared on the same missions.
+    """Compare every two values of a parameter on the same missions.
 
     Args:
         results: The study.
@@ -125,7 +126,7 @@ def changes_by_field(results: Results, table: pd.DataFrame, metric: str = PRODUC
 
 
 def shape(pairs: pd.DataFrame) -> Shape:
-    """The shape that the differences of ``changes`` leave."""
+    """The shape of a metric that follows from the differences of ``changes``."""
     ups, downs = _differing(pairs, 1), _differing(pairs, -1)
     places = range(int(pairs["second"].max()) + 1)
     peaks = tuple(p for p in places if _passes(p, ups, downs))
@@ -173,13 +174,13 @@ def significantly_lower(pairs: pd.DataFrame, values: Mapping[int, str], value: s
 
 
 def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
-    """The pairs of positions whose values differ, upwards (sign 1) or downwards (sign -1)."""
+    """The pairs of positions with a significant rise (sign 1) or fall (sign -1)."""
     rows = pairs[(pairs["p_adjusted"] <= 1 - LEVEL) & (np.sign(pairs["difference"]) == sign)]
     return set(zip(rows["first"], rows["second"], strict=True))
 
 
 def _passes(peak: int, ups: set[tuple[int, int]], downs: set[tuple[int, int]]) -> bool:
-    """Whether nothing falls on the way to the peak, and nothing rises behind it."""
+    """Whether there is no fall before the peak, and no rise after it."""
     return all(b > peak for _, b in downs) and all(a < peak for a, _ in ups)
 
 

@@ -1,10 +1,10 @@
-"""Single missions of a study: what each collected and left behind, and what its UAVs did.
+"""Single missions of a study: what was collected, what was left, and what the UAVs did.
 
 mission = logged_mission(results, "greedy", point=0, replication=0)
 outcome_table([mission])
 
-Event logs that the study has not kept are made by simulating its missions again. They are kept in
-another folder, under the keys of their cells, so those of other results are never read.
+Event logs that the study has not stored are made by simulating its missions again. They are stored
+in another folder, under the keys of their cells, so that logs of other results are never read.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,19 +24,19 @@ from analysis.stats.intervals import summary
 from dess import InputError
 from dess.scenario import SAMPLED, Scenario
 
-FOLDER = "cross-check"  # of missions simulated again, beside the results folders of the studies
+FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
 
 
 @dataclass(frozen=True, eq=False)
 class LoggedMission:
-    """A mission of a study whose event log is kept.
+    """A mission of a study whose event log is stored.
 
     Attributes:
-        row: Its row of ``Results.missions``.
-        uavs: Its rows of ``Results.uavs``.
-        scenario: What its replication drew.
-        log: Its event log.
+        row: The row of the mission in ``Results.missions``.
+        uavs: The rows of its UAVs in ``Results.uavs``.
+        scenario: The scenario with the parameters that the mission drew.
+        log: The event log.
     """
 
     row: pd.Series
@@ -46,7 +46,7 @@ class LoggedMission:
 
     @property
     def collected(self) -> str:
-        """What it collected, as a part of a sentence."""
+        """How much data the mission collected, as a part of a sentence."""
         collected, total, _ = self.data_units
         return f"{collected} of {total} data units collected"
 
@@ -64,7 +64,7 @@ class LoggedMission:
 
     @property
     def depletions(self) -> str:
-        """Which batteries were depleted, when and how far from the zone, for a sentence."""
+        """Which batteries were depleted, when and how far from the zone, as part of a sentence."""
         left, top, width, height = self.scenario.zone
         parts = []
         depleted = self.log[self.log["event"] == "battery_empty"]
@@ -78,7 +78,7 @@ class LoggedMission:
 
     @property
     def caption(self) -> str:
-        """What happened, for a figure of it."""
+        """What happened in the mission, as the caption of a figure."""
         policy, replication = self.row["policy"], self.row["replication"]
         return (
             f"{policy} in mission {replication}, a single one (n = 1): {self.depletions}. "
@@ -89,10 +89,10 @@ class LoggedMission:
 def logged_mission(
     results: Results, policy: str, point: int = 0, replication: int = 0
 ) -> LoggedMission:
-    """A mission of a study.
+    """A mission of a study with its event log.
 
     Raises:
-        InputError: If its event log has not been kept.
+        InputError: If the event log has not been stored.
     """
     return _mission(results, policy, point, replication, results.events(policy, point, replication))
 
@@ -103,15 +103,16 @@ def keep_logs(
     folder: str | Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Simulate missions again whose event logs are not in ``FOLDER``, and keep the logs there.
+    """Simulate missions again whose event logs are not in ``FOLDER``, and store the logs there.
 
-    A mission whose record is then another one, because other code simulated it, gets none.
+    If the new record of a mission differs from the stored one, because other code simulated it, no
+    log is stored.
 
     Args:
         results: The study.
-        wanted: Policies and replications of missions of the first design point.
-        folder: Holds a results folder per study.
-        progress: Called with the missions done and the missions in all.
+        wanted: Policies and replications of the missions, at the first design point.
+        folder: A folder that contains a results folder per study.
+        progress: Called with the number of missions done and of all missions.
 
     Raises:
         InputError: If a log cannot be written.
@@ -126,7 +127,7 @@ def keep_logs(
 def kept_missions(
     results: Results, wanted: Sequence[tuple[str, int]], folder: str | Path
 ) -> list[LoggedMission]:
-    """Those of the missions whose event logs ``keep_logs`` has kept."""
+    """Those of the missions whose event logs ``keep_logs`` has stored."""
     return [
         _mission(results, policy, 0, replication, log)
         for policy, replication in wanted
@@ -166,7 +167,7 @@ def _mission(
 
 
 def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | None = None) -> Any:
-    """The mean of a metric over the missions of a policy, at a design point or at all of them.
+    """The mean of a metric over the missions of a policy, at one design point or at all.
 
     Returns:
         A row of ``analysis.summary``.
@@ -179,12 +180,12 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
 
 
 def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
-    """A row per mission; data in data units."""
+    """A table to print with a row per mission; data are in data units."""
     return pd.DataFrame([_outcome(mission) for mission in missions])
 
 
 def uav_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
-    """A row per UAV of some missions."""
+    """A table to print with a row per UAV of some missions."""
     return pd.concat([_uavs(mission) for mission in missions], ignore_index=True)
 
 

@@ -1,11 +1,11 @@
-"""How a team shares the sensor nodes: what every UAV collects where, and what is left behind.
+"""How the UAVs of a team share the sensor nodes: what each collects where, and what is left.
 
 From the event log of a mission (``dess.record.EventLog``):
 
     >>> data = collected(results.events("ddqn", point=1), uavs=2, nodes=25)  # (2, 25)
     >>> division(data), sectors(data, nodes)
 
-Nodes and UAVs are in the order of their numbers.
+Nodes and UAVs are in the order of their indices.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ import pandas as pd
 
 from analysis.results.event_log import Events
 
-# A node is left behind if less than this share of the data that it ever held was collected.
+# A node counts as left behind if less than this share of all its data was collected.
 LEFT_BEHIND = 0.5
 
 
 def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
-    """Data that every UAV collected from every node [data units], (I, K)."""
+    """The (I, K) data that every UAV collected from every node [data units]."""
     log = pd.DataFrame(events)
     served = log[log["event"] == "communication"]
     data = np.zeros((uavs, nodes))
@@ -29,21 +29,21 @@ def collected(events: Events, uavs: int, nodes: int) -> np.ndarray:
 
 
 def held(events: Events, nodes: int) -> np.ndarray:
-    """Data that every node ever held: at the start, and what arrived [data units], (K,)."""
+    """The (K,) data of every node in the whole mission: initial and arrived [data units]."""
     return _of_nodes(events, ["mission_start", "arrival"], nodes)
 
 
 def left_behind(events: Events, nodes: int) -> np.ndarray:
-    """Whether less than ``LEFT_BEHIND`` of what a node ever held was collected, (K,)."""
+    """For each of the K nodes, whether less than ``LEFT_BEHIND`` of its data was collected."""
     return np.asarray(
         _of_nodes(events, ["communication"], nodes) < LEFT_BEHIND * held(events, nodes)
     )
 
 
 def far_edges(nodes: np.ndarray) -> np.ndarray:
-    """Whether a node is of the leftmost column or the bottommost row, (K,).
+    """For each of the K nodes, whether it is in the leftmost column or the bottommost row.
 
-    In the paper's layout that is x = 3 or y = 26, the edges away from the charging zone.
+    In the paper's layout these are x = 3 and y = 26, the edges far from the charging zone.
 
     Args:
         nodes: (K, 2) cells x, y; y grows south.
@@ -52,26 +52,28 @@ def far_edges(nodes: np.ndarray) -> np.ndarray:
 
 
 def division(data: np.ndarray) -> float:
-    """The share of the data that came from the UAV which served the node most.
+    """The share of the data that was collected by the UAV which serves the node most.
 
-    1 if every node is served by one UAV alone; 1 / I if all UAVs take as much from every node.
-    Nodes count by the data collected from them. Nan if nothing was collected.
+    It is 1 if every node is served by only one UAV, and 1 / I if all UAVs collect the same amount
+    from every node. Nodes are weighted by the data collected from them. It is nan if nothing was
+    collected.
 
     Args:
-        data: (I, K) as of ``collected``.
+        data: (I, K) result of ``collected``.
     """
     total = data.sum()
     return float(data.max(axis=0).sum() / total) if total else np.nan
 
 
 def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
-    """The share of the data that two UAVs collected each from a sector of its own.
+    """The share of the data that two UAVs collected, each from its own sector.
 
-    The sectors are the two sides of a straight line, the best one for the share. 1 if a line parts
-    the nodes of the one from those of the other; 0.5 at least. Nan if nothing was collected.
+    The sectors are the two sides of the straight line that gives the highest share. The share is 1
+    if a line separates the nodes of the two UAVs, and it is at least 0.5. It is nan if nothing was
+    collected.
 
     Args:
-        data: (2, K) as of ``collected``.
+        data: (2, K) result of ``collected``.
         nodes: (K, 2) cells x, y.
     """
     total = data.sum()
@@ -85,9 +87,10 @@ def sectors(data: np.ndarray, nodes: np.ndarray) -> float:
 
 
 def _directions(nodes: np.ndarray) -> np.ndarray:
-    """Directions (D, 2), one for every order in which lines across them meet the nodes.
+    """The (D, 2) directions that order the nodes in all different ways.
 
-    The order changes where two nodes are level; the directions lie between those changes.
+    The order along a direction changes where two nodes have the same position on it; the returned
+    directions lie between these changes.
     """
     one, other = np.triu_indices(len(nodes), 1)
     gaps = (nodes[other] - nodes[one])[(nodes[other] != nodes[one]).any(axis=1)]

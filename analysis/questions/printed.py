@@ -1,6 +1,6 @@
-"""Estimates beside the figures that the paper prints: tables of text.
+"""Estimates compared with the numbers that the paper prints, as tables of text.
 
-A mark says where the whole interval of an estimate lies, relative to the printed figure.
+A mark tells where the whole interval of an estimate lies relative to the printed number.
 """
 
 from collections.abc import Mapping
@@ -21,15 +21,15 @@ def with_mark(estimate: Any, printed: float) -> str:
 
 
 def beside(estimates: pd.DataFrame, printed: Mapping[str, float]) -> pd.DataFrame:
-    """The metrics of every policy, and their differences to printed figures.
+    """The metrics of every policy, and their differences from the printed numbers.
 
     Args:
         estimates: Rows of ``analysis.summary`` by ``policy``.
-        printed: The printed figures by metric.
+        printed: The printed numbers by metric.
 
     Returns:
-        A row of the printed figures, and one per policy; two columns of text per metric: the mean
-        with its interval, and the difference in percentage points with its mark.
+        A row of the printed numbers and a row per policy, with two columns of text per metric: the
+        mean with its interval, and the difference in percentage points with its mark.
     """
     columns = {("", "Policy"): [PAPER, *estimates["policy"].unique()]}
     for metric, figure in printed.items():
@@ -45,14 +45,15 @@ def beside(estimates: pd.DataFrame, printed: Mapping[str, float]) -> pd.DataFram
 def beside_by_fleet(
     estimates: pd.DataFrame, printed: Mapping[int, Mapping[str, float]]
 ) -> pd.DataFrame:
-    """The metrics of every policy by number of UAVs, with marks relative to printed figures.
+    """The metrics of every policy by number of UAVs, with marks relative to the printed numbers.
 
     Args:
         estimates: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
-        printed: The printed figures by number of UAVs, then by metric.
+        printed: The printed numbers by number of UAVs, then by metric.
 
     Returns:
-        A row of the printed figures, and one per policy; a column of text per metric and number.
+        A row of the printed numbers and a row per policy, with a column of text per metric and
+        number of UAVs.
     """
     columns = {("", "Policy"): [PAPER, *estimates["policy"].unique()]}
     for metric in next(iter(printed.values())):

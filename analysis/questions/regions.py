@@ -1,6 +1,6 @@
-"""Where in the space of scenario parameters one policy is ahead of another, and where behind.
+"""In which regions of the parameter space one policy is better than another, and where worse.
 
-The missions of one design point that draws its scenarios cover the space themselves:
+The missions of a design point that draws its parameters are a sample of the parameter space:
 
     missions = duels(results, pair)           # of questions.head_to_head
     lead = along(missions, pair.candidates)   # mean differences along every parameter
@@ -24,8 +24,9 @@ from analysis.stats.intervals import wilson
 from analysis.stats.paired import paired
 from analysis.stats.verdict import INCONCLUSIVE
 
-BINS = 5  # of a parameter, at most
-DEPTH, LEAST, SHARE = 3, 20, 0.05  # of the tree: depth, and least missions in a leaf (also a share)
+BINS = 5  # largest number of bins of a parameter
+# Of the regression tree: largest depth, and smallest number and share of missions in a leaf.
+DEPTH, LEAST, SHARE = 3, 20, 0.05
 
 Range = tuple[float, float]
 
@@ -36,13 +37,13 @@ def varied(missions: pd.DataFrame) -> list[str]:
 
 
 def halves(missions: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The missions of even replications, to choose by, and those of odd ones, to judge by."""
+    """The missions of even replications, for choosing regions, and of odd ones, for estimates."""
     even = missions["replication"] % 2 == 0
     return missions[even], missions[~even]
 
 
 def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
-    """Values in at most so many bins: one each if they are that few, else by quantiles.
+    """Divide values into at most ``most`` bins: one per value if possible, else by quantiles.
 
     Returns:
         (n,) the bin of each value, and the names of the bins, from the lowest on.
@@ -61,14 +62,15 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
 
     Args:
         missions: Rows of ``duels``.
-        candidates: Pairs that the two policies were chosen from.
+        candidates: Number of pairs among which the two policies were chosen.
 
     Returns:
-        A row per parameter and bin, at most ``BINS`` of about as many missions each: ``field``,
-        ``position``, ``value`` in words, and the columns of a comparison: ``mean``, ``low``,
-        ``high`` (of Student's t, 95 % each), ``p``, ``p_adjusted`` (Holm over all rows, Bonferroni
-        for the choice of the pair), ``verdict``, ``n``, and ``behind``, the share of missions in
-        which the policy is behind, with ``behind_low`` and ``behind_high``.
+        A row per parameter and bin; a parameter has at most ``BINS`` bins of about equally many
+        missions. The columns are ``field``, ``position``, ``value`` in words, and those of a
+        comparison: ``mean``, ``low``, ``high`` (Student's t, 95 % each), ``p``, ``p_adjusted``
+        (Holm over all rows, Bonferroni for the choice of the pair), ``verdict``, ``n``, and
+        ``behind``, the share of missions in which the policy is worse, with ``behind_low`` and
+        ``behind_high``.
     """
     parts = []
     for field in varied(missions):
@@ -82,7 +84,7 @@ def across(missions: pd.DataFrame, first: str, second: str, candidates: int = 1)
 
     Returns:
         A row per pair of bins with missions: ``position``, ``value`` (of the first), ``position_2``
-        and ``value_2`` (of the second), and the columns of a comparison, as of ``along``.
+        and ``value_2`` (of the second), and the columns of a comparison, as in ``along``.
     """
     (codes, names), (codes_2, names_2) = bins(missions[first]), bins(missions[second])
     parts = [
@@ -119,12 +121,12 @@ def dependence(missions: pd.DataFrame) -> pd.DataFrame:
 def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The two parameters that explain most of the difference, and the difference over both.
 
-    The parameters are chosen by the missions of even replications; those of odd ones, which had no
-    part in the choice, give the differences.
+    The parameters are chosen by the missions of even replications. The differences come from those
+    of odd replications, which were not used for the choice.
 
     Returns:
-        Up to two rows of ``dependence``, and rows of ``across``; both empty if fewer than two
-        parameters vary, or there are no missions to judge by.
+        Up to two rows of ``dependence``, and rows of ``across``; both are empty if fewer than two
+        parameters vary, or there are no missions of odd replications.
     """
     chosen_on, judged_on = halves(missions)
     chosen = dependence(chosen_on).head(2)
@@ -135,18 +137,19 @@ def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame
 
 
 def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
-    """Regions of the space in which the difference differs, by a regression tree.
+    """Regions of the parameter space with different mean differences, by a regression tree.
 
-    The tree is grown on the missions of even replications; the estimates come from the odd ones,
-    which had no part in it: else the regions that chance favours would look real.
+    The tree is fitted to the missions of even replications. The estimates come from the missions of
+    odd replications, which were not used for the fit. Otherwise a region would seem to differ only
+    because it was chosen for its random deviations.
 
     Args:
         missions: Rows of ``duels``.
-        candidates: As of ``along``.
+        candidates: As for ``along``.
 
     Returns:
-        A row per region with missions to judge by, the lowest mean first: ``rule`` in words, and
-        the columns of a comparison, as of ``along``.
+        A row per region with missions of odd replications, the lowest mean first: ``rule`` in
+        words, and the columns of a comparison, as in ``along``.
     """
     fields = varied(missions) or [*PARAMETERS][:1]
     grown_on, judged_on = halves(missions)
@@ -178,7 +181,7 @@ def lowest(cells: pd.DataFrame) -> str:
 
 
 def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
-    """How the difference varies with every parameter, as a table to print.
+    """How the difference depends on every parameter, as a table to print.
 
     Args:
         lead: Rows of ``along``.
@@ -223,7 +226,7 @@ def _compared(
     columns: list[str],
     candidates: int,
 ) -> pd.DataFrame:
-    """A row per part of the missions of ``duels`` that has some: its labels and its comparison."""
+    """A row for every part of the missions that is not empty: its labels and its comparison."""
     rows = []
     for labels, missions in parts:
         if missions.empty:
@@ -239,7 +242,7 @@ def _compared(
 
 
 def _equal_means(groups: Any) -> float:
-    """The p-value of equal means; 1 where fewer than two groups have a spread."""
+    """The p-value of equal means; 1 if fewer than two groups have different values."""
     samples = [group.to_numpy() for _, group in groups if np.ptp(group) > 0]
     return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
 
@@ -247,7 +250,7 @@ def _equal_means(groups: Any) -> float:
 def _leaves(
     tree: Any, fields: list[str], node: int = 0, box: Mapping[str, Range] | None = None
 ) -> Iterator[tuple[int, Mapping[str, Range]]]:
-    """The leaves below a node, each with the range (low, high] of every field that is split."""
+    """The leaves below a node of the tree, each with the range (low, high] of every split field."""
     box = box or {}
     left, right = tree.children_left[node], tree.children_right[node]
     if left == right:  # a leaf
@@ -260,7 +263,7 @@ def _leaves(
 
 
 def _rule(missions: pd.DataFrame, box: Mapping[str, Range]) -> str:
-    """A box in words, by the values that missions have in it."""
+    """A box of parameter ranges in words, by the values of the missions in it."""
     sides = []
     for field in (field for field in PARAMETERS if field in box):
         low, high = box[field]

@@ -1,4 +1,4 @@
-"""What a mission depends on: Sobol indices of a Saltelli design, by SALib."""
+"""Global sensitivity analysis: Sobol indices of a Saltelli design, computed with SALib."""
 
 from collections.abc import Mapping, Sequence
 
@@ -28,19 +28,20 @@ def sensitivity(
     A metric of a mission is a function of the parameters, each uniform on its range, and of the
     replication; an index is a share of its variance over the design.
 
-    Of a parameter, ``first`` is the share that falls away, on average, when it is fixed: how far
-    it alone moves the mean; large ones are worth setting with care. ``total`` is the share that
-    stays when all else, the replication included, is fixed: near 0, the parameter does not touch
-    any mission and may stay anywhere in its range. ``total`` above ``first`` means interaction,
-    with other parameters or with the noise; a parameter of high total and no first changes which
-    missions go well, not how many, unless others are set with it.
+    For a parameter, ``first`` is the share of the variance that disappears, on average, when the
+    parameter is fixed. It measures how strongly the parameter alone changes the mean, so parameters
+    with a large ``first`` should be set with care. ``total`` is the share that remains when all
+    other factors, the replication included, are fixed. If it is near 0, the parameter changes no
+    mission and can have any value in its range. A ``total`` above ``first`` means interaction with
+    other parameters or with the noise. A parameter with a high ``total`` and a ``first`` of 0
+    changes which missions go well, but not how many, unless other parameters are set with it.
 
-    Of the noise, ``total`` is the share that is left when all parameters are fixed: averaged over
-    the settings, no setting can remove it, and only more missions average it out. The rest is all
-    that the parameters explain together. ``first`` is the luck that all settings share, which
-    common random numbers take out of comparisons; ``total`` above ``first`` is luck that depends
-    on the setting. What the scenario itself draws from ranges that are not in the design belongs
-    to the noise.
+    For the noise, ``total`` is the share that remains when all parameters are fixed. On average
+    over the settings, no setting can remove it; only more missions reduce its effect on a mean. The
+    rest of the variance is what all parameters explain together. ``first`` is the noise that all
+    settings share, which common random numbers remove from comparisons. ``total`` above ``first``
+    is noise that depends on the setting. Parameters that the scenario draws from ranges, and that
+    are not in the design, belong to the noise.
 
     Args:
         design: The design of the missions.
@@ -54,10 +55,11 @@ def sensitivity(
     Returns:
         A row per metric and parameter, the noise last: ``metric``, ``parameter``, ``first``,
         ``first_low``, ``first_high``, ``total``, ``total_low``, ``total_high`` and ``n``, the
-        number of missions. Intervals are normal, with the bootstrap's standard error: as wide as
-        claimed where the noise rules, wider than need be where the parameters do, because the
-        design is more even than the resamples know. Estimates are not cut: that of a small index
-        may be negative. A metric that is the same in all of A and B has no shares: nan.
+        number of missions. Intervals are normal intervals with the standard error of the bootstrap.
+        Their coverage is right where the noise dominates. Where the parameters dominate they are
+        too wide, because the design covers the space more evenly than the resamples. Estimates are
+        not limited to [0, 1]; that of a small index may be negative. If a metric has the same value
+        in all missions of A and B, its indices are nan.
 
     Raises:
         InputError: If the missions are not one per point of the design, in order.
@@ -81,7 +83,7 @@ def index_table(indices: pd.DataFrame) -> pd.DataFrame:
     """Sobol indices as text, with their intervals.
 
     Args:
-        indices: Rows of ``questions.summary.sensitivities``; those without shares are left out.
+        indices: Rows of ``questions.summary.sensitivities``; rows with nan are left out.
     """
     rows = indices.dropna(subset=["first"])
     columns = {
@@ -129,7 +131,7 @@ def _indices(
         calc_second_order=False,
         num_resamples=resamples,
         conf_level=level,
-        seed=np.random.default_rng(seed),  # not the seed itself: SALib takes 0 for none
+        seed=np.random.default_rng(seed),  # not the seed itself, since SALib takes 0 for "no seed"
     )
     pairs = [(indices[name], indices[f"{name}_conf"]) for name in ("S1", "ST")]
     return np.column_stack(

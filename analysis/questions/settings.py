@@ -1,11 +1,11 @@
-"""The settings of a study: a policy at a design point each, ranked, compared and averaged.
+"""The settings of a study (policies at design points): ranked, compared and averaged.
 
     results = load_results("results/fleets")
     ranked(results)  # the best setting first, and those that may be as good
-    averaged(results, ["uavs"])  # by number of UAVs, over all else that the design varies
+    averaged(results, ["uavs"])  # by number of UAVs, averaged over all other varied fields
 
-All functions compare settings on common replications: every setting meets the same realisation of
-all random draws. ``metric`` is a column of ``results.missions``.
+All functions compare settings on common replications: every setting meets the same random draws.
+``metric`` is a column of ``results.missions``.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,15 +23,16 @@ from analysis.stats.intervals import Interval, column_intervals, stratified
 from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
 
-AS_IT_IS = "the scenario"  # a design point in words, where nothing is varied
-MOST_VALUES, BINS = 12, 5  # a field with more numbers than that has its main effect in bins
+AS_IT_IS = "the scenario"  # a design point in words, if the design varies nothing
+MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
 
 def varied(results: Results) -> dict[str, list[Any]]:
     """The fields that have more than one value over the design, in the order of the study.
 
     Returns:
-        Field -> its values: numbers in ascending order, others as text in the order of the study.
+        For each field its values: numbers in ascending order, others as text in the order of the
+        study.
     """
     table = points(results)
     return {str(field): _ordered(table[field]) for field in table}
@@ -41,8 +42,8 @@ def points(results: Results) -> pd.DataFrame:
     """The values of the varied fields at every design point.
 
     Returns:
-        A row per design point, a column per field. A field that a point does not set has the value
-        of the scenario. What is no number is text: a range is ``5–7.5``.
+        A row per design point and a column per field. If a point does not set a field, the value is
+        that of the scenario. Values that are not numbers are text, such as ``5–7.5`` for a range.
     """
     manifest = results.store.manifest
     columns = {}
@@ -78,13 +79,13 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     Args:
         results: The study.
         metric: The metric that ranks them.
-        policy: The policy whose settings are ranked; all policies, if not given.
+        policy: The policy whose settings are ranked; by default all policies.
 
     Returns:
-        A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, per
-        metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as of
+        A row per policy and design point: ``rank``, ``policy``, ``point``, the varied fields, for
+        every metric ``METRIC``, ``METRIC_low`` and ``METRIC_high`` (95 % intervals as in
         ``analysis.summary``), ``n`` missions, and ``tied``: whether the setting may be the best, by
-        ``may_be_best`` over all rows. Of those alike the first in the study has the lower rank.
+        ``may_be_best`` over all rows. Of equal settings, the first in the study has the lower rank.
 
     Raises:
         InputError: If there is no such metric or policy.
@@ -99,7 +100,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[["policy", "point"]]))
         ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
-    table["tied"] = _tied(wide, metric)  # of the metric that ranks, the last of all
+    table["tied"] = _tied(wide, metric)  # by the ranking metric, which was computed last
     sign = 1 if metric in LESS_IS_BETTER else -1
     table = table.iloc[np.argsort(sign * table[metric], kind="stable")].reset_index(drop=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
@@ -111,21 +112,22 @@ def averaged(
 ) -> pd.DataFrame:
     """Means of every policy at each combination of values of some fields.
 
-    Where several design points have the values, the mean is over these points: the partial
-    dependence on the fields, over the design. The intervals hold for the design as it is: its
-    points are strata, as of ``stats.intervals.stratified``. Counted are the replications that all
-    these points have.
+    Where several design points have the same values of these fields, the mean is taken over these
+    points (partial dependence on the fields). The intervals are conditional on the design: its
+    points are strata, see ``stats.intervals.stratified``. Only replications that all these points
+    have are counted.
 
     Args:
         results: The study.
-        by: Varied fields; some, at least.
+        by: One or more varied fields.
         metric: The metric.
-        policy: The policy; all, if not given.
+        policy: The policy; by default all policies.
 
     Returns:
         A row per policy and combination, in the order of the study: ``policy``, the fields,
-        ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` that the mean is over,
-        and ``tied``: whether the combination may be the best of this policy.
+        ``mean``, ``low``, ``high`` (95 %), ``n`` replications, ``points`` (number of points that
+        the mean is taken over), and ``tied``: whether the combination may be the best of this
+        policy.
 
     Raises:
         InputError: If there is no such field, metric or policy.
@@ -140,10 +142,10 @@ def averaged(
 def main_effects(
     results: Results, metric: str = PRODUCT, policy: str | None = None
 ) -> pd.DataFrame:
-    """The partial dependence of a metric on every varied field, as of ``averaged``.
+    """The partial dependence of a metric on every varied field, see ``averaged``.
 
-    A field with more than ``MOST_VALUES`` numbers, as of a sampled design, is cut into bins with
-    about as many design points.
+    A field with more than ``MOST_VALUES`` numbers, as in a sampled design, is divided into bins
+    with about equally many design points.
 
     Returns:
         A row per field, policy and value: ``field``, ``value`` in words, ``position`` (0, 1, ... in
@@ -166,14 +168,14 @@ def at_best(results: Results, table: pd.DataFrame) -> pd.DataFrame:
 
     Args:
         results: The study.
-        table: Its ``ranked``.
+        table: The result of ``ranked``.
     """
     best = table.drop_duplicates("policy")[["policy", "point"]]
     return results.missions.merge(best, on=["policy", "point"])
 
 
 def by_influence(effects: pd.DataFrame) -> list[str]:
-    """The fields by how far the metric moves along their values, the widest first.
+    """The fields, sorted by the size of their effect on the metric, the largest first.
 
     Args:
         effects: Rows of ``main_effects``.
@@ -184,7 +186,7 @@ def by_influence(effects: pd.DataFrame) -> list[str]:
 
 
 def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) -> pd.DataFrame:
-    """Every design point against a baseline point, for the same policy on the same replications.
+    """Every design point compared with a baseline point, with the same policy and replications.
 
     Args:
         results: The study.
@@ -202,7 +204,7 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
     """
     count = len(results.store.manifest.points)
     if not 0 <= point < count:
-        raise InputError(f"baseline: {point} is no design point; allowed: 0..{count - 1}")
+        raise InputError(f"baseline: {point} is not a design point; allowed: 0..{count - 1}")
     tables = []
     for metric in metrics:
         parts = []
@@ -222,20 +224,20 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
 def _averaged(
     results: Results, labels: pd.DataFrame, metric: str, policy: str | None
 ) -> pd.DataFrame:
-    """Means at each combination of labels of design points, as ``averaged`` has them."""
+    """The means at each combination of labels of design points, as ``averaged`` returns them."""
     groups = labels.groupby([*labels], sort=False)
     cell_of, cells = groups.ngroup().to_numpy(), labels.drop_duplicates(ignore_index=True)
     sizes = np.bincount(cell_of)
     missions = _missions(results, metric, policy)
     design = results.manifest["study"]["design"] or {}
-    if sampled := design.get("kind") == "saltelli":  # its samples A and B alone are independent
+    if sampled := design.get("kind") == "saltelli":  # only its samples A and B are independent
         last = len(design["ranges"]) + 2
         missions = missions[(missions["point"] % (last + 1)).isin((0, last))]
     missions = missions.assign(cell=cell_of[missions["point"].to_numpy()])
     tables = []
     for name, part in missions.groupby("policy", sort=False):
         units = part.groupby(["cell", "replication"])[metric].agg(["mean", "size"])
-        if not sampled:  # replications that all points of a cell have
+        if not sampled:  # only replications that all points of a cell have
             units = units[units["size"] == sizes[units.index.get_level_values("cell")]]
         wide = units["mean"].unstack("cell").reindex(columns=range(len(cells)))
         if sampled:
@@ -251,11 +253,11 @@ def _averaged(
 
 
 def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.DataFrame:
-    """``mean``, ``low``, ``high``, ``n`` of every cell, over its points as strata; nan without any.
+    """``mean``, ``low``, ``high`` and ``n`` of every cell, with its points as strata, or nan.
 
     Args:
-        values: (R, K) a row per replication, a column per design point.
-        cell_of: (K,) the cell that every point is in.
+        values: (R, K) a row per replication and a column per design point.
+        cell_of: (K,) the cell of every point.
         metric: The metric.
     """
     samples, rows = values.to_numpy(float), []
@@ -268,7 +270,7 @@ def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.D
 
 
 def check_metric(results: Results, metric: str) -> None:
-    """Raise ``InputError`` if missions have no such metric."""
+    """Raise ``InputError`` if the missions do not have the metric."""
     known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in results.missions]
     if metric not in known:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, known)}")
@@ -289,7 +291,7 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
 
 
 def _in_order(column: pd.Series) -> pd.Series:
-    """Policies by their order of appearance, other columns as they are: a key to sort by."""
+    """A key for sorting: policies by their order of appearance, other columns unchanged."""
     return column if is_numeric_dtype(column) else pd.Series(pd.factorize(column)[0], column.index)
 
 
@@ -299,14 +301,14 @@ def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
 
 
 def _ordered(values: pd.Series) -> list[Any]:
-    """The different values: numbers and bins in ascending order, others as they come."""
+    """The distinct values: numbers and bins in ascending order, others in order of appearance."""
     unique = values.drop_duplicates()
     ascends = is_numeric_dtype(unique) or isinstance(unique.dtype, pd.CategoricalDtype)
     return (unique.sort_values() if ascends else unique).tolist()
 
 
 def _binned(values: pd.Series) -> pd.Series:
-    """Values, or the bins that they are in, if they are too many numbers."""
+    """The values, or their bins if there are too many different numbers."""
     if not is_numeric_dtype(values) or values.nunique() <= MOST_VALUES:
         return values
     places = pd.qcut(values, BINS, labels=False, duplicates="drop")
@@ -316,7 +318,7 @@ def _binned(values: pd.Series) -> pd.Series:
 
 
 def _hashable(field: str, values: Sequence[Any]) -> list[Any]:
-    """Values as they are, if all are numbers, or as text."""
+    """The values unchanged if all are numbers, otherwise as text."""
     plain = [
         v[0] if isinstance(v, list | tuple) and len({*map(str, v)}) == 1 else v for v in values
     ]
@@ -331,7 +333,7 @@ def _hashable(field: str, values: Sequence[Any]) -> list[Any]:
 
 
 def _numbered(names: Sequence[str], values: Sequence[Any]) -> list[str]:
-    """Names with a number, where different values have the same."""
+    """The names, with a number added where different values have the same name."""
     found: dict[str, list[Any]] = {}
     for name, value in zip(names, values, strict=True):
         if value not in found.setdefault(name, []):

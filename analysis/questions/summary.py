@@ -4,7 +4,7 @@
     best_policy(results.missions)
     comparisons(results)
 
-Every function takes results, or the missions in them.
+Every function takes results, or the missions of results.
 """
 
 import json
@@ -37,7 +37,7 @@ def means(results: Results) -> pd.DataFrame:
     """Means with intervals of every policy at every design point.
 
     Returns:
-        A row per policy, design point and metric, as ``analysis.summary`` has it.
+        A row per policy, design point and metric, as ``analysis.summary`` returns it.
     """
     return summary(results.missions, by=["policy", "point"])
 
@@ -131,13 +131,14 @@ def guard_in_words(means: pd.DataFrame) -> str:
 
 
 def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
-    """Policies by their mean collection ratio and communication, the best one first.
+    """The policies by their mean collection ratio and communication, the best one first.
 
-    Every design point has the same weight. Of policies alike the first to appear is the better.
+    Every design point has the same weight. Of policies with equal means, the one that appears first
+    is ranked first.
 
     Args:
         missions: A row per mission.
-        among: The policies to rank; all, if not given.
+        among: The policies to rank; by default all.
     """
     if among is not None:
         missions = missions[missions["policy"].isin([*among])]
@@ -191,11 +192,12 @@ def worst(
 
 
 def comparisons(results: Results) -> pd.DataFrame:
-    """Every policy against the best one on the same missions, over all design points.
+    """Every policy compared with the best one on the same missions, over all design points.
 
     Returns:
-        A row per policy and metric, as of ``analysis.compare``, ``p_adjusted`` also for the choice
-        of the best; empty if there is one policy, or a stopping rule gave each its own missions.
+        A row per policy and metric, as ``analysis.compare`` returns it; ``p_adjusted`` also
+        corrects for the choice of the best policy. Empty if there is only one policy, or if a
+        stopping rule gave the policies different missions.
     """
     if len(results.policies) < 2 or not _same_missions(results):
         return pd.DataFrame()
@@ -204,10 +206,10 @@ def comparisons(results: Results) -> pd.DataFrame:
 
 
 def learners(results: Results) -> dict[str, list[str]]:
-    """The trained policies by learner: those of one learner differ in the seed of their training.
+    """The trained policies by learner; those of one learner differ in the seed of their training.
 
     Returns:
-        Name of the learner -> its policies, in the order of the study.
+        For the name of each learner its policies, in the order of the study.
     """
     policies: dict[str, list[str]] = {}
     for team in results.store.manifest.policies:
@@ -219,13 +221,13 @@ def learners(results: Results) -> dict[str, list[str]]:
 
 
 def learned_against_heuristic(results: Results) -> pd.DataFrame:
-    """Every learner against the best policy that has not learned, on the same missions.
+    """Every learner compared with the best policy that is not learned, on the same missions.
 
     Returns:
-        A row per learner and metric, as of ``analysis.compare_learners``: about the learner where
-        it has several trainings, else about this one checkpoint; ``p_adjusted`` also for the choice
-        of the best. Empty if there is nothing to compare, or a stopping rule gave each policy its
-        own missions.
+        A row per learner and metric, as ``analysis.compare_learners`` returns it: about the learner
+        if it has several trainings, otherwise about this one checkpoint. ``p_adjusted`` also
+        corrects for the choice of the best policy. Empty if there is nothing to compare, or if a
+        stopping rule gave the policies different missions.
     """
     trained = learners(results)
     learned = {policy for checkpoints in trained.values() for policy in checkpoints}
@@ -243,11 +245,11 @@ def _same_missions(results: Results) -> bool:
 
 
 def distributions(results: Results) -> pd.DataFrame:
-    """How collection ratio and communication spreads over the missions of every policy.
+    """The distribution of collection ratio and communication over the missions of every policy.
 
     Returns:
-        A row per policy and view, as of ``analysis.distribution``; empty if there are several
-        design points, whose missions are not alike.
+        A row per policy and view, as ``analysis.distribution`` returns it. Empty if there are
+        several design points, whose missions have different distributions.
     """
     if len(results.store.manifest.points) > 1:
         return pd.DataFrame()
@@ -275,7 +277,7 @@ def precisions(results: Results) -> pd.DataFrame:
 
 
 def sensitivities(results: Results) -> pd.DataFrame:
-    """How much each metric of each policy depends on each parameter, and on the noise.
+    """The Sobol indices of each metric of each policy for each parameter and for the noise.
 
     Returns:
         A row per policy, metric and parameter: ``policy``, and the columns of
@@ -297,9 +299,9 @@ def selections(results: Results) -> pd.DataFrame:
     """The design point that was selected for every policy, and its guarantee.
 
     Returns:
-        A row per policy: ``policy``, ``point``, ``setting`` in words, ``missions`` that it took,
-        ``left`` (points not ruled out), ``guaranteed``, ``guarantee`` in words. Empty if the study
-        selects nothing. A study that selects the cheapest setting has the rows of
+        A row per policy: ``policy``, ``point``, ``setting`` in words, number of ``missions``,
+        ``left`` (number of points not ruled out), ``guaranteed``, and ``guarantee`` in words. Empty
+        if the study selects nothing. For a study that selects the cheapest setting, the rows of
         ``costs.selections``.
     """
     if isinstance(results.store.manifest.selection, Cheapest):
@@ -316,7 +318,7 @@ def selections(results: Results) -> pd.DataFrame:
 
 
 def checks(results: Results) -> pd.DataFrame:
-    """Means with intervals of what was selected, over missions that did not select it."""
+    """Means with intervals of the selected points, over missions not used for the selection."""
     return summary(results.checks, by=["policy", "point"])
 
 

@@ -1,1 +1,1 @@
-"""The paper: its printed figures, its claims, and the verdicts on them."""
+"""The replication of the paper: its printed numbers, its claims, and the verdicts on them."""

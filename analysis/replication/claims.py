@@ -1,6 +1,6 @@
 """The claims of the paper's Section V: what each says, which rule judges it, what is measured.
 
-For a claim, read its entry here; what its rule means stands in ``rules``.
+The rules are in ``verdict_rules``, the measures in ``measures``.
 """
 
 from collections.abc import Callable
@@ -14,7 +14,7 @@ from analysis.replication import verdict_rules as rules
 from analysis.replication.measures import Measured, Quantity
 from analysis.replication.verdict_rules import Rule
 
-TRAININGS = "trainings"  # beside the names of studies, for claims on learning curves
+TRAININGS = "trainings"  # in place of the name of a study, for claims about learning curves
 
 
 @dataclass(frozen=True)
@@ -23,11 +23,11 @@ class Claim:
 
     Attributes:
         text: What the paper claims.
-        place: Where it does so.
-        rule: Which rule judges it.
-        measure: What the rule judges, of the evidence that the section names.
-        printed: The paper's figure, if it prints one.
-        basis: What is measured, in words, where the text does not say so.
+        place: Where in the paper the claim stands.
+        rule: The rule that judges the claim.
+        measure: The function that computes what the rule judges, from the evidence of the section.
+        printed: The paper's number, if it prints one.
+        basis: What is measured, in words, if the text does not say so.
     """
 
     text: str
@@ -38,14 +38,14 @@ class Claim:
     basis: str = ""
 
     def rule_in_words(self, margin: float) -> str:
-        """How it is judged, with a difference that does not matter."""
+        """The rule in words; ``margin`` is the difference that does not matter."""
         return f"{self.basis} {self.rule.in_words(margin)}".strip()
 
 
 class Section(NamedTuple):
-    """Claims that stand together: their heading, page with the evidence, study, and they.
+    """Claims about the same evidence: a heading, the page with the evidence, the study, the claims.
 
-    The page is ``mission.html#fig-4``, say; the study may be ``TRAININGS``.
+    The page is, for example, ``mission.html#fig-4``; the study may be ``TRAININGS``.
     """
 
     heading: str
@@ -55,19 +55,19 @@ class Section(NamedTuple):
 
 
 def _printed(metric: str, figure: float, missions: int = 0) -> Quantity:
-    """A figure of the paper, with an interval where it is a share of so many missions."""
+    """A number of the paper, with an interval if it is a share of a known number of missions."""
     if metric in SHARES and missions:
         return Quantity(*paper.spread(figure, missions), n=missions)
     return Quantity(figure, n=missions)
 
 
 def _printed_gain(metric: str, uavs: int) -> Quantity:
-    """What one more UAV changes in the paper's Fig. 4."""
+    """The effect of one more UAV in the paper's Fig. 4."""
     gain = paper.FIG_4[uavs][metric] - paper.FIG_4[uavs - 1][metric]
     return Quantity(gain, unit="points")
 
 
-# Values that the paper names, as those of a study are called.
+# Values that the paper names, in the form that the studies use.
 _THREE, _LONE = value_text(paper.BEST_UAVS), value_text(paper.LONE_UAV)
 _EARLIEST = value_text(paper.EARLIEST_CHARGE)
 _ADVENTUROUS = tuple(map(value_text, paper.ADVENTUROUS))
@@ -85,7 +85,7 @@ _second_uav = partial(measures.change, field="uavs", first="1", second="2")
 _third_uav = partial(measures.change, field="uavs", first="2", second="3")
 
 # fmt: off
-# Of every claim the first lines are the paper's, the others are ours.
+# In every claim, the first lines are what the paper says; the others are how we judge it.
 
 TABLE_4 = Section("Table IV: random missions", "performance.html#table-4", "table4", [
     *(Claim(

@@ -1,6 +1,6 @@
-"""What the paper's claims are judged by: the results of one policy in one study, and trainings.
+"""The evidence for judging the paper's claims: results of one policy in one study, and trainings.
 
-What the results lack raises ``MissingError``: the claim then has no results.
+If results lack something, ``MissingError`` is raised, and the claim has no results.
 """
 
 from collections.abc import Mapping
@@ -18,15 +18,15 @@ from analysis.results.tables import Results
 
 
 class MissingError(Exception):
-    """Results that a claim needs are not there."""
+    """Results that a claim needs are missing."""
 
 
 class Pairs(NamedTuple):
     """The values of a parameter, compared with each other.
 
     Attributes:
-        changes: As of ``main_effects.changes``.
-        positions: Position of every value, by its words.
+        changes: The result of ``main_effects.changes``.
+        positions: The position of every value, by its text.
     """
 
     changes: pd.DataFrame
@@ -39,7 +39,7 @@ class Pairs(NamedTuple):
         return self.positions[value]
 
     def leads(self, *values: str) -> pd.DataFrame:
-        """By how much the metric is higher at these values than at every other (``other``)."""
+        """How much higher the metric is at these values than at every other value (``other``)."""
         chosen = [self.position(value) for value in values]
         first, second = (self.changes[end].isin(chosen) for end in ("first", "second"))
         up, down = self.changes[second & ~first], self.changes[first & ~second]
@@ -52,7 +52,7 @@ class Pairs(NamedTuple):
 
 
 def negated(changes: pd.DataFrame) -> pd.DataFrame:
-    """Differences the other way round."""
+    """The differences with the opposite sign."""
     turned = {"difference": "difference", "low": "high", "high": "low"}
     turned |= {"wide_low": "wide_high", "wide_high": "wide_low"}
     return changes.assign(**{end: -changes[other] for end, other in turned.items()})
@@ -72,14 +72,14 @@ class EvidenceOfPolicy:
 
     @cached_property
     def effects(self) -> pd.DataFrame:
-        """As of ``main_effects.effects``."""
+        """The result of ``main_effects.effects``."""
         return main_effects.effects(self.results)
 
     def missions(self, uavs: int | None = None) -> pd.DataFrame:
-        """The missions of the policy; those of a number of UAVs, if asked.
+        """The missions of the policy, or only those with a number of UAVs.
 
-        Of a study that selects a setting they are those that check it: they had no part in the
-        selection.
+        For a study that selects a setting, these are the missions that check it, which were not
+        used for the selection.
         """
         selects = self.results.manifest["study"]["selection"] is not None
         missions = self.results.checks if selects else self.results.missions
@@ -99,11 +99,11 @@ class EvidenceOfPolicy:
         return Pairs(changes, dict(zip(values["value"], values["position"], strict=True)))
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:
-        """The event logs, with (K, 2) nodes, that are kept of missions with a number of UAVs."""
+        """The stored event logs of missions with a number of UAVs, each with the (K, 2) nodes."""
         missions, logged = self.missions(uavs), self.results.manifest["study"]["logged"]
         missions = missions[missions["replication"] < logged]
         if missions.empty:
-            raise MissingError(f"the study {self.study} keeps no event logs")
+            raise MissingError(f"the study {self.study} stores no event logs")
         return [
             (
                 self.results.events(self.policy, point, replication),
@@ -116,16 +116,16 @@ class EvidenceOfPolicy:
 def evidence_of_policy(
     studies: Mapping[str, Results], study: str, learner: str = "", policy: str = ""
 ) -> EvidenceOfPolicy:
-    """The results of a study for its best learned policy, or another one.
+    """The results of one policy of a study, by default of its best learned policy.
 
     Args:
         studies: Results by the name of the study.
         study: The study.
-        learner: A learner whose best policy to take.
-        policy: A policy to take, whatever it is.
+        learner: A learner, to take its best policy.
+        policy: A policy, to take this one.
     """
     if study not in studies:
-        raise MissingError(f"the study {study} has not run")
+        raise MissingError(f"the study {study} has not been run")
     if policy:
         return EvidenceOfPolicy(studies[study], policy)
     learners = summary.learners(studies[study])
@@ -138,7 +138,7 @@ def evidence_of_policy(
 
 
 class EvidenceOfTrainings(NamedTuple):
-    """Learning curves, and the names of those with transfer learning and of those without."""
+    """Learning curves, and the names of the variants with and without transfer learning."""
 
     trainings: pd.DataFrame
     using: str

@@ -1,6 +1,6 @@
-"""What is measured for the paper's claims: from evidence to figures, and what a rule judges by.
+"""Measures for the paper's claims: functions from evidence to the quantities that a rule judges.
 
-Claims hold a function of these with its metric and values filled in:
+A claim contains one of these functions, with the metric and values filled in:
 
     >>> partial(mean, metric="success")(evidence).quantities
 """
@@ -25,21 +25,21 @@ from analysis.stats.intervals import Interval, bounded_interval, mean_interval, 
 
 Unit = Literal["share", "points", "reward", "steps", "number"]
 
-# Times that the nodes are shuffled, to see what chance gives.
+# Number of random permutations of the nodes, for the share that is expected by chance.
 SHUFFLES = 100
 
 
 class Quantity(NamedTuple):
-    """A figure, with its interval if it has one.
+    """A quantity with its interval, if it has one.
 
     Attributes:
-        value: The figure, in its unit.
-        low: Lower end of its interval, or none.
-        high: Upper end.
-        n: Number of missions, or trainings, that it is from; 0 if none are counted.
-        unit: A ``share``; ``points``, a difference of shares; a ``reward``; training ``steps``; or
-            a ``number``.
-        name: What it is, where the claim does not say so.
+        value: The value, in its unit.
+        low: Lower end of the interval, or None.
+        high: Upper end of the interval, or None.
+        n: Number of missions or trainings that it is computed from; 0 if it is not known.
+        unit: ``share``, ``points`` (for a difference of shares), ``reward``, ``steps`` (of a
+            training) or ``number``.
+        name: What the quantity is, if the claim does not say so.
     """
 
     value: float
@@ -51,7 +51,7 @@ class Quantity(NamedTuple):
 
     @property
     def interval(self) -> Interval:
-        """Value and ends; degenerate where it has none."""
+        """The value and the ends; without an interval, the ends are equal to the value."""
         low = self.value if self.low is None else self.low
         return Interval(self.value, low, self.value if self.high is None else self.high)
 
@@ -60,9 +60,9 @@ class Measured(NamedTuple):
     """What is measured for a claim.
 
     Attributes:
-        arguments: What the judge of the claim's rule takes.
-        quantities: The figures to show; the first is the one to set beside the paper's.
-        note: More of it in words.
+        arguments: The arguments for the judge of the claim's rule.
+        quantities: The quantities to show; the first one is compared with the paper's number.
+        note: A remark in words.
     """
 
     arguments: tuple[Any, ...]
@@ -71,7 +71,7 @@ class Measured(NamedTuple):
 
     @classmethod
     def of(cls, *quantities: Quantity) -> "Measured":
-        """Figures whose intervals are what the judge takes."""
+        """Quantities whose intervals are the arguments of the judge."""
         return cls(tuple(quantity.interval for quantity in quantities), quantities)
 
 
@@ -79,7 +79,7 @@ class Measured(NamedTuple):
 
 
 def mean(evidence: EvidenceOfPolicy, metric: str, uavs: int | None = None) -> Measured:
-    """The mean of a metric over all missions, or those of a number of UAVs."""
+    """The mean of a metric over all missions, or over those with a number of UAVs."""
     return Measured.of(_mean_of(evidence.missions(uavs), metric))
 
 
@@ -108,7 +108,7 @@ def ignored_nodes(evidence: EvidenceOfPolicy) -> Measured:
 
 
 def reached_nodes(evidence: EvidenceOfPolicy) -> Measured:
-    """How many more nodes of the far edges two UAVs reach than one, in the same missions."""
+    """How many more nodes on the far edges two UAVs reach than one UAV, in the same missions."""
     one, two = ([_left_behind(*log)[0] for log in evidence.logs(uavs)] for uavs in (1, 2))
     more = np.array([alone - team for alone, team in zip(one, two, strict=False)])
     name = "more of these nodes than by a lone UAV"
@@ -119,7 +119,7 @@ def reached_nodes(evidence: EvidenceOfPolicy) -> Measured:
 
 
 def sectors(evidence: EvidenceOfPolicy) -> Measured:
-    """The share of data that two UAVs collect each on its own side, beside what chance gives."""
+    """The share of data that two UAVs collect on their own sides, and the share by chance."""
     generator = np.random.default_rng(evidence.results.store.manifest.seed)
     rows = [row for log in evidence.logs(uavs=2) if (row := _division(*log, generator))]
     if not rows:
@@ -134,7 +134,7 @@ def sectors(evidence: EvidenceOfPolicy) -> Measured:
 
 
 def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]:
-    """The shares left behind, of the nodes of the far edges and of the others."""
+    """The shares of nodes left behind: of those on the far edges, and of the others."""
     left = node_shares.left_behind(events, len(nodes))
     far = node_shares.far_edges(nodes)
     if far.all():
@@ -145,7 +145,7 @@ def _left_behind(events: pd.DataFrame, nodes: np.ndarray) -> tuple[float, float]
 def _division(
     events: pd.DataFrame, nodes: np.ndarray, generator: np.random.Generator
 ) -> tuple[float, ...]:
-    """The share on the own side, the same by chance, and by the UAV that serves a node most."""
+    """The share on the own side, the share by chance, and that of the UAV that serves most."""
     data = node_shares.collected(events, 2, len(nodes))
     if not data.any():
         return ()
@@ -167,13 +167,13 @@ def change(
 def lead(
     evidence: EvidenceOfPolicy, field: str, metric: str, values: tuple[str, ...], name: str
 ) -> Measured:
-    """By how much a metric is higher at some values of a parameter than at all others."""
+    """How much higher a metric is at some values of a parameter than at all others."""
     leads = evidence.pairs(field, metric).leads(*values)
     return Measured((leads,), (_least(leads, name),))
 
 
 def lag(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
-    """By how much a metric is lower at a value of a parameter than at all others."""
+    """How much lower a metric is at a value of a parameter than at all others."""
     lags = negated(evidence.pairs(field, metric).leads(value))
     return Measured((lags,), (_least(lags, "the next lowest is higher by"),))
 
@@ -186,7 +186,7 @@ def spread(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
 
 
 def course(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
-    """How a metric goes along the values of a parameter, from the first to the last."""
+    """How a metric changes along the values of a parameter, from the first to the last."""
     pairs = evidence.pairs(field, metric)
     first, *_, last = pairs.positions
     shape = main_effects.shape(pairs.changes)
@@ -197,14 +197,14 @@ def course(evidence: EvidenceOfPolicy, field: str, metric: str) -> Measured:
 
 
 def peak(evidence: EvidenceOfPolicy, field: str, metric: str, value: str) -> Measured:
-    """As ``course``, beside the lead of a value over all others."""
+    """The result of ``course``, with the lead of a value over all others."""
     pairs, along = evidence.pairs(field, metric), course(evidence, field, metric)
     ahead = _least(pairs.leads(value), f"{setting(field, value)} above the best other")
     return Measured((*along.arguments, pairs.position(value)), (ahead,), along.note)
 
 
 def selected_uavs(evidence: EvidenceOfPolicy) -> Measured:
-    """The number of UAVs of the setting that a study selects, beside the paper's."""
+    """The number of UAVs in the setting that a study selects."""
     choice = evidence.results.choice(evidence.policy)
     points = evidence.results.store.manifest.points
     if choice is None or "uavs" not in points[choice.best].values:
@@ -225,7 +225,7 @@ def setting(field: str, value: str) -> str:
 
 
 def final_lead(evidence: EvidenceOfTrainings, metric: str, unit: Unit) -> Measured:
-    """By how much training with transfer learning ends above training without it."""
+    """How much higher training with transfer learning ends than training without it."""
     transfer = evidence.transfer(metric)
     variants = f"trainings {evidence.using} and {evidence.without}"
     note = f"{variants}: {transfer.course}{_if_short(transfer)}"

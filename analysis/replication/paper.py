@@ -1,12 +1,9 @@
-"""The figures that the paper prints, to set those of the studies beside.
-
-The paper: the learned policy of its Section V on a 32 x 32 map.
-"""
+"""The numbers that the paper prints for its learned policy in Section V, on a 32 x 32 map."""
 
 from analysis.names import PRODUCT, RATIO, SUCCESS
 from analysis.stats.intervals import Interval, wilson
 
-# Table IV: means over that many random missions of the scenario space of Table II.
+# Table IV: means over TABLE_IV_MISSIONS random missions of the scenario space of Table II.
 TABLE_IV_MISSIONS = 1000
 TABLE_IV = {
     SUCCESS: 0.901,
@@ -15,14 +12,14 @@ TABLE_IV = {
 }
 
 # Fig. 4 (a), (b), (c) by number of UAVs: C_S 30, C_C 80, 12.5 data units per node, flying time 80.
-# Over how many missions is not said; the product is not printed.
+# The paper does not say over how many missions, and does not print the product.
 FIG_4 = {
     1: {SUCCESS: 0.996, RATIO: 0.634},
     2: {SUCCESS: 0.996, RATIO: 0.894},
     3: {SUCCESS: 0.990, RATIO: 0.938},
 }
 
-# Section V-D: means over that many missions with every parameter at its best value.
+# Section V-D: means over SWEET_SPOT_MISSIONS missions with every parameter at its best value.
 SWEET_SPOT_MISSIONS = 300
 SWEET_SPOT = {
     SUCCESS: 0.99,
@@ -30,7 +27,7 @@ SWEET_SPOT = {
     PRODUCT: 0.93,
 }
 
-# By the shipped study that does the same.
+# The printed means, by the name of the shipped study that does the same.
 PRINTED = {"table4": TABLE_IV, "sweet-spot": SWEET_SPOT}
 
 # The best number of UAVs (Section V-D); extremes of two parameters (V-C); values of C_S [%] that
@@ -40,11 +37,11 @@ LONE_UAV, EARLIEST_CHARGE = 1, 10
 ADVENTUROUS = (10, 20)
 TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
 
-# Training steps at which the curve with transfer learning passes that without, and from which on
-# that without stays level (Fig. 3b, Section V-B).
+# Training steps at which the curve with transfer learning overtakes the one without it, and from
+# which on the curve without it stays level (Fig. 3b, Section V-B).
 CROSSING, LEVEL_FROM = 800_000, 500_000
 
 
 def spread(share: float, missions: int) -> Interval:
-    """A printed share of missions with the interval that it does not print (Wilson)."""
+    """A printed share of missions with its Wilson interval, which the paper does not print."""
     return Interval(share, *wilson(round(share * missions), missions)[1:])

@@ -1,7 +1,7 @@
-"""The replication scorecard: the claims of the paper's Section V beside what the studies found.
+"""The replication scorecard: the claims of the paper's Section V and the results of the studies.
 
-Verdicts are computed, for two policies: the best learned one of each study, and the one with the
-paper's observation, network and algorithm.
+Verdicts are computed for two policies: the best learned policy of each study, and the policy with
+the paper's observation, network and algorithm.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -26,23 +26,24 @@ from dess import InputError
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
-# Trainings with and without transfer learning, with the means of the best learned policy.
+# Trainings with and without transfer learning, with the methods of the best learned policy.
 VARIANTS = ("quick", "no transfer")
 
-Evidence = Callable[[str], Any]  # from the name of a study, as of ``evidence_of_policy``
+Evidence = Callable[[str], Any]  # from the name of a study to its evidence
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What the results of a policy say of a claim.
+    """What the results of a policy say about a claim.
 
     Attributes:
-        verdict: One of ``rules.VERDICTS``.
-        policy: The policy; empty where it is about trainings.
-        quantities: The figures that it rests on; the first is the one to set beside the paper's.
-        against: Where its interval lies to the printed figure, as by ``stats.verdict.position``;
-            empty if there is none to compare.
-        note: More of it in words, or why there are no results.
+        verdict: One of ``verdict_rules.VERDICTS``.
+        policy: The policy; empty for a claim about trainings.
+        quantities: The quantities that the verdict is based on; the first one is compared with the
+            paper's number.
+        against: Where the interval of the first quantity lies relative to the paper's number
+            (``stats.verdict.position``); empty if they cannot be compared.
+        note: A remark in words, or the reason why there are no results.
     """
 
     verdict: str
@@ -67,13 +68,13 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
 
     Args:
         studies: Results by the name of the study: ``table4``, ``fig4``, ``fig5``, ``sweet-spot``,
-            as far as they have run.
+            as far as they have been run.
         trainings: Learning curves, with the columns that ``questions.learning`` reads; may be
             empty.
 
     Returns:
-        A row per claim. The findings are those of the best learned policy of each study, and of
-        the one with the paper's observation, network and algorithm.
+        A row per claim, with the findings for the best learned policy of each study and for the
+        policy with the paper's observation, network and algorithm.
     """
 
     def evidence(learner: str, variants: tuple[str, str] | None, study: str) -> Any:
@@ -97,7 +98,7 @@ def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> 
 
 
 def listed(rows: Iterable[Row]) -> str:
-    """Claims with the verdict on one policy and the rule, a line of Markdown each."""
+    """Claims with the verdict for one policy and the rule, in a line of Markdown each."""
     lines = [
         f"- {row.claim.text}: **{row.findings[0].verdict}**"
         + (f"; {row.findings[0].note}" if row.findings[0].note else "")
@@ -114,15 +115,15 @@ def margin(studies: Mapping[str, Results]) -> float:
 
 
 def departures(training: Mapping[str, Any]) -> list[str]:
-    """What of a training is not the paper's, in words.
+    """In what a training departs from the paper, in words.
 
     Args:
-        training: The settings of ``policies.ddqn``, as ``config.json`` of the policy has them.
+        training: The settings of the training, as in ``config.json`` of the policy.
     """
     n_step, num_envs = training["n_step"], training["num_envs"]
     greedy = all(phase["temperature"] == 0 for phase in training["phases"])
     differs = {
-        "the return guard, which masks actions that leave no way back": training["guard"],
+        "the return guard, which masks actions that would be too late to return": training["guard"],
         "missions that start with little battery": training["low_battery_starts"],
         "early returns": training["early_returns"],
         f"{n_step}-step returns": n_step > 1,
@@ -135,7 +136,7 @@ def departures(training: Mapping[str, Any]) -> list[str]:
 
 
 def _rows(section: Section, margin: float, policies: Iterable[Evidence]) -> list[Row]:
-    """The claims of a section, with findings by the evidence of several policies."""
+    """The claims of a section, with findings from the evidence of several policies."""
     evidence = [cache(partial(of_study, section.study)) for of_study in policies]
     return [
         Row(
@@ -149,21 +150,21 @@ def _rows(section: Section, margin: float, policies: Iterable[Evidence]) -> list
 
 
 def _finding(claim: Claim, margin: float, evidence: Callable[[], Any]) -> Finding:
-    """What a policy's results say of a claim; without results, why there are none."""
+    """What a policy's results say about a claim or, without results, why there are none."""
     try:
         of_study = evidence()
         measured = claim.measure(of_study)
     except MissingError as missing:
         return Finding(NO_RESULTS, note=str(missing))
     except InputError:  # a study of another design
-        return Finding(NO_RESULTS, note="the results there are were not made for it")
+        return Finding(NO_RESULTS, note="the results come from a study of another design")
     policy = of_study.policy if isinstance(of_study, EvidenceOfPolicy) else ""
     verdict, against = _verdict(claim, margin, measured), _against(claim, measured)
     return Finding(verdict, policy, measured.quantities, against, measured.note)
 
 
 def _verdict(claim: Claim, margin: float, measured: Measured) -> str:
-    """By the rule; a single mission, or training, has no spread that could make anything sure."""
+    """The verdict by the rule; a single mission or training cannot show anything."""
     if any(quantity.n == 1 for quantity in measured.quantities):
         return INCONCLUSIVE
     known = {"margin": margin, "printed": claim.printed and claim.printed.interval}
@@ -171,7 +172,7 @@ def _verdict(claim: Claim, margin: float, measured: Measured) -> str:
 
 
 def _against(claim: Claim, measured: Measured) -> str:
-    """Where the interval of the first figure lies to the printed one, if both are of a kind."""
+    """Where the interval of the first quantity lies relative to the paper's number, if any."""
     first, printed = measured.quantities[0], claim.printed
     if printed is None or first.low is None or first.unit != printed.unit:
         return ""

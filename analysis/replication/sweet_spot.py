@@ -1,4 +1,4 @@
-"""The best setting of every policy, and its means beside the paper's (Section V-D)."""
+"""The best setting of every policy, and its means compared with the paper's (Section V-D)."""
 
 import pandas as pd
 
@@ -18,7 +18,7 @@ def setting(results: Results, point: int) -> dict[str, str]:
 
 
 def table(results: Results) -> pd.DataFrame:
-    """A row for the paper, and one per policy: its best setting, and the means of its check."""
+    """A table with a row for the paper and a row per policy: its best setting and its check."""
     checks = {(row.policy, row.metric): row for row in summary.checks(results).itertuples()}
     printed = {name: numbers.percent(paper.SWEET_SPOT[metric]) for metric, name in METRICS.items()}
     rows = [{"Policy": "paper", **dict.fromkeys(setting(results, 0), ""), **printed}]
@@ -34,7 +34,7 @@ def table(results: Results) -> pd.DataFrame:
 
 
 def guarantees(results: Results) -> str:
-    """What is known of the selection for every policy: a list in Markdown."""
+    """What is guaranteed about the selection for every policy: a list in Markdown."""
     rows = summary.selections(results).itertuples()
     return "\n".join(f"- **{row.policy}**: {row.guarantee}." for row in rows)
 

@@ -1,13 +1,13 @@
-"""The rules that judge the paper's claims: a rule is its words and its judge.
+"""The rules that judge the paper's claims; a rule consists of its words and its judge.
 
-A judge takes figures and returns a verdict; the words say on the page how it does so:
+A judge is a function from quantities to a verdict; the words explain the rule on the page:
 
     >>> rules.higher.judge(Interval(0.02, 0.01, 0.03))
     'holds'
 
-A claim holds, or does not, where whole intervals say so, and in part where a part of it is shown;
-else it is inconclusive. Intervals are of 95 %, differences are taken mission by mission, unless the
-words say otherwise.
+A claim holds, or does not hold, if complete intervals show it. It holds in part if only a part of
+it is shown. Otherwise it is inconclusive. Unless the words say otherwise, intervals have a level of
+95 %, and differences are taken mission by mission.
 """
 
 from collections.abc import Callable, Collection
@@ -40,9 +40,10 @@ from analysis.study.selection import Choice
 NO_RESULTS = "no results"
 VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
 
-# A figure whose interval is above a printed one - NEAR is near it; a small change is less.
+# A value is near a printed number if its interval is above that number - NEAR; a change is small if
+# it is less than NEAR.
 NEAR = 0.05
-# A difference below this does not matter, where the study of the sweet spot gives no other.
+# A smaller difference does not matter, unless the study of the sweet spot gives another margin.
 MARGIN = 0.01
 
 Judge = Callable[..., str]
@@ -59,14 +60,14 @@ _LONG = f"Trainings of fewer than the {CROSSING:,} steps of the paper's crossing
 
 @dataclass(frozen=True)
 class Rule:
-    """How figures judge a claim.
+    """A rule that judges a claim by quantities.
 
     Attributes:
         words: When the claim holds; ``{margin}`` stands for a difference that does not matter.
-        judge: From figures to one of ``VERDICTS``.
-        takes: What else the judge takes by name: ``printed``, the interval of the paper's figure,
+        judge: A function from quantities to one of ``VERDICTS``.
+        takes: What else the judge takes by name: ``printed``, the interval of the paper's number,
             or ``margin``.
-        remark: What follows on the words.
+        remark: A remark that follows the words.
     """
 
     words: str
@@ -75,13 +76,13 @@ class Rule:
     remark: str = ""
 
     def in_words(self, margin: float) -> str:
-        """The words with a margin in them; what they leave open is inconclusive."""
+        """The words of the rule with the margin filled in."""
         words = self.words.format(margin=numbers.margin(margin))
         return f"{words}; else it is inconclusive. {self.remark}".strip()
 
 
 def rule(words: str, *takes: str, remark: str = "") -> Callable[[Judge], Rule]:
-    """Join words to the judge that they stand above."""
+    """A decorator that joins words to the judge below them."""
     return lambda judge: Rule(words, judge, takes, remark)
 
 
@@ -95,7 +96,7 @@ def rule(words: str, *takes: str, remark: str = "") -> Callable[[Judge], Rule]:
     "printed",
 )
 def reached(mean: Interval, printed: Interval) -> str:
-    """Whether a printed figure is reached."""
+    """Whether a printed number is reached."""
     difference = gap(mean, printed)
     near = difference.low > -NEAR
     if difference.high < 0:
@@ -104,9 +105,10 @@ def reached(mean: Interval, printed: Interval) -> str:
 
 
 def gap(mean: Interval, printed: Interval) -> Interval:
-    """By how much a mean is above a printed figure, which may have an interval of its own.
+    """How much higher a mean is than a printed number, which may have its own interval.
 
-    The interval of a difference from those of the two (Newcombe 1998, method 10).
+    The interval of the difference is computed from the two intervals (R. G. Newcombe, Statistics in
+    Medicine 17 (1998) 873-890, method 10).
     """
     difference = mean.mean - printed.mean
     below = hypot(mean.mean - mean.low, printed.high - printed.mean)
@@ -121,7 +123,7 @@ def gap(mean: Interval, printed: Interval) -> Interval:
     "printed",
 )
 def gained(difference: Interval, printed: Interval) -> str:
-    """Whether something rises, by as much as is printed."""
+    """Whether a metric rises, and by as much as the paper prints."""
     near = difference.low > printed.mean - NEAR or None
     return judged(above(difference), near if difference.high >= printed.mean else False)
 
@@ -142,7 +144,7 @@ lower = Rule(
     "is below 0, but may be more; does not hold if all of it is elsewhere"
 )
 def slightly_lower(difference: Interval) -> str:
-    """Whether something falls, but not by much."""
+    """Whether a metric falls, but only slightly."""
     if difference.low > 0 or difference.high <= -NEAR:
         return REFUTED
     if difference.high >= 0:
@@ -180,8 +182,8 @@ def never_all(ratio: Interval, whole: Interval) -> str:
 # Who serves which nodes.
 
 ignored = Rule(
-    "A node is ignored if less than half of its data is collected. Holds if that befalls most of "
-    f"these nodes, and more of them than of the others, {_TWO}",
+    "A node is ignored if less than half of its data is collected. Holds if this is true "
+    f"for most of these nodes, and more of them than of the others, {_TWO}",
     lambda share, beyond_others: judged(above(share, 0.5), above(beyond_others)),
 )
 
@@ -193,8 +195,8 @@ divided = Rule(
     lambda beyond_chance, division: judged(above(beyond_chance), above(division, 0.75)),
 )
 
-# The values of a parameter. ``leads`` are rows of ``main_effects.changes``, turned so that a
-# difference is that of the value in question to another one.
+# The values of a parameter. ``leads`` are rows of ``main_effects.changes``, with signs such that a
+# difference is the value in question minus another value.
 
 
 @rule(f"Holds if every other value is surely lower {_PAIRS}; does not hold if one is surely higher")
@@ -219,7 +221,7 @@ lowest = Rule(
     "margin",
 )
 def no_lower(leads: pd.DataFrame, margin: float) -> str:
-    """Whether the metric is no lower at some values than at all others, up to a margin."""
+    """Whether the metric at some values is not lower than at all others, up to a margin."""
     if (leads["wide_high"] < -margin).any():
         return REFUTED
     return HOLDS if (leads["low"] > -margin).all() else INCONCLUSIVE
@@ -231,7 +233,7 @@ def no_lower(leads: pd.DataFrame, margin: float) -> str:
     "margin",
 )
 def alike(changes: pd.DataFrame, margin: float) -> str:
-    """Whether the metric is alike at all values, up to a margin."""
+    """Whether the metric is the same at all values, up to a margin."""
     if ((changes["wide_low"] > margin) | (changes["wide_high"] < -margin)).any():
         return REFUTED
     within = (changes["low"] >= -margin) & (changes["high"] <= margin)
@@ -253,7 +255,7 @@ def rises(shape: Shape) -> str:
     "values that differ surely contradict that"
 )
 def peaks(shape: Shape, wanted: int) -> str:
-    """Whether the metric rises up to a value and falls behind it."""
+    """Whether the metric rises up to a value and falls after it."""
     if wanted not in shape.peaks:
         return REFUTED
     return HOLDS if shape.words == main_effects.PEAK else INCONCLUSIVE
@@ -264,7 +266,7 @@ def peaks(shape: Shape, wanted: int) -> str:
     "rule out; does not hold if none of these has"
 )
 def chosen(choice: Choice, wanted: Collection[int]) -> str:
-    """Whether a selection came to one of the design points with these numbers."""
+    """Whether a selection has chosen one of the design points with these numbers."""
     left = {choice.best, *choice.survivors}
     part: Part = None if left & {*wanted} else False
     return judged(left <= {*wanted} or part)
@@ -287,7 +289,7 @@ passes = Rule(
     remark=_LONG,
 )
 def throughout(transfer: Transfer) -> str:
-    """Whether the curve with transfer learning is above, all along."""
+    """Whether the curve with transfer learning is above at every step."""
     in_part = transfer.verdict == HOLDS and not transfer.throughout
     return IN_PART if in_part else transfer.verdict
 
@@ -300,7 +302,7 @@ def throughout(transfer: Transfer) -> str:
     remark=_LONG,
 )
 def levels_off(settled: float, transfer: Transfer) -> str:
-    """Whether training without transfer learning levels off, after a share of it, and low."""
+    """Whether training without transfer learning levels off early, and at a low value."""
     if transfer.length < CROSSING:
         return INCONCLUSIVE
     return judged(settled <= 0.5 or None, above(transfer.last))

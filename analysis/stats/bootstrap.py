@@ -1,4 +1,4 @@
-"""Bootstrap intervals: for medians, ratios and other statistics without an interval of their own.
+"""Bootstrap intervals for medians, ratios and other statistics without a formula for an interval.
 
 For a paired comparison, take the differences of the pairs:
 
@@ -15,7 +15,7 @@ from scipy import stats
 
 from analysis.stats.intervals import LEVEL, Interval
 
-_BATCH = 2**18  # resampled values at a time: some megabytes, whatever n
+_BATCH = 2**18  # resampled values at a time, which take some megabytes for every n
 
 
 def bootstrap_interval(
@@ -26,21 +26,22 @@ def bootstrap_interval(
     method: str = "BCa",
     resamples: int = 9999,
 ) -> Interval:
-    """A statistic with its bootstrap interval: for medians, ratios, and small or odd samples.
+    """A statistic with its bootstrap interval, for example a median, a ratio or a small sample.
 
     Args:
-        samples: (n,) values, or several such arrays of which entry r belongs to the same
-            replication; these are resampled together.
-        statistic: Function of the samples, as many arguments as there are. One that takes ``axis``,
-            like ``np.mean``, is computed for many resamples at once, in bounded memory.
-        generator: Draws the resamples.
+        samples: (n,) values, or several such arrays that are resampled together; entry r of all
+            arrays belongs to the same replication.
+        statistic: A function with as many arguments as there are samples. If it takes ``axis``,
+            like ``np.mean``, it is computed for many resamples at once, in limited memory.
+        generator: The random generator of the resamples.
         level: Confidence level.
-        method: ``BCa``, ``percentile`` or ``basic``, as of ``scipy.stats.bootstrap``.
+        method: ``BCa``, ``percentile`` or ``basic``, as in ``scipy.stats.bootstrap``.
         resamples: Number of resamples.
 
     Returns:
-        The statistic of the samples as ``mean``, and its interval: by percentiles where BCa is not
-        defined or misses the statistic, degenerate (low = mean = high) where all resamples agree.
+        The statistic of the samples as ``mean``, and its interval. Where BCa is not defined or does
+        not contain the statistic, the interval is that of ``percentile``. If all resamples agree,
+        it is degenerate (low = mean = high).
 
     Raises:
         ValueError: If there are no values.
@@ -66,19 +67,20 @@ def bootstrap_interval(
             rng=generator,
         )
     low, high = result.confidence_interval
-    if method == "BCa" and not low <= estimate <= high:  # nan, or bias or level beyond its reach
+    if method == "BCa" and not low <= estimate <= high:  # nan, or too large a bias or level
         low, high = np.quantile(result.bootstrap_distribution, [(1 - level) / 2, (1 + level) / 2])
     return Interval(estimate, float(low), float(high))
 
 
 def expanded_level(level: float, n: float) -> float:
-    """The level at which a bootstrap interval of a mean of few values holds ``level``.
+    """The nominal level at which a bootstrap interval of a mean of few values covers at ``level``.
 
-    Resamples vary by (n - 1) / n of what samples do, and take the normal distribution where
-    Student's t is due (Hesterberg 2015, the expanded percentile interval).
+    The variance of resamples is only (n - 1) / n of that of samples, and the bootstrap corresponds
+    to the normal distribution in place of Student's t. The correction is the expanded percentile
+    interval (T. C. Hesterberg, The American Statistician 69 (2015) 371-386).
 
     Args:
-        level: The level that is wanted.
+        level: The coverage that the interval should have.
         n: Number of values; fewer than 2 count as 2.
     """
     n = max(n, 2)

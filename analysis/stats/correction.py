@@ -1,4 +1,4 @@
-"""Corrections of p-values: for their number, and for a baseline that the same data chose."""
+"""Corrections of p-values: for multiple tests, and for a baseline chosen by the same data."""
 
 from typing import Literal, get_args
 
@@ -12,12 +12,12 @@ Correction = Literal["holm", "fdr"]
 
 
 def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
-    """Adjust p-values for their number; those up to alpha are the claims made at that level.
+    """Adjust p-values for multiple tests; adjusted values up to alpha are significant at alpha.
 
     Args:
         p: (m,) p-values.
-        correction: ``holm`` (1979) bounds the chance of any false claim by alpha, ``fdr``
-            (Benjamini and Hochberg 1995) the expected share of false claims; None: unadjusted.
+        correction: ``holm`` (Holm 1979) limits the probability of any false claim to alpha, ``fdr``
+            (Benjamini and Hochberg 1995) the expected share of false claims. None: no adjustment.
 
     Returns:
         (m,) adjusted p-values, at most 1.
@@ -41,15 +41,15 @@ def adjust(p: np.ndarray, correction: Correction | None) -> np.ndarray:
 
 
 def with_adjusted(table: pd.DataFrame, correction: Correction | None) -> pd.DataFrame:
-    """A table of comparisons with ``p_adjusted`` after ``p``, over all its rows."""
+    """Add ``p_adjusted`` after ``p`` to a table of comparisons, adjusted over all its rows."""
     adjusted = adjust(table["p"].to_numpy(float), correction)
     table.insert(table.columns.get_loc("p") + 1, "p_adjusted", adjusted)
     return table
 
 
 def for_choice(table: pd.DataFrame, candidates: int) -> pd.DataFrame:
-    """A table of comparisons whose baseline, or pair, the same data chose among candidates.
+    """Correct a table of comparisons whose baseline, or pair, was chosen by the same data.
 
-    By Bonferroni: ``p_adjusted`` is that of any choice.
+    By Bonferroni, ``p_adjusted`` is multiplied by the number of candidates.
     """
     return table.assign(p_adjusted=(table["p_adjusted"] * candidates).clip(upper=1))

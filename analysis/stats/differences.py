@@ -1,7 +1,8 @@
-"""Tests of paired differences: Student's t, for shares with McNemar's, and the sign test.
+"""Tests of paired differences: Student's t test, McNemar's test for shares, and the sign test.
 
-Differences of values from 0 to 1 keep Student's t, cut at -1 and 1: missions that only one of two
-policies fails weigh on both sides, so their mean is less skewed than that of the values.
+Differences of values from 0 to 1 have Student's t, cut off at -1 and 1. Missions in which only one
+of two policies fails occur on both sides, so the mean of the differences is less skewed than the
+mean of the values.
 """
 
 from collections.abc import Callable
@@ -13,11 +14,11 @@ from scipy import stats
 from analysis.names import BOUNDED, SHARES
 from analysis.stats.intervals import LEVEL, Interval, column_intervals, mean_interval
 
-_ROUNDING = 64 * np.finfo(float).eps  # relative; differences of differences below are none
+_ROUNDING = 64 * np.finfo(float).eps  # relative tolerance below which differences count as equal
 
 
 def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """A - B; all the same where they differ by rounding only."""
+    """The differences A - B; if they differ only by rounding errors, they are made equal."""
     differences = a - b
     rounding = _ROUNDING * max(np.abs(a).max(), np.abs(b).max())
     if np.ptp(differences) > rounding:
@@ -27,9 +28,9 @@ def differences_of(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
-    """The mean difference with Student's interval, and the p-value of none.
+    """The mean difference with Student's interval, and the p-value of "no difference".
 
-    If all differences are equal the interval is degenerate, and p is that of the sign test.
+    If all differences are equal, the interval is degenerate and p is that of the sign test.
     """
     mean = mean_interval(differences, level)
     if np.ptp(differences) == 0:
@@ -39,10 +40,11 @@ def t_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
 
 
 def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
-    """The mean difference of shares with its interval, and the p-value of none.
+    """The mean difference of shares with its interval, and the p-value of "no difference".
 
-    One gain and one loss are added before t (as Bonett and Price 2012 do), so that few discordant
-    pairs, or none, are not taken for certainty; outcomes have the exact test of McNemar.
+    One gain and one loss are added before Student's t is used (as by Bonett and Price 2012), so
+    that the interval has a length even if there are few discordant pairs, or none. The p-value of
+    outcomes 0 and 1 is that of McNemar's exact test.
     """
     smooth, p = t_test(smoothed(differences), level)
     if np.isin(differences, (-1, 0, 1)).all():
@@ -53,27 +55,28 @@ def share_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
 
 
 def bounded_test(differences: np.ndarray, level: float) -> tuple[Interval, float]:
-    """The mean difference of values from 0 to 1 with its interval, and the p-value of none.
+    """The mean difference of values from 0 to 1 with its interval, and the p-value.
 
-    Student's t, cut at -1 and 1. If all differences are equal, one gain and one loss are added, as
-    for shares: missions that differ otherwise may be too rare to be among these.
+    The interval is Student's t, cut off at -1 and 1. If all differences are equal, one gain and one
+    loss are added as for shares, because missions with another difference may just be too rare to
+    be in the sample.
     """
     mean, p = t_test(smoothed(differences) if np.ptp(differences) == 0 else differences, level)
     return Interval(float(differences.mean()), max(mean.low, -1.0), min(mean.high, 1.0)), p
 
 
 def difference_test(metric: str) -> Callable[[np.ndarray, float], tuple[Interval, float]]:
-    """The test of paired differences that is fit for a metric of missions."""
+    """The test of paired differences that suits a metric of missions."""
     return share_test if metric in SHARES else bounded_test if metric in BOUNDED else t_test
 
 
 def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") -> pd.DataFrame:
-    """Paired comparisons of many columns with a baseline, as ``stats.paired.paired`` has them.
+    """Paired comparisons of many columns with a baseline, as ``stats.paired.paired`` makes them.
 
     Args:
         values: (R, K) a row per replication; nan where a column lacks one.
         baseline: (R,) the values of the baseline.
-        metric: The metric; one without bounds, if not given.
+        metric: The metric; by default one without bounds.
 
     Returns:
         (K, 5): ``difference`` (column - baseline) with ``low``, ``high``, ``p`` and ``n``.
@@ -86,7 +89,7 @@ def column_tests(values: pd.DataFrame, baseline: pd.Series, metric: str = "") ->
     t = (table["difference"] / differences.sem()).abs()
     table["p"] = 2 * stats.t.sf(t, np.maximum(table["n"] - 1, 1))
     known: dict[tuple[int, int, int], tuple[Interval, float]] = {}
-    exact = {}  # columns that Student's t is not for
+    exact = {}  # columns for which Student's t is not suitable
     for column in differences if metric in SHARES else differences.columns[constant]:
         own = differences[column].dropna().to_numpy()
         if metric in SHARES and len(own):
@@ -109,6 +112,6 @@ def sign_test(equal: np.ndarray) -> float:
 
 
 def smoothed(differences: np.ndarray) -> np.ndarray:
-    """Differences with one gain and one loss more, along the last axis."""
+    """The differences with one gain and one loss added, along the last axis."""
     more = np.broadcast_to([1.0, -1.0], (*differences.shape[:-1], 2))
     return np.concatenate([differences, more], axis=-1)

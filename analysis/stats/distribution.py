@@ -1,4 +1,4 @@
-"""How a metric spreads over missions: quantiles, and the mean of the worst missions."""
+"""The distribution of a metric over missions: quantiles, and the mean of the worst missions."""
 
 from collections.abc import Sequence
 from typing import Any, Literal, get_args
@@ -28,21 +28,21 @@ def distribution(
     level: float = LEVEL,
     resamples: int = 9999,
 ) -> pd.DataFrame:
-    """How a metric spreads over the missions of groups: quantiles, and the mean of the worst.
+    """The distribution of a metric over groups of missions: quantiles, and the mean of the worst.
 
-    The mean of the worst missions is the conditional value at risk. Its BCa bootstrap interval,
-    expanded for the size of the tail, is fit from some 30 missions in the tail on (600 missions
-    for the worst 5 %); with fewer it is too narrow. The quantiles have the intervals of
+    The mean of the worst missions is the conditional value at risk. Its BCa bootstrap interval is
+    expanded for the size of the tail. It is reliable with about 30 missions or more in the tail
+    (600 missions for the worst 5 %), and too narrow with fewer. The quantiles have the intervals of
     ``quantile_interval``, whose ends may be infinite.
 
     Args:
         missions: A row per mission, with the metric and the fields of ``by``.
         metric: A column of numbers.
-        generator: Draws the resamples.
-        by: Columns whose values form the groups; without any, all missions are one.
+        generator: The random generator of the resamples.
+        by: Columns whose values form the groups; without any, all missions are one group.
         quantiles: Shares of the missions below each quantile, in (0, 1).
         tail: Share of the missions that are the worst, in (0, 1).
-        worst: Whether the ``lowest`` or the ``highest`` values are.
+        worst: Whether the ``lowest`` or the ``highest`` values are the worst.
         level: Confidence level.
         resamples: Number of bootstrap resamples.
 
@@ -81,12 +81,12 @@ def quantile_interval(
 ) -> Interval:
     """A quantile with its distribution-free interval between two order statistics.
 
-    It covers at least at its level, for every distribution. An end that the sample is too small
-    for is infinite: no observation bounds the quantile on that side.
+    Its coverage is at least its level for every distribution. If the sample is too small for an
+    end, that end is infinite, because no observation limits the quantile on that side.
 
     Args:
         values: (n,) values.
-        share: Of the missions that lie below the quantile, in (0, 1).
+        share: Share of the missions below the quantile, in (0, 1).
         level: Confidence level.
 
     Raises:
@@ -105,9 +105,9 @@ def tail_mean(values: np.ndarray, share: float = TAIL, axis: int = -1) -> Any:
 
     Args:
         values: (..., n, ...) values.
-        share: Of the values that are the lowest, in (0, 1]. Where ``share * n`` is not whole, the
-            last of them counts in part; the lowest counts in any case.
-        axis: Of the n values.
+        share: Share of the lowest values, in (0, 1]. If ``share * n`` is not an integer, the last
+            of them counts in part; at least the lowest value counts.
+        axis: The axis of the n values.
 
     Returns:
         The means over the axis.

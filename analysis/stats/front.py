@@ -3,30 +3,30 @@
     on_front(costs, values)  # of known means
     membership(costs, values, share=True, generator=np.random.default_rng(1))  # of samples
 
-A setting is on the front if no other one is dominating it: at most as costly and at least as good,
-and one of both strictly.
+A setting is on the front if no other setting dominates it. A setting dominates another one if it is
+at most as expensive and at least as good, and strictly better in one of the two.
 """
 
 import numpy as np
 
-_BATCH = 2**21  # weights at a time: some megabytes, whatever n
+_BATCH = 2**21  # weights at a time, which take some megabytes for every n
 
 
 def on_front(costs: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Which settings are on the front.
 
     Args:
-        costs: (..., k) costs of the settings: less is better.
-        values: (..., k) values of the metric: more is better.
+        costs: (..., k) costs of the settings; lower is better.
+        values: (..., k) values of the metric; higher is better.
 
     Returns:
-        (..., k) booleans. Settings that are alike in both are on the front together, or not at all.
+        (..., k) booleans. Settings that are equal in both are either all on the front, or none is.
     """
     order = np.lexsort((-values, costs), axis=-1)
     cost, value = (np.take_along_axis(of, order, -1) for of in (costs, values))
     best_before = np.full_like(value, -np.inf)
     best_before[..., 1:] = np.maximum.accumulate(value, axis=-1)[..., :-1]
-    # Of those alike, which are neighbours now, the first one decides.
+    # Equal settings are neighbours now; the first of them decides for all.
     alike = np.zeros(value.shape, bool)
     alike[..., 1:] = (np.diff(cost) == 0) & (np.diff(value) == 0)
     first = np.maximum.accumulate(np.where(alike, 0, np.arange(value.shape[-1])), axis=-1)
@@ -45,27 +45,29 @@ def membership(
 ) -> np.ndarray:
     """The probability that each setting is on the front, given the missions.
 
-    The Bayesian bootstrap of D. B. Rubin (Annals of Statistics 9 (1981) 130-134): the missions get
-    weights from Dirichlet's distribution, the same for all settings, so that what common random
-    numbers let settings have in common stays in common. Failures may be so rare that a sample has
-    none. So each setting has half a success and half a failure more, of weights of its own: the
-    share of a single setting has its posterior distribution under the prior of Jeffreys.
+    The method is the Bayesian bootstrap (D. B. Rubin, Annals of Statistics 9 (1981) 130-134). The
+    missions get weights from a Dirichlet distribution. The weights are the same for all settings,
+    which keeps the correlation by common random numbers. Failures may be so rare that a sample has
+    none. Therefore half a success and half a failure with their own weights are added to each
+    setting, so that the share of a single setting has its posterior distribution under the prior of
+    Jeffreys.
 
-    Over 3,000 planted problems of each of three kinds, whose true means were drawn independently,
-    stated and true shares of membership differed by 0.005 on average, and by 0.06 at most in any
-    bin of probabilities. Nothing is assumed of how a metric depends on the fleet: where each
-    costlier setting is truly better, by less than the missions can show, they are too low.
+    In 3,000 simulated problems of each of three kinds, whose true means were drawn independently,
+    stated and true shares of membership differed by 0.005 on average, and by at most 0.06 in any
+    bin of probabilities. The method assumes nothing about how a metric depends on the fleet. If
+    every more expensive setting is truly better, but by less than the missions can show, the
+    probabilities are too low.
 
     Args:
-        costs: (k, n) costs; entry r of every setting belongs to the same replication, nan where a
-            setting does not have it.
+        costs: (k, n) costs; entry r of every setting belongs to the same replication, and is nan if
+            the setting does not have this replication.
         values: (k, n) values of the metric, nan at the same places.
         share: Whether the metric is an outcome 0 or 1.
-        generator: Draws the weights.
-        draws: How many fronts are drawn.
+        generator: The random generator of the weights.
+        draws: Number of fronts that are drawn.
 
     Returns:
-        (k,) shares of the fronts that have the setting.
+        (k,) the share of the drawn fronts that contain the setting.
     """
     present = ~np.isnan(values)
     count = np.zeros(len(values))

@@ -1,6 +1,6 @@
-"""Learners against a baseline: crossed random factors, training and mission.
+"""Learners compared with a baseline: training and mission as crossed random factors.
 
-How good a training turns out is chance as well, so a claim on a learner needs several trainings:
+The result of a training is random, so a claim about a learner needs several trainings:
 
     compare_learners(results.missions, {"ddqn": ["ddqn", "ddqn-2", "ddqn-3"]}, "greedy")
 """
@@ -19,14 +19,14 @@ from analysis.stats.intervals import LEVEL, check_share
 from analysis.stats.matching import check_same_missions, matched, metrics_by_treatment, select
 from dess import InputError
 
-# What the row of a comparison is about: trainings at large, or the only one.
+# What a comparison is about: all trainings of the learner, or the only one that there is.
 LEARNER, CHECKPOINT = "the learner", "this checkpoint"
 
 _ENDS = ("low", "high", "new_low", "new_high")
 
 
 class Crossed(NamedTuple):
-    """A learner of S trainings on R missions: the mean difference with intervals, and its spread.
+    """A learner with S trainings on R missions: the mean difference, intervals, and variances.
 
     ``low`` and ``high`` bound the expected difference of the learner's trainings, ``new_low`` and
     ``new_high`` that of one new training. The standard deviations are those of the trainings, of
@@ -45,26 +45,27 @@ class Crossed(NamedTuple):
 
 
 def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
-    """What the trainings of a learner say of it: two crossed random factors, training and mission.
+    """The mean difference of a learner, with training and mission as crossed random factors.
 
-    The layout d = mu + training + mission + rest has one observation per cell; the mean squares
-    give the variance components, cut at 0. The half-width adds two parts in quadrature (as of
-    Graybill and Wang 1980): Student's t on the means of the S trainings, which holds the rest as
-    well, and that of the missions, which all trainings share. It is at least that of these very
-    trainings. By simulation it covers at its level or above, whichever part dominates, from two
-    trainings on.
+    The model d = mu + training + mission + rest has one observation per cell. The mean squares give
+    the variance components, with negative ones set to 0. The half-width is the root of the sum of
+    squares of two parts (Graybill and Wang 1980): Student's t on the means of the S trainings,
+    which includes the rest, and the part of the missions, which all trainings share. It is at least
+    the half-width for these S trainings alone. Simulations show that the coverage is at the level
+    or above for two or more trainings, whichever part dominates.
 
     Args:
-        differences: (S, R) of training s on mission r, to the same baseline.
+        differences: (S, R) differences of training s on mission r from the same baseline.
         level: Confidence level.
 
     Returns:
-        The intervals, the p-value of no expected difference, and the components as standard
-        deviations. If all differences are equal the intervals are degenerate and p is that of the
-        sign test over the trainings, 2^(1 - S). With a single training the interval is of this
-        training alone (Student's t over the missions), the new one is unbounded, and the deviations
-        of training and rest are nan: unknown. With a single mission the interval is degenerate,
-        the new one unbounded, p is 1 and all deviations are nan.
+        The intervals, the p-value of "no expected difference", and the components as standard
+        deviations. If all differences are equal, the intervals are degenerate and p is that of the
+        sign test over the trainings, 2^(1 - S). With a single training, the interval is about this
+        training only (Student's t over the missions), the interval for a new training is infinite,
+        and the deviations of training and rest are nan (unknown). With a single mission, the
+        interval is degenerate, the interval for a new training is infinite, p is 1 and all
+        deviations are nan.
 
     Raises:
         ValueError: If there are no values.
@@ -73,7 +74,7 @@ def crossed(differences: np.ndarray, level: float = LEVEL) -> Crossed:
     if d.ndim != 2 or not d.size:
         raise ValueError("crossed: no values; allowed: trainings x missions")
     trainings, missions = d.shape
-    of_missions, p = t_test(d.mean(axis=0), level)  # of these very trainings
+    of_missions, p = t_test(d.mean(axis=0), level)  # for these trainings alone
     mean = of_missions.mean
     if trainings == 1 or missions == 1:
         spread = float(d.std(ddof=1)) if missions > 1 else np.nan
@@ -107,20 +108,20 @@ def compare_learners(
     level: float = LEVEL,
     correction: Correction | None = "holm",
 ) -> pd.DataFrame:
-    """Compare learners, each known by checkpoints of several trainings, with a baseline policy.
+    """Compare learners, each with checkpoints of several trainings, with a baseline policy.
 
-    How good a training turns out is chance as well, so a claim on the learner needs checkpoints of
-    several training seeds; one checkpoint supports claims on this checkpoint only.
+    The result of a training is random. So a claim about a learner needs checkpoints of several
+    training seeds; one checkpoint supports only claims about this checkpoint.
 
     Args:
-        missions: As of ``compare``; the checkpoints and the baseline meet the same missions.
-        learners: Name of each learner -> the policies that are its checkpoints, all of them:
-            the best of several trainings is not the learner.
-        baseline: The policy to compare with, taken as it is.
+        missions: As for ``compare``; the checkpoints and the baseline have the same missions.
+        learners: For each learner the policies that are its checkpoints. All of them are needed,
+            because choosing the best of several trainings would bias the comparison.
+        baseline: The policy to compare with; it is not treated as random.
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Of the p-values, over all rows, as of ``correction.adjust``.
+        correction: Correction of the p-values over all rows, as for ``correction.adjust``.
 
     Returns:
         A row per learner, group and metric: ``learner``, ``baseline``, the columns ``by``,
@@ -132,7 +133,7 @@ def compare_learners(
         p-value with one gain and one loss added, as of ``paired``.
 
     Raises:
-        InputError: As of ``compare``; if a learner has no checkpoint, or one twice.
+        InputError: As for ``compare``, and if a learner has no checkpoint, or one twice.
     """
     check_share("level", level)
     tables = metrics_by_treatment(missions, "policy", metrics, by)
@@ -172,18 +173,18 @@ def _as_share(result: Crossed, differences: np.ndarray, level: float) -> Crossed
 
 
 def _within(result: Crossed) -> Crossed:
-    """The result with its intervals cut at -1 and 1, where differences of shares end."""
+    """The result with its intervals cut off at -1 and 1, the limits of differences of shares."""
     ends = {name: float(np.clip(getattr(result, name), -1, 1)) for name in _ENDS}
     return result._replace(**ends)
 
 
 def _alpha_of(half: Callable[[float], float], distance: float) -> float:
-    """Where a half-width, which falls with alpha, meets a distance: the p-value of an interval."""
+    """The p-value of an interval: the alpha at which its half-width equals a distance."""
 
     def excess(exponent: float) -> float:
         return half(10**exponent) - distance
 
-    lowest = -100.0  # where quantiles of Student are exact still
+    lowest = -100.0  # quantiles of Student's t are still exact here
     if excess(lowest) <= 0:
         return 0.0
     return float(10 ** optimize.brentq(excess, lowest, 0.0)) if distance else 1.0

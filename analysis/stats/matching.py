@@ -1,4 +1,4 @@
-"""Missions of policies, or of design points, matched by the replication that they share."""
+"""Match missions of policies, or of design points, by the replication that they share."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, get_args
@@ -46,7 +46,7 @@ def select(tables: Mapping[Any, pd.DataFrame], of: str, name: str | int) -> pd.D
     """The table of a policy or point.
 
     Raises:
-        InputError: If it has no missions.
+        InputError: If there are no missions of it.
     """
     if name not in tables:
         raise InputError(f"{of}: {name} has no missions; allowed: {', '.join(map(str, tables))}")
@@ -67,7 +67,7 @@ def check_same_missions(tables: Mapping[Any, pd.DataFrame], name: Any, baseline:
 def matched(
     tables: Sequence[pd.DataFrame], by: Sequence[str]
 ) -> Iterator[tuple[tuple, list[dict[str, np.ndarray]]]]:
-    """Groups of units that share no realisation: missions, or means over those of a replication.
+    """Groups of independent units: missions, or means over the missions of a replication.
 
     Yields:
         The group, and for each table the values of every metric, in the order of the units.

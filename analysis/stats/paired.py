@@ -1,7 +1,7 @@
-"""A against B: paired comparisons on common random numbers.
+"""Paired comparisons of A with B under common random numbers.
 
-Replication r of two policies, or of two design points, has the same realisation of all random
-draws, so missions are compared pair by pair, and what both share drops out of the difference:
+Replication r of two policies, or of two design points, has the same random draws. So missions are
+compared pair by pair, and the randomness that both share cancels in the difference:
 
     compare(results.missions, "greedy")
 """
@@ -27,10 +27,11 @@ from dess import InputError
 
 
 class Paired(NamedTuple):
-    """A comparison of n pairs: the mean difference with its interval, and what pairing gained.
+    """A comparison of n pairs: the mean difference, its interval, and the gain by pairing.
 
-    ``variance_reduction`` is 1 - Var(A - B) / (Var A + Var B): of v, 1 / (1 - v) times as many
-    missions would be needed without common random numbers. Below 0 pairing did harm.
+    ``variance_reduction`` is v = 1 - Var(A - B) / (Var A + Var B). Without common random numbers,
+    1 / (1 - v) times as many missions would be needed. If v is negative, pairing made the interval
+    wider.
     """
 
     difference: float
@@ -47,22 +48,22 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
 
     Args:
         a: (n,) values of A.
-        b: (n,) values of B; entry r belongs with entry r of A.
+        b: (n,) values of B; entry r forms a pair with entry r of A.
         level: Confidence level.
-        metric: What the values are of; a metric without bounds, if not given.
+        metric: The metric of the values; by default one without bounds.
 
     Returns:
         The interval of Student's t and the p-value of the paired t test; those of
         ``differences.share_test`` for ``success``, and of ``differences.bounded_test`` for metrics
-        from 0 to 1. Nothing is ever nan:
+        from 0 to 1. No result is nan:
 
-        - All differences equal (up to rounding), n = 1 included, of a metric without bounds: the
-          interval is degenerate (low = difference = high); p is that of the sign test, 2^(1 - n),
-          which is 1 for a single pair; 1 if there is no difference at all.
-        - A or B constant: their correlation is 0. Both: so is the variance reduction.
+        - If all differences of a metric without bounds are equal (up to rounding), n = 1 included,
+          the interval is degenerate (low = difference = high). p is that of the sign test,
+          2^(1 - n), which is 1 for a single pair; it is 1 if all differences are 0.
+        - If A or B is constant, their correlation is 0. If both are, the variance reduction is 0.
 
     Raises:
-        ValueError: If the samples are empty, differ in length, or are no shares but should be.
+        ValueError: If the samples are empty, differ in length, or should be shares and are not.
     """
     a, b = np.asarray(a, float), np.asarray(b, float)
     if a.shape != b.shape or not a.size:
@@ -89,25 +90,27 @@ def compare(
     """Compare every other policy, or design point, with a baseline, mission by mission.
 
     Args:
-        missions: A row per mission, with ``policy``, ``point``, ``seed`` and ``replication`` (as
-            far as it has them), the metrics and the fields of ``by``.
+        missions: A row per mission, with the metrics, the fields of ``by`` and, as far as they
+            exist, ``policy``, ``point``, ``seed`` and ``replication``.
         baseline: The policy, or the number of the design point, to compare with.
         metrics: Columns of numbers.
         by: Columns whose values form groups of missions, compared one by one.
         level: Confidence level of each interval.
-        correction: Of the p-values, over all rows, as of ``correction.adjust``.
+        correction: Correction of the p-values over all rows, as for ``correction.adjust``.
         of: What is compared: ``policy`` or ``point``.
 
     Returns:
         A row per policy (in order of first appearance), group (in order of their values) and
         metric: ``policy`` (or ``point``), ``baseline``, the columns ``by``, ``metric``, the fields
-        of ``Paired`` and, after ``p``, ``p_adjusted``. Differences are to the baseline, positive if
-        more. Where a group holds several missions of a replication - at several points, which share
-        its realisation - their means are compared, and ``n`` counts replications.
+        of ``Paired`` and, after ``p``, ``p_adjusted``. A positive difference means that the value
+        is above that of the baseline. If a group has several missions of a replication (at several
+        design points, which share its random draws), their means are compared, and ``n`` is the
+        number of replications.
 
     Raises:
-        InputError: If a column is missing or not of numbers, the baseline is missing or alone, a
-            mission appears twice or for one of a pair only, or an argument is not allowed.
+        InputError: If a column is missing or does not contain numbers, the baseline is missing or
+            the only one, a mission appears twice or only for one of a pair, or an argument is not
+            allowed.
     """
     check_share("level", level)
     tables = metrics_by_treatment(missions, of, metrics, by)

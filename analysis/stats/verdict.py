@@ -1,11 +1,11 @@
-"""What an interval or a test says: the one home of these rules and their words.
+"""Verdicts that follow from intervals and tests, and the words and marks for them.
 
 An estimate is ``ABOVE`` or ``BELOW`` a reference if its whole interval is, else ``INCONCLUSIVE``:
 
     >>> position(Interval(0.2, 0.1, 0.3))
     'above'
 
-A part of a claim is shown (true) or refuted (false) by a whole interval, or open (None).
+A part of a claim is shown (True), refuted (False) or open (None), by a complete interval.
 """
 
 from typing import Protocol
@@ -32,10 +32,10 @@ class Ends(Protocol):
 
 
 def position(interval: Ends, reference: float = 0.0) -> str:
-    """Where a whole interval lies: above the reference, below it, or around it.
+    """Whether a complete interval is above a reference, below it, or contains it.
 
     Returns:
-        ``ABOVE``, ``BELOW`` or ``INCONCLUSIVE``, which it is as well where an end is nan.
+        ``ABOVE``, ``BELOW`` or ``INCONCLUSIVE``; also ``INCONCLUSIVE`` if an end is nan.
     """
     if interval.low > reference:
         return ABOVE
@@ -62,7 +62,8 @@ def above(interval: Ends, bound: float = 0.0) -> Part:
 def judged(*parts: Part) -> str:
     """The verdict on a claim of several parts.
 
-    It holds if all are shown, in part if some are; it does not hold if none is and one is refuted.
+    The claim holds if all parts are shown, and holds in part if some are. It does not hold if none
+    is shown and one is refuted.
     """
     if any(parts):
         return HOLDS if all(parts) else IN_PART

@@ -1,1 +1,1 @@
-"""Questions about training: learning curves, ablations, the trained policies in a folder."""
+"""Questions about training: learning curves, ablations, and the trained policies in a folder."""

@@ -1,4 +1,4 @@
-"""What each means of learning is worth: variants of a training, compared by what they end with.
+"""Ablation: the effect of each method of learning, from the final metrics of training variants.
 
     table = ablation(finals(curves), "final_reward", "quick")
 
@@ -20,21 +20,21 @@ from analysis.stats.verdict import MARKS, position
 
 _UNKNOWN = Interval(np.nan, np.nan, np.nan)
 
-BASELINE = "quick"  # the variant that the others of the shipped curves are compared with
+BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
 
 
 def finals(curves: pd.DataFrame) -> pd.DataFrame:
-    """The last row of every training: it has the metrics of the weights that were kept."""
+    """The last row of every training, which has the metrics of the selected weights."""
     return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
 
 
 def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
-    """What every variant reaches in the end, and its difference to the baseline.
+    """The final metric of every variant, and its difference from the baseline.
 
     Args:
         last: Rows of ``finals``.
         metric: The column of the final metric.
-        baseline: The variant that the others are compared with.
+        baseline: The variant with which the others are compared.
         level: Confidence level.
 
     Returns:
@@ -78,14 +78,14 @@ def within(interval: Interval) -> Interval:
 def difference(
     a: Sequence[float] | np.ndarray, b: Sequence[float] | np.ndarray, level: float = LEVEL
 ) -> tuple[Interval, float]:
-    """The mean of A minus that of B, over trainings of their own.
+    """The mean of A minus the mean of B, over independent trainings (Welch's t).
 
-    Welch's t. Where one of the two is a single training, Student's t with the spread of the other:
-    the interval then holds 0 if one more training of the other might have come out like that.
+    If one of the two is a single training, Student's t with the standard deviation of the other is
+    used; the interval then contains 0 if the single value could be one more training of the other.
 
     Returns:
-        The interval (nan ends where both are single trainings; degenerate where neither has any
-        spread) and the p-value (1 where there is none).
+        The interval and the p-value. The ends are nan if both are single trainings, and equal to
+        the difference if all trainings of each side agree. The p-value is 1 if it is unknown.
     """
     a, b = np.asarray(a, float), np.asarray(b, float)
     gap = float(a.mean() - b.mean())
@@ -99,12 +99,12 @@ def difference(
 
 
 def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """The rows of ``ablation`` of collection ratio and communication as a table of text.
+    """The rows of ``ablation`` for collection ratio and communication, as a table of text.
 
     Args:
         table: Rows of ``ablation``.
         last: Rows of ``finals``, for the means of the other metrics.
-        baseline: The variant that the others are compared with.
+        baseline: The variant with which the others are compared.
     """
     means = last.groupby("variant")[[f"final_{SUCCESS}", f"final_{RATIO}"]].mean()
     others = means.loc[table["variant"]].map(numbers.percent).to_numpy()
@@ -113,7 +113,7 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
         "n": table["n"],
         METRICS[PRODUCT]: [_mean(row) for row in table.itertuples()],
         "One new training": [_new(row) for row in table.itertuples()],
-        f"To {baseline} [points]": [_gap(row) for row in table.itertuples()],
+        f"Difference from {baseline} [points]": [_gap(row) for row in table.itertuples()],
         "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
         METRICS[SUCCESS]: others[:, 0],
         METRICS[RATIO]: others[:, 1],

@@ -23,31 +23,31 @@ from analysis.questions.learning.ablation import difference, within
 from analysis.stats.intervals import Interval, mean_interval
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
-# What is evaluated while training.
+# The metric that is evaluated while training.
 REWARD, PRODUCT = "evaluation_reward", "evaluation_collection_ratio_and_communication"
-# What trainings of the curves that are shipped have besides -> the variants with transfer learning
-# and without it.
+# Pairs of variants of the shipped curves, with and without transfer learning, by what both have in
+# common otherwise.
 PAIRS = {
-    "all means of this project": ("quick", "no transfer"),
+    "all methods of this project": ("quick", "no transfer"),
     "no return guard": ("no guard", "no guard, no transfer"),
-    "the paper's means alone": ("none of the three", "none of the three, no transfer"),
+    "the paper's methods alone": ("none of the three", "none of the three, no transfer"),
 }
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
 # Level of the band of the paper's Fig. 3.
 BAND = 0.99
-# The smallest number of trainings that has a band: Student's t for two is 64 standard errors wide.
+# The smallest number of trainings with a band; for two, Student's band of 99 % is 64 errors wide.
 FEWEST = 3
 
 
 @dataclass(frozen=True)
 class Transfer:
-    """How trainings with transfer learning compare to those without it.
+    """How trainings with transfer learning compare with those without it.
 
     Attributes:
         verdict: Of ``verdicts``, whether the mean curve with transfer ends above, by the interval
             of the last difference; ``INCONCLUSIVE`` if the trainings are too short.
-        since: The first training step from which the mean curve stays above; none if it ends below.
+        since: The training step from which on the mean curve stays above; None if it ends below.
         throughout: Whether that is the first step that both have.
         last: Difference of the curves at the last step, with its interval.
         length: The last step that both reach.
@@ -71,10 +71,10 @@ class Transfer:
 
 
 def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
-    """The exponential moving average of every training, begun anew in every phase.
+    """The exponential moving average of every training, started again in every phase.
 
-    With x(t) an evaluation, e(t) = (1 - ALPHA) e(t - 1) + ALPHA x(t), and e = x at the first of a
-    phase: missions of one phase are no measure of the next.
+    For evaluations x(t) it is e(t) = (1 - ALPHA) e(t - 1) + ALPHA x(t). At the first evaluation of
+    a phase e = x, because the missions of different phases cannot be compared.
 
     Returns:
         A row per evaluation: ``variant``, ``seed``, ``phase``, ``updates``, ``value``.
@@ -114,7 +114,7 @@ def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:
 
 
 def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """(steps, trainings) averages of a variant in its last phase, at the steps of all trainings."""
+    """The (steps, trainings) averages of a variant in its last phase, at their common steps."""
     curves = averages[averages["variant"] == variant]
     curves = curves[curves["phase"] == curves["phase"].iloc[-1]]
     return curves.pivot(index="updates", columns="seed", values="value").dropna()
@@ -123,9 +123,10 @@ def last_phase(averages: pd.DataFrame, variant: str) -> pd.DataFrame:
 def transfer(
     averages: pd.DataFrame, using: str, without: str, shortest: int, level: float = BAND
 ) -> Transfer:
-    """Whether a variant with transfer learning passes the one without it and ends higher.
+    """Whether a variant with transfer learning overtakes the one without it and ends higher.
 
-    They are compared in the last phase of both, where both train in the mission itself.
+    They are compared in the last phase of both, in which both train in missions with battery
+    decrease.
 
     Args:
         averages: Rows of ``smoothed``.
@@ -159,7 +160,7 @@ def transfers(
 
 
 def settled(averages: pd.Series, margin: float) -> int:
-    """The position from which on averages stay within a margin of the last one."""
+    """The position from which on the averages stay within a margin of the last one."""
     far = np.flatnonzero((averages - averages.iloc[-1]).abs() > margin)
     return int(far[-1]) + 1 if len(far) else 0
 
@@ -170,7 +171,7 @@ def transfer_table(
     """Trainings with transfer learning compared with those without, as a table of text.
 
     Args:
-        transfers: By what the trainings have besides, and the metric: ``REWARD`` or ``PRODUCT``.
+        transfers: The result of ``transfers``, by the name of the pair and the metric.
         verdicts: The verdict on each.
     """
     rows = [

@@ -82,7 +82,7 @@ def settings_table(policies: Iterable[Trained]) -> pd.DataFrame:
 
 
 def commands(policies: Iterable[Trained]) -> list[str]:
-    """The commands that train policies anew."""
+    """The commands that train the policies again."""
     return [
         f"dess train {policy.config.name} --seed {policy.config.seed} --out runs/{policy.name}"
         for policy in policies

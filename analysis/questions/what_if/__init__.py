@@ -1,1 +1,1 @@
-"""What if: a question about a variation of a scenario, and its answer."""
+"""What-if questions: the effect of a variation of a scenario."""

@@ -22,7 +22,7 @@ from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position
 
-# Means per mission beside the paper's metrics.
+# Further quantities per mission, in addition to the paper's metrics.
 MEASURES = {
     "slots": "Mission slots",
     "collected": "Data collected",
@@ -33,7 +33,7 @@ MEASURES = {
     "depleted": "Depleted batteries in 100 missions",
 }
 
-# Probability of a significant difference of the size that was seen, for ``missions_needed``.
+# Power, for ``missions_needed``: the probability that a difference of this size is significant.
 POWER = 0.8
 
 _SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product"}
@@ -59,12 +59,12 @@ def means(results: Results) -> pd.DataFrame:
 
 
 def answers(results: Results) -> pd.DataFrame:
-    """The variation against the baseline, mission by mission.
+    """The variation compared with the baseline, mission by mission.
 
     Returns:
         A row per policy and metric (those of ``METRICS``, then of ``MEASURES``): ``policy``, the
-        means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval
-        stands by itself, at 95 %; that of Student or, for shares, as of ``stats.paired.paired``.
+        means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval has
+        its own level of 95 %; see ``stats.paired.paired``.
     """
     missions = missions_of(results)
     metrics = [*METRICS, *MEASURES]
@@ -80,23 +80,27 @@ def answers(results: Results) -> pd.DataFrame:
 
 
 def verdict(answer: Any) -> str:
-    """Whether the variation is ``ABOVE`` or ``BELOW`` the baseline in a row of ``answers``.
+    """Whether the variation is significantly ``ABOVE`` or ``BELOW`` the baseline.
 
-    The whole interval decides. An interval without length says nothing of the spread, so there the
-    sign test has to be significant as well.
+    The complete interval has to be above or below 0. If it has no length, it tells nothing about
+    the variance, so the sign test must be significant as well.
+
+    Args:
+        answer: A row of ``answers``.
     """
     known = answer.low < answer.high or answer.p <= 1 - LEVEL
     return position(answer) if known else INCONCLUSIVE
 
 
 def missions_needed(answer: Any) -> float:
-    """How many missions show a difference of the size that a row of ``answers`` has.
+    """The number of missions that would show a difference of the observed size.
 
-    By the normal approximation, with the spread that was seen: both are estimates themselves.
+    It is computed by the normal approximation from the observed difference and variance, which are
+    estimates themselves.
 
     Returns:
-        The number whose interval leaves out 0 with probability ``POWER``; infinite if there is no
-        difference, or its spread is unknown.
+        The number with which the interval excludes 0 with probability ``POWER``; infinite if there
+        is no difference, or its variance is unknown.
     """
     if not answer.difference or answer.low == answer.high:
         return np.inf
@@ -113,7 +117,7 @@ def differences(results: Results, policy: str) -> pd.Series:
 
 
 def best_policy(results: Results, point: int) -> str:
-    """The policy with the highest mean of collection ratio and communication on a side."""
+    """The policy with the highest mean collection ratio and communication on one side."""
     missions = results.missions
     return summary.best_policy(missions[missions["point"] == point])
 
@@ -121,7 +125,7 @@ def best_policy(results: Results, point: int) -> str:
 def typical(results: Results, policy: str) -> int:
     """The replication whose difference in collection ratio and communication is the median.
 
-    Of an even number it is the lower one in the middle, of those alike the first.
+    With an even number it is the lower one of the two in the middle; among equal ones, the first.
     """
     ordered = differences(results, policy).sort_values(kind="stable")
     middle = ordered.iloc[(len(ordered) - 1) // 2]
@@ -131,7 +135,7 @@ def typical(results: Results, policy: str) -> int:
 def worst(results: Results, policy: str) -> int:
     """The replication with the lowest collection ratio and communication in the variation.
 
-    Of those alike it is the one that collected the smallest part, then the first.
+    Among equal ones it is the one with the lowest collection ratio, then the first.
     """
     missions = results.missions.query("policy == @policy and point == @VARIATION")
     ordered = missions.sort_values([PRODUCT, RATIO], kind="stable")
@@ -139,7 +143,7 @@ def worst(results: Results, policy: str) -> int:
 
 
 def conclusions(table: pd.DataFrame) -> str:
-    """What ``answers`` say of collection ratio and communication: a list, an item per policy."""
+    """What ``answers`` say about collection ratio and communication: a list, an item per policy."""
     words = {
         ABOVE: "is **higher** in the variation",
         BELOW: "is **lower** in the variation",
@@ -154,32 +158,32 @@ def conclusions(table: pd.DataFrame) -> str:
 
 
 def _missing(answer: Any) -> str:
-    """How many missions would make an inconclusive answer a conclusive one."""
+    """How many missions would be needed for a conclusive answer, in words."""
     needed = missions_needed(answer)
     if needed == np.inf:
-        return " How many missions would show a difference, these do not say."
+        return " These missions do not tell how many would show a difference."
     return (
-        f" If the difference is as large as seen, some {float(f'{needed:.2g}'):,.0f} missions show "
-        f"it {100 * POWER:g} times in 100, instead of the {answer.n:,} here; these are kept, only "
-        "the others would be simulated."
+        f" If the true difference is as large as this estimate, about "
+        f"{float(f'{needed:.2g}'):,.0f} missions (instead of {answer.n:,}) show it with a probability of {100 * POWER:g} %. Only "
+        "the additional missions would be simulated."
     )
 
 
 def best_of_side(results: Results, point: int) -> str:
-    """The best policy of a side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
+    """The best policy of one side with its mean, as ``greedy, 95.3 % [94.5, 96.1]``."""
     policy = best_policy(results, point)
     return f"{policy}, {numbers.estimate(estimate(results, policy, point=point))}"
 
 
 def winners(changes: Mapping[str, pd.Series]) -> str:
-    """In what shares of the missions each policy has more, or less, in the variation.
+    """In words: the shares of the missions in which each policy is better or worse.
 
     Args:
-        changes: Per policy, as of ``differences``.
+        changes: For each policy the result of ``differences``.
     """
     shares = {policy: [(gaps > 0).mean(), (gaps < 0).mean()] for policy, gaps in changes.items()}
     return "; ".join(
-        f"{policy} has more in {numbers.percent(more)} of the missions and less in "
+        f"{policy} is better in {numbers.percent(more)} of the missions and worse in "
         f"{numbers.percent(less)}"
         for policy, (more, less) in shares.items()
     )
@@ -198,7 +202,7 @@ def listed(table: pd.DataFrame, policy: str) -> pd.DataFrame:
 
 
 def pairing(table: pd.DataFrame) -> pd.DataFrame:
-    """What common random numbers gain in the rows of ``answers``, as a table to print."""
+    """How much common random numbers narrow the intervals of ``answers``, as a table to print."""
     lines = []
     for row in table[table["metric"].isin([*METRICS])].itertuples():
         left = 1 - row.variance_reduction
@@ -211,7 +215,7 @@ def pairing(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def outcome(results: Results, policy: str, point: int, replication: int) -> str:
-    """What became of a mission, in a sentence."""
+    """The outcome of a mission, in a sentence."""
     where = "policy == @policy and point == @point and replication == @replication"
     (mission,) = results.missions.query(where).itertuples()
     ends = results.uavs.query(where)["end"]
@@ -248,9 +252,9 @@ def commands(results: Results, policy: str, replication: int) -> list[str]:
 
 
 def change(answer: Any) -> str:
-    """The paired difference of a row of ``answers`` with its interval; short ones in more digits.
+    """The paired difference of a row of ``answers`` with its interval, as text.
 
-    In percentage points for the paper's metrics.
+    It is in percentage points for the paper's metrics; small numbers have more digits.
     """
     ends = (answer.difference, answer.low, answer.high)
     if answer.metric not in METRICS:

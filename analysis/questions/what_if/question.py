@@ -1,8 +1,8 @@
-"""What if: a variation of a scenario beside its baseline, in the same realisations.
+"""A what-if question: a baseline and a variation of a scenario, with common random numbers.
 
 A question is a study of two design points, ``BASELINE`` and ``VARIATION``. Both have the same
-replications: initial data, arrivals, shadowing and all that is drawn are equal as far as the
-variation does not set them (common random numbers):
+replications, so they have the same initial data, arrivals, shadowing and drawn parameters, except
+what the variation sets:
 
     results = ask(question({"uavs": 5}, baseline={"quota": 300}), "results")
 
@@ -51,14 +51,16 @@ def question(
 
     Args:
         settings: Fields of the scenario that the variation sets.
-        baseline: Fields of the scenario that are set in both, where ``settings`` does not.
-        scenario: A shipped scenario, or a TOML file.
+        baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
+            first.
+        scenario: The name of a shipped scenario, or a TOML file.
         policies: Teams, each compared with itself.
-        missions: Number of missions of each, at least 2.
-        seed: Of the missions.
+        missions: Number of missions of each policy on each side, at least 2.
+        seed: Seed of the missions.
 
     Raises:
-        InputError: If a field, a value or a policy is unknown or not allowed, or a setting is none.
+        InputError: If a field, a value or a policy is unknown or not allowed, or if ``settings``
+            changes nothing.
     """
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
@@ -72,7 +74,7 @@ def question(
     before = {field: fixed[field] for field in changed if field in fixed}
     data = {
         "name": NAME,
-        "description": "a variation beside its baseline, on the same missions",
+        "description": "a variation compared with its baseline, on the same missions",
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
@@ -87,9 +89,9 @@ def question(
 
 
 def key_of(study: Study) -> str:
-    """A hash of all that the records of a question depend on, but not of their number.
+    """A hash of all that the records of a question depend on, without their number.
 
-    So the same question with more missions tops up the results folder.
+    So the same question with more missions adds to the same results folder.
     """
     manifest = Manifest.of(study)
     without_number = {name: v for name, v in manifest.study.items() if name != "missions"}
@@ -98,10 +100,10 @@ def key_of(study: Study) -> str:
 
 
 def check_policy(study: Study, policy: str) -> None:
-    """Refuse a policy that a question is not about.
+    """Refuse a policy that is not in the question.
 
     Raises:
-        InputError: If it is none of the study's.
+        InputError: If the study does not have the policy.
     """
     if policy not in study.policies:
         raise InputError(f"shown: {policy!r} is not asked about{one_of(policy, study.policies)}")
@@ -110,18 +112,18 @@ def check_policy(study: Study, policy: str) -> None:
 def ask(
     study: Study, folder: str | Path, workers: int = 1, progress: Progress | None = None
 ) -> Results:
-    """Run a question into ``FOLDER/what-if/KEY``, as far as no question there has its missions.
+    """Run a question into ``FOLDER/what-if/KEY``; missions of other questions there are reused.
 
     Args:
-        study: As of ``question``.
-        folder: Where results folders are kept.
-        workers: Processes. Two or more take seconds to start, and pay for long runs only.
-        progress: As of ``run_study``.
+        study: The result of ``question``.
+        folder: Folder in which results folders are stored.
+        workers: Number of processes. Two or more take seconds to start; they help in long runs.
+        progress: As for ``run_study``.
 
     Raises:
-        InputError: If a policy cannot act in the scenario, before anything is written; if the
+        InputError: Before anything is written, if a policy cannot act in the scenario; or if the
             folder cannot be written or is in use.
-        ChunkError: As of ``run_study``.
+        ChunkError: As for ``run_study``.
     """
     for policy in study.policies:
         for point in study.points:
@@ -156,7 +158,7 @@ def settings_of(results: Results) -> tuple[list[str], list[str]]:
 
 
 def in_words(space: ScenarioSpace, field: str) -> str:
-    """The value of a field in words: ``3``, ``10 to 50`` of a range, ``25 cells`` of nodes."""
+    """The value of a field in words: ``3``, ``10 to 50`` for a range, ``25 cells`` for nodes."""
     value = _value(space, field)
     if field in _RANGES:
         return numbers.span(value, "{:g}")
@@ -184,7 +186,7 @@ def command(results: Results) -> str:
 
 
 def as_toml(results: Results) -> str:
-    """The question as the TOML file of a study, to add rows to."""
+    """The question as the TOML file of a study, to which rows can be added."""
     study = results.store.manifest.study
     names = ("scenario", "policies", "missions", "seed", "set", "design")
     return tomli_w.dumps({"name": "my-sweep"} | {n: study[n] for n in names if study[n] != {}})
@@ -204,7 +206,7 @@ def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterabl
 
 
 def _meaning(field: str) -> str:
-    """What a field is, without the details of its description."""
+    """The first part of a field's description, without details."""
     description = ScenarioSpace.model_fields[field].description or ""
     return description.partition(";")[0].partition(":")[0]
 
@@ -215,6 +217,6 @@ def _assignments(values: Mapping[str, Any]) -> list[str]:
 
 
 def _value(space: ScenarioSpace, field: str) -> Any:
-    """The value of a field; the number of pads where it follows from the zone."""
+    """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
     value = getattr(space, field)
     return space.charging_pads if field == "pads" else value
