@@ -87,7 +87,7 @@ def introduction(results: Results, pair: Pair, missions: pd.DataFrame) -> str:
     policy, baseline, candidates = pair
     return (
         f"**{policy}** is {role(results, policy)}, **{baseline}** is {role(results, baseline)}; "
-        f"they were chosen among {candidates} {'pair' if candidates == 1 else 'pairs'} by these data. "
+        f"these data chose them among {candidates} {'pair' if candidates == 1 else 'pairs'}. "
         f"They are compared in the same {len(missions):,} missions. Differences are {policy} minus "
         f"{baseline}; a positive difference means that {policy} is better."
     )

@@ -172,14 +172,14 @@ def worst(
     Args:
         results: The study.
         policy: The policy.
-        missions: How many.
-        point: The design point; all, if not given.
+        missions: Number of missions.
+        point: The design point; by default all.
         folder: The results folder that the commands name; ``results/NAME`` by default.
 
     Returns:
-        A row per mission, the worst first, of those alike first the one with the lower collection
-        ratio: ``policy``, ``point``, ``replication``, the metrics, and ``command``, which simulates
-        it again.
+        A row per mission, the worst first (among equal ones, the one with the lower collection
+        ratio): ``policy``, ``point``, ``replication``, the metrics, and ``command``, which
+        simulates the mission again.
     """
     policy_missions = results.missions[results.missions["policy"] == policy]
     if point is not None:

@@ -163,9 +163,9 @@ def _missing(answer: Any) -> str:
     if needed == np.inf:
         return " These missions do not tell how many would show a difference."
     return (
-        f" If the true difference is as large as this estimate, about "
-        f"{float(f'{needed:.2g}'):,.0f} missions (instead of {answer.n:,}) show it with a probability of {100 * POWER:g} %. Only "
-        "the additional missions would be simulated."
+        " If the true difference is as large as this estimate, about "
+        f"{float(f'{needed:.2g}'):,.0f} missions (instead of {answer.n:,}) show it with a "
+        f"probability of {100 * POWER:g} %. Only the additional missions would be simulated."
     )
 
 

@@ -232,7 +232,7 @@ def test_a_point_is_compared_on_the_pairs_that_it_has(results):
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
-        (lambda r: settings.against(r, 6), "baseline: 6 is no design point; allowed: 0..5"),
+        (lambda r: settings.against(r, 6), "baseline: 6 is not a design point; allowed: 0..5"),
         (lambda r: settings.ranked(r, "speed"), "metric: 'speed' is unknown; allowed: success, "),
         (
             lambda r: settings.ranked(r, policy="tour"),

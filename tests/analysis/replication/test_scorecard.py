@@ -352,7 +352,7 @@ def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) 
     study = load_study("fig4", policies=["ddqn"], missions=2, logged=0)
     row = row_of(scorecard({"fig4": run_study(study, tmp_path / "fig4")}, NONE), "two sectors")
     assert row.findings[0].verdict == NO_RESULTS
-    assert row.findings[0].note == "the study fig4 keeps no event logs"
+    assert row.findings[0].note == "the study fig4 stores no event logs"
 
 
 def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:

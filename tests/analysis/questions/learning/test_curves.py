@@ -129,6 +129,6 @@ def test_pairs_need_trainings_of_both_variants():
     curves = pd.concat(
         [several("quick", [1.0]), several("no transfer", [1.0]), several("no guard", [1.0])]
     )
-    assert learning.pairs_in(curves) == {"all means of this project": ("quick", "no transfer")}
+    assert learning.pairs_in(curves) == {"all methods of this project": ("quick", "no transfer")}
     (key,) = learning.transfers(curves, [METRIC], shortest=STEPS[-1])
-    assert key == ("all means of this project", METRIC)
+    assert key == ("all methods of this project", METRIC)

@@ -150,9 +150,9 @@ def test_a_conclusion_names_the_side_of_the_whole_interval(ends, words):
 
 def test_an_inconclusive_answer_says_how_many_missions_it_takes():
     few = what_if_answer.conclusions(answer_of(PRODUCT, 0.01, -0.01, 0.03))
-    assert "some 820 missions show it 80 times in 100, instead of the 100 here" in few
+    assert "about 820 missions (instead of 100) show it with a probability of 80 %" in few
     none = what_if_answer.conclusions(answer_of(PRODUCT, 0.0, 0.0, 0.0))
-    assert "How many missions would show a difference, these do not say." in none
+    assert "These missions do not tell how many would show a difference." in none
 
 
 @pytest.mark.parametrize(
@@ -201,4 +201,4 @@ def test_the_outcome_of_a_mission_names_the_uavs_that_failed(results):
 
 def test_shares_of_missions_with_more_and_less_are_counted():
     text = what_if_answer.winners({"greedy": pd.Series([0.1, 0.0, -0.1, 0.4])})
-    assert text == "greedy has more in 50.0 % of the missions and less in 25.0 %"
+    assert text == "greedy is better in 50.0 % of the missions and worse in 25.0 %"
