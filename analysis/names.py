@@ -20,6 +20,9 @@ METRICS = {
 # Shorter names for the terminal.
 SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "product"}
 
+# The description of the studies of sweeps, and the folder of their results folders.
+SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"
+
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
 

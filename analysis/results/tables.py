@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.names import SWEEP, SWEEPS
 from analysis.results import commands
 from analysis.results.chunks import check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
@@ -74,8 +75,13 @@ class Results:
 
     @property
     def usual_folder(self) -> str:
-        """The folder that ``dess study run`` keeps the study in; pages name no other one."""
-        return f"results/{self.manifest['study']['name']}"
+        """The folder that ``dess study run`` or ``dess sweep`` keeps the study in, for pages.
+
+        Pages name no other one, so that they do not depend on where the results are.
+        """
+        study = self.store.manifest.study
+        within = f"{SWEEPS}/" if study["description"] == SWEEP else ""
+        return f"results/{within}{study['name']}"
 
     def command(
         self, policy: str, point: int, replication: int, folder: str | Path | None = None

@@ -23,7 +23,7 @@ import dess
 from analysis.execution.dry_run import check_effort, check_policies
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
-from analysis.names import ALIASES, METRICS
+from analysis.names import ALIASES, METRICS, SWEEP, SWEEPS
 from analysis.results.chunks import short_hash
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
@@ -37,7 +37,6 @@ from dess.errors import InputError, one_of, validation_line
 from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 
-FOLDER = "sweeps"
 LONGEST = 60  # largest number of characters for the fields in a name
 
 # Missions in the search for the cheapest setting: at most, per setting on average and over all
@@ -82,7 +81,7 @@ def question(
     load_scenario(scenario, **{field: of_field[0] for field, of_field in values.items()})
     data = {
         "name": "sweep" if name is None else name,
-        "description": "a sweep: every combination of the values",
+        "description": SWEEP,
         "scenario": str(scenario),
         "set": fixed,
         "design": {"kind": "grid", "values": swept},
@@ -99,12 +98,12 @@ def question(
 
 def folder_of(study: Study, folder: str | Path) -> Path:
     """The results folder of a sweep."""
-    return Path(folder) / FOLDER / study.name
+    return Path(folder) / SWEEPS / study.name
 
 
 def file_of(study: Study, folder: str | Path) -> Path:
     """The file of the study of a sweep."""
-    return Path(folder) / FOLDER / f"{study.name}.toml"
+    return Path(folder) / SWEEPS / f"{study.name}.toml"
 
 
 def command(study: Study) -> str:

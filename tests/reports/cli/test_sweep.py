@@ -36,6 +36,8 @@ def test_a_line_leads_to_a_page(dess, tmp_path):
     page = re.search(r"page: (.*)", out)[1]
     assert page == f"build/reports/study-{name}.html"
     assert "greedy" in (tmp_path / page).read_text("utf-8")
+    assert f"dess simulate --of results/sweeps/{name}" in (tmp_path / page).read_text("utf-8")
+    assert (tmp_path / "results" / "sweeps" / name).is_dir()
     file = re.search(r"study: (.*)", out)[1]
     before = files_of(tmp_path / "results")
     code, _, err = dess("study", "run", file, "--out", f"results/sweeps/{name}")
