@@ -17,14 +17,19 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
+        *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
         *("ipywidgets", "jinja2", "jupyter_client", "jupytext", "markupsafe"),
         *("nbclient", "nbconvert", "nbformat", "packaging", "pygments", "rocrate"),
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
 }
-_TITLES = {"torch": "PyTorch", "sklearn": "scikit-learn", "tensorboard": "TensorBoard"}
+_TITLES = {
+    "torch": "PyTorch",
+    "sklearn": "scikit-learn",
+    "PIL": "Pillow",
+    "tensorboard": "TensorBoard",
+}
 
 
 class MissingLibraryError(InputError):

@@ -95,9 +95,8 @@ def test_the_worst_missions_come_with_commands_that_simulate_them_again(results,
 
 
 def test_the_command_of_a_mission_gives_its_row(results, tmp_path, monkeypatch, capsys):
-    small_study(tmp_path)
     monkeypatch.chdir(tmp_path)
-    worst = summary.worst(results, "random", 1).iloc[0]
+    worst = summary.worst(results, "random", 1, folder=results.store.folder).iloc[0]
     assert cli.main([*shlex.split(worst["command"])[1:], "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["collection_ratio"] == worst["collection_ratio"]
