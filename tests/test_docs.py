@@ -28,6 +28,7 @@ from reports.tools import learning_curves
 ROOT = Path(__file__).parents[1]
 PATHS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in PATHS}
+ALL = "\n".join(PAGES.values())
 README, OWN_POLICY = PAGES["README.md"], PAGES["docs/how-to/own-policy.md"]
 POLICIES = PAGES["docs/concepts/policies.md"]
 
@@ -83,19 +84,27 @@ def table(text: str, heading: str) -> dict[str, list[list[float]]]:
 
 @pytest.fixture
 def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The policy of the how-to page as an installed package; the name of the policy."""
+    """The policy of the how-to page as an installed package; the name of the policy.
+
+    The working folder has this policy, and the files that pages give a title.
+    """
+    folder = tmp_path / "my-policies"
+    folder.mkdir()
+    for title, text in re.findall(r'^```\w+ title="(.+?)"\n(.*?)^```', ALL, re.M | re.S):
+        (tmp_path / title).write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
     source = next(block for block in blocks(OWN_POLICY, "python") if "class " in block)
     project = tomllib.loads(blocks(OWN_POLICY, "toml")[0])["project"]
     ((name, where),) = project["entry-points"]["dess.policies"].items()
     module = where.split(":")[0]
-    (tmp_path / f"{module}.py").write_text(source)
-    metadata = tmp_path / f"{module}-{project['version']}.dist-info"
+    (folder / f"{module}.py").write_text(source)
+    metadata = folder / f"{module}-{project['version']}.dist-info"
     metadata.mkdir()
     (metadata / "METADATA").write_text(
         f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
     )
     (metadata / "entry_points.txt").write_text(f"[dess.policies]\n{name} = {where}\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, module, raising=False)
     return name
 
