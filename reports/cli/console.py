@@ -20,8 +20,10 @@ def fail(message: str, code: int) -> int:
 
 def print_list(entries: Iterable[tuple[str, str]]) -> None:
     """Print names with their descriptions, one per line."""
-    for name, description in entries:
-        print(f"{name:12} {description}".rstrip())
+    lines = [*entries]
+    width = max((len(name) for name, _ in lines), default=0)
+    for name, description in lines:
+        print(f"{name:{width}}  {description}".rstrip())
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
