@@ -55,7 +55,9 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
         where: Name or path of the input.
         model: The model that was validated.
     """
-    first = error.errors()[0]
+    errors = error.errors()
+    # A key that is spelled wrongly is also missing: tell the cause.
+    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     kind, value, loc = first["type"], first["input"], first["loc"]
     place = f"{where}: {'.'.join(map(str, loc))}" if loc else where
     fields, field, is_whole = _field_at(model, loc)

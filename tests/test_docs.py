@@ -106,7 +106,6 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     (metadata / "entry_points.txt").write_text(f"[dess.policies]\n{name} = {where}\n")
     monkeypatch.syspath_prepend(str(folder))
     monkeypatch.delitem(sys.modules, module, raising=False)
-    monkeypatch.chdir(tmp_path)  # where FILE.py:CLASS is looked for
     return name
 
 

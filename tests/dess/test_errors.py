@@ -47,6 +47,7 @@ class Whole(BaseModel):
 
 LINES = [
     ({}, "name: is missing; allowed: name of the whole"),
+    ({"part": {"price": -1}, "nam": "x"}, "nam: unknown key (did you mean name?)"),
     ({"nam": "x"}, "nam: unknown key (did you mean name?); allowed: {}part, parts"),
     ({"count": 0}, "count: 0 is out of range; allowed: an integer 1..1,000"),
     ({"count": "few"}, "count: 'few' is not an integer; allowed: an integer 1..1,000"),
