@@ -98,6 +98,7 @@ def load(name: str | Path) -> Policy:
         return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
     outside = _outside()
     if name not in outside:
+        _check_untrained(Path(name))
         raise InputError(f"policy: {name!r} is unknown{one_of(name, names(), _OTHERS)}")
     return _made(name, outside[name].value, outside[name].load)
 
@@ -107,6 +108,17 @@ def folder_of(name: str) -> Path | None:
     folder = TRAINED / name if name in trained_names() else Path(name)
     # An empty name would be the working folder.
     return folder if name and os.path.exists(folder / CONFIG) else None
+
+
+def _check_untrained(folder: Path) -> None:
+    """Raise an error if a folder has a training that has not written any weights yet."""
+    from policies.ddqn.config import CHECKPOINT  # imports pydantic
+
+    if (folder / CHECKPOINT).exists():
+        raise InputError(
+            f"policy: {folder} is a training that has no weights yet; continue it with "
+            f"dess train CONFIG --out {folder} --resume"
+        )
 
 
 def package_of(name: str) -> str:

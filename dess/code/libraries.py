@@ -36,19 +36,25 @@ class MissingLibraryError(InputError):
     """An optional library is not installed: one line with the command that installs it."""
 
 
-def needs(extra: str, what: str) -> None:
-    """Raise an error if a library of an extra is not installed; nothing is imported.
+def missing(extra: str, what: str) -> MissingLibraryError | None:
+    """The error that a library of an extra is not installed, if one is not; nothing is imported.
 
     Args:
         extra: The extra.
         what: What needs it, for the message.
+    """
+    absent = (library for library in EXTRAS[extra] if find_spec(library) is None)
+    return next((MissingLibraryError(_line(what, library, extra)) for library in absent), None)
+
+
+def needs(extra: str, what: str) -> None:
+    """Raise the error of ``missing``, if there is one.
 
     Raises:
-        MissingLibraryError: If one of its libraries is not installed.
+        MissingLibraryError: If a library of the extra is not installed.
     """
-    for library in EXTRAS[extra]:
-        if find_spec(library) is None:
-            raise MissingLibraryError(_line(what, library, extra))
+    if error := missing(extra, what):
+        raise error
 
 
 def absence(error: ModuleNotFoundError, what: str) -> MissingLibraryError | None:

@@ -8,7 +8,9 @@ and, in its header as JSON, everything else.
 import copy
 import hashlib
 import json
+import logging
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -21,13 +23,19 @@ from dess.errors import InputError
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD
 from dess.scenario import ScenarioSpace
-from policies.ddqn.config import TrainingConfig, config_of, learner_of
+from policies.ddqn.config import (
+    TrainingConfig,
+    config_names,
+    config_of,
+    learner_of,
+    resume_command,
+)
 from policies.ddqn.observations.states import Layout, layout_of
 from policies.ddqn.policy import DDQN
 from policies.ddqn.training import OBSERVATIONS, Training, build
 
 FORMAT = 1
-MODEL, CONFIG, CHECKPOINT = "model.safetensors", "config.json", "checkpoint.safetensors"
+MODEL, CONFIG = "model.safetensors", "config.json"
 
 Tensors = dict[str, torch.Tensor]
 
@@ -92,6 +100,14 @@ def load_policy(folder: Path) -> DDQN:
     policy.exact = copy.deepcopy(network).double()
     policy.learner = learner_of(config)
     policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])
+    ticks = content.get("run", {}).get("ticks", config.ticks)
+    if ticks < config.ticks:
+        name = config.name if config.name in config_names() else "CONFIG"
+        _log_once(
+            f"{folder}: this training is not finished ({ticks:,} of {config.ticks:,} ticks); the "
+            "policy acts with the weights that it has so far; continue with "
+            + resume_command(config, name, folder)
+        )
     return policy
 
 
@@ -195,6 +211,12 @@ def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> No
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
     torch.set_rng_state(tensors["random.torch"])
+
+
+@lru_cache
+def _log_once(line: str) -> None:
+    """Log a line for the user; every process loads a policy many times."""
+    logging.getLogger(__name__).warning(line)
 
 
 def _digest(tensors: Tensors, use: list[Any]) -> str:

@@ -6,6 +6,8 @@ config.num_envs, config.n_step, config.phases[0].ticks
 
 import hashlib
 import json
+import shlex
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -20,9 +22,12 @@ from pydantic import (
 
 from dess.errors import InputError, validation_line
 from dess.files import Shipped
-from dess.scenario import load_scenario
+from dess.scenario import ScenarioSpace, load_scenario
 
 _CONFIGS = Shipped("config", "policies.ddqn", "configs")
+
+# The file of a training that can go on.
+CHECKPOINT = "checkpoint.safetensors"
 
 # Seed of training missions: this plus the seed of the training.
 MISSION_SEED = 500_000_000
@@ -60,6 +65,7 @@ class TrainingConfig(_Settings):
     name: str = Field(description="name of the policy")
     description: str = Field("", description="purpose of the policy")
     scenario: str = Field("paper", description="scenario that missions are drawn from")
+    set: dict[str, Any] = Field({}, description="fields of the scenario, in all missions")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
         1, description="of the training: weights, exploration, missions"
     )
@@ -137,22 +143,44 @@ class TrainingConfig(_Settings):
         """Ticks of all phases."""
         return sum(phase.ticks for phase in self.phases)
 
+    @property
+    def space(self) -> ScenarioSpace:
+        """The scenario that missions are drawn from, with the fields that ``set`` changes.
+
+        Raises:
+            InputError: If it does not exist or is not valid.
+        """
+        return load_scenario(self.scenario, **self.set)
+
 
 def config_names() -> list[str]:
     """The names of the shipped configs."""
     return _CONFIGS.names()
 
 
-def load_config(name_or_path: str | Path, /, **overrides: Any) -> TrainingConfig:
+def load_config(
+    name_or_path: str | Path, /, fields: Mapping[str, Any] | None = None, **overrides: Any
+) -> TrainingConfig:
     """A shipped config by name, or one from a TOML file.
+
+    Args:
+        name_or_path: One of ``config_names()``, or the path of a TOML file.
+        fields: Fields of the scenario to set on top of those that the config sets.
+        **overrides: Settings of ``TrainingConfig`` in place of those of the config.
 
     Raises:
         InputError: If the config does not exist, or it or its scenario is not valid.
     """
     where, values = _CONFIGS.load(name_or_path)
     config = config_of(values | overrides, where)
+    config = config.model_copy(update={"set": config.set | dict(fields or {})})
+    for key in sorted(config.set.keys() & TrainingConfig.model_fields.keys()):
+        raise InputError(
+            f"{where}: {key} is a setting of the training, not a field of the scenario; allowed: "
+            f"{key} = VALUE in a config file"
+        )
     try:
-        load_scenario(config.scenario)
+        config.space  # noqa: B018 - it is checked when it is made
     except InputError as error:
         raise InputError(f"{where}: scenario: {error}") from None
     return config
@@ -164,6 +192,11 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
     Raises:
         InputError: If the values are not valid.
     """
+    for key in sorted(values.keys() & ScenarioSpace.model_fields.keys()):
+        raise InputError(
+            f"{where}: {key} is a field of the scenario; allowed: "
+            f"--set {key}={json.dumps(values[key])}, or {key} in the table [set]"
+        )
     try:
         return TrainingConfig.model_validate(values)
     except ValidationError as error:
@@ -172,5 +205,27 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
 
 def learner_of(config: TrainingConfig) -> str:
     """An identifier that trainings share if they differ only in the seed: name and hash."""
-    settings = config.model_dump(mode="json", exclude={"seed", "description"})
+    unset = set() if config.set else {"set"}  # policies have been trained before it existed
+    settings = config.model_dump(mode="json", exclude={"seed", "description"} | unset)
     return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
+
+
+def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "auto") -> str:
+    """The command that continues a training.
+
+    Args:
+        config: The settings of the training.
+        name: The name or path of the config.
+        out: The folder of the training.
+        device: The device of the training.
+    """
+    try:
+        original = load_config(name)
+    except InputError:  # only its path is unknown
+        original = config
+    words = ["dess", "train", name, "--out", str(out)]
+    words += ["--seed", str(config.seed)] if config.seed != original.seed else []
+    for key, value in config.set.items():
+        words += ["--set", f"{key}={json.dumps(value)}"] if original.set.get(key) != value else []
+    words += [] if device == "auto" else ["--device", device]
+    return shlex.join([*words, "--resume"])

@@ -2,7 +2,7 @@
 
 training = train(load_config("quick"), Path("runs/quick"))
 training = train(load_config("quick"), Path("runs/quick"), resume=True)
-policy = policies.load("runs/quick")       # from the first evaluation on
+policy = policies.load("runs/quick")       # from the first evaluation or interruption on
 """
 
 import signal
@@ -19,16 +19,14 @@ import torch
 import dess
 from dess.errors import InputError
 from dess.files import writable
-from dess.scenario import load_scenario
 from policies.ddqn.checkpoint import (
-    CHECKPOINT,
     MODEL,
     load_training,
     replace,
     save_policy,
     save_training,
 )
-from policies.ddqn.config import TrainingConfig
+from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.training import Training
 
@@ -54,7 +52,7 @@ def device_of(name: str) -> torch.device:
 
 def memory_of(config: TrainingConfig) -> int:
     """The size of the replay memory of a config [bytes]."""
-    space = load_scenario(config.scenario)
+    space = config.space
     return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
 
 
@@ -122,13 +120,12 @@ def train(
             if progress:
                 progress(training, 1)
         save_training(path, training)
-    if training.curve:
-        _save_results(out, training)
+    _save_results(out, training)
     return training
 
 
 def _save_results(out: Path, training: Training) -> None:
-    """Write the best policy so far and the learning curves."""
+    """Write the policy so far, and the learning curves from the first evaluation on."""
     cuda = training.device.type == "cuda"
     run = {
         "dess": dess.__version__,
@@ -141,7 +138,9 @@ def _save_results(out: Path, training: Training) -> None:
         "seconds": round(training.seconds),
         "selection_score": training.best_score,
     }
-    save_policy(out, training.best, training.config, training.space, run)
+    save_policy(out, training.kept, training.config, training.space, run)
+    if not training.curve:
+        return
     names = dict.fromkeys(name for row in training.curve for name in row)
     table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
     replace(out / CURVE, lambda new: pq.write_table(table, new))

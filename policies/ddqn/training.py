@@ -16,7 +16,7 @@ from dess.batch import simulate_batch
 from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
 from dess.errors import InputError
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
@@ -46,6 +46,7 @@ METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", 
 MISSIONS_PER_PHASE = 2**28
 OBSERVATIONS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
+EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values.
 _PROGRESS = (
     "tick",
@@ -88,7 +89,7 @@ class Training:
         self.config, self.device = config, device
         self.generator = np.random.default_rng(config.seed)
         torch.manual_seed(config.seed)
-        self.space = load_scenario(config.scenario)
+        self.space = config.space
         self.layout = layout_of(self.space)
         self.observation, network = build(config, self.layout)
         self.learner = Learner(network, self.observation, config, device)
@@ -136,6 +137,8 @@ class Training:
         over = self.tick - self.phase_start == self.phase.ticks
         if over or self.tick % self.config.evaluate_every == 0:
             self._evaluate()
+        elif self.tick == max(self.config.evaluate_every // EARLY, 1):
+            self._evaluate_early()
         if over and not self.done:
             for network in (self.learner.online, self.learner.target, self.learner.average):
                 if network is not None:
@@ -151,6 +154,11 @@ class Training:
     def _as_policy(self, network: nn.Module) -> DDQN:
         config = self.config
         return DDQN(config.name, self.observation, network, config.guard, self.layout)
+
+    @property
+    def kept(self) -> dict[str, torch.Tensor]:
+        """The best weights so far; before the first evaluation the present ones."""
+        return self.best if self.curve else _weights(self.learner.evaluated)
 
     def progress(self) -> dict[str, Any]:
         """The progress of the training, as plain values."""
@@ -249,17 +257,40 @@ class Training:
     def _evaluate(self) -> None:
         """Simulate the selection missions; keep the weights with the best moving average."""
         config, network = self.config, self.learner.evaluated
-        policy = self._as_policy(network)
-        records = simulate_batch(
-            self.phase_space, policy, config.evaluation_seed, config.evaluation_missions
-        ).missions
-        network.train()
+        records = self._selection_missions()
         settled = len(self.scores) == config.window  # before that the latest weights are kept
         self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
         if is_best:
             self.best, self.best_score = _weights(network), average
+        self.curve.append(self._row(records, average, is_best))
+        self.finished, self.losses = [], []
+
+    def _evaluate_early(self) -> None:
+        """Evaluate before the first interval is over, so that a new training soon shows a result.
+
+        The present weights are kept until the next evaluation, which replaces them. Nothing else
+        changes: the training goes on as if there had been no early evaluation.
+        """
+        records = self._selection_missions()
+        self.best = _weights(self.learner.evaluated)
+        self.curve.append(self._row(records, float(records[SELECT_BY].mean()), True))
+
+    def _selection_missions(self) -> np.ndarray:
+        """The records of the selection missions under the present policy."""
+        network = self.learner.evaluated
+        records = simulate_batch(
+            self.phase_space,
+            self._as_policy(network),
+            self.config.evaluation_seed,
+            self.config.evaluation_missions,
+        ).missions
+        network.train()
+        return records
+
+    def _row(self, records: np.ndarray, average: float, is_best: bool) -> dict[str, Any]:
+        """A row of the curve: progress, metrics of an evaluation, metrics and losses since."""
         share = (self.tick - self.phase_start) / self.phase.ticks
         row = {
             "tick": self.tick,
@@ -278,8 +309,7 @@ class Training:
             row |= {f"training_{name}": float(finished[name].mean()) for name in METRICS}
         for name in self.losses[-1] if self.losses else ():
             row[name] = float(torch.stack([loss[name] for loss in self.losses]).mean())
-        self.finished, self.losses = [], []
-        self.curve.append(row)
+        return row
 
 
 def _between(ends: tuple[float, float], share: float) -> float:

@@ -70,10 +70,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return console.fail(str(interruption), console.INTERRUPTED)
     except ModuleNotFoundError as error:
         command = [*(sys.argv[1:] if arguments is None else arguments)][:1]
-        missing = absence(error, " ".join(["dess", *command]))
-        if missing is None:
+        absent = absence(error, " ".join(["dess", *command]))
+        if absent is None:
             raise
-        return console.fail(f"dess: error: {missing}", 2)
+        return console.fail(f"dess: error: {absent}", 2)
     except SystemError as error:
         from analysis.execution.jobs import was_interrupted
 

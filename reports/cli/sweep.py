@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dess.code.libraries import MissingLibraryError, needs
+from dess.code.libraries import missing
 from dess.files import check_folder
 from reports.cli import completion, console
 from reports.cli.ranges import all_settings, all_values
@@ -124,10 +124,8 @@ def sweep(
 
 def _render(folder: Path, out: Path) -> Path | None:
     """Write the page; a line says so where the libraries of pages are not installed."""
-    try:
-        needs("reports", "the page of a sweep")
-    except MissingLibraryError as missing:
-        print(f"no page: {missing}", file=sys.stderr)
+    if absent := missing("reports", "the page of a sweep"):
+        print(f"no page: {absent}", file=sys.stderr)
         return None
     from reports.pages.render import render_study
 

@@ -1,6 +1,5 @@
 """``dess train``: train a policy into a folder."""
 
-import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from dess.code.libraries import missing, needs
 from reports.cli import completion, console
+from reports.cli.settings import SetOption, setting
 
 if TYPE_CHECKING:
     from policies.ddqn.training import Training
@@ -38,26 +39,37 @@ def train(
     seed: Annotated[
         int | None, typer.Option(help="Seed in place of the seed of the config.")
     ] = None,
+    settings: SetOption = None,
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly."""
-    from policies.ddqn.config import load_config
+    from policies.ddqn.config import load_config, resume_command
 
-    config = load_config(name, **({} if seed is None else {"seed": seed}))
-    from policies.ddqn.session import train
+    fields = dict(setting(text) for text in settings or [])
+    config = load_config(name, fields, **({} if seed is None else {"seed": seed}))
+    needs("learning", "dess train")
+    from policies.ddqn.session import EVENTS, train
+
+    def announce(memory: int) -> None:
+        """Print the size of the replay memory [bytes], and how to see the curves."""
+        view = missing("tensorboard", "a live view of the curves")
+        print(f"replay memory: {memory / 2**20:,.0f} MiB", file=sys.stderr)
+        print(view or f"curves: tensorboard --logdir {out / EVENTS}", file=sys.stderr)
 
     with console.compile_notice(), _bar(config.ticks) as progress:
         training = train(
-            config, out, resume=resume, device=device, announce=_print_memory, progress=progress
+            config, out, resume=resume, device=device, announce=announce, progress=progress
         )
     if not training.done:
-        options = ["--out", str(out), *([] if seed is None else ["--seed", str(seed)])]
-        options += [] if device == "auto" else ["--device", device]
-        command = shlex.join(["dess", "train", name, *options, "--resume"])
-        raise console.Interruption(f"interrupted at tick {training.tick}: continue with {command}")
+        command = resume_command(config, name, out, device)
+        raise console.Interruption(
+            f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
+            f"--policy {out}; continue with {command}"
+        )
     print(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
     )
+    print(f"compare: dess evaluate --policy {out} --policy greedy")
 
 
 @contextmanager
@@ -79,8 +91,3 @@ def _bar(ticks: int) -> "Iterator[Callable[[Training, int], None]]":
                 )
 
         yield show
-
-
-def _print_memory(size: int) -> None:
-    """Print the size of the replay memory [bytes]."""
-    print(f"replay memory: {size / 2**20:,.0f} MiB", file=sys.stderr)

@@ -19,7 +19,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.names import METRICS, PRODUCT
-from dess import load_scenario, simulate_batch
+from dess import simulate_batch
 from dess.files import replacing
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of
@@ -61,7 +61,7 @@ def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, 
     training = Training(config, device_of("cpu"))
     training.run(config.ticks)
     policy = training.policy(training.best)
-    records = simulate_batch(load_scenario(config.scenario), policy, EVALUATION_SEED, missions)
+    records = simulate_batch(config.space, policy, EVALUATION_SEED, missions)
     metrics = {f"final_{name}": float(records.missions[name].mean()) for name in METRICS}
     return pd.DataFrame(training.curve), metrics
 

@@ -48,7 +48,7 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     shipped = load_config(config["name"], seed=config["seed"]).model_dump(mode="json")
     if shipped != config_of(config, str(folder)).model_dump(mode="json"):
         raise SystemExit(f"{folder}: was not trained by the config of its name")
-    space, policy = load_scenario(config["scenario"]), policies.load(folder)
+    space, policy = load_config(config["name"]).space, policies.load(folder)
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
 
     yield "## Training"

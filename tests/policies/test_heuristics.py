@@ -14,9 +14,10 @@ from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View
 from policies.guard import guard
+from policies.registry import SHIPPED
 from tests.drawn import Checked, replications, seeds, spaces
 
-NAMES = ("random", "nearest", "greedy", "tour")
+NAMES = tuple(SHIPPED)
 heuristics = st.sampled_from(NAMES).map(policies.load)
 
 

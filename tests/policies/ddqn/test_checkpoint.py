@@ -17,7 +17,6 @@ from dess.batch import simulate_batch
 from dess.scenario import load_scenario
 from policies.ddqn import checkpoint
 from policies.ddqn.checkpoint import (
-    CHECKPOINT,
     CONFIG,
     MODEL,
     load_policy,
@@ -25,6 +24,7 @@ from policies.ddqn.checkpoint import (
     save_policy,
     save_training,
 )
+from policies.ddqn.config import CHECKPOINT
 from policies.ddqn.training import Training
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny

@@ -5,8 +5,17 @@ from typing import Any
 
 import pytest
 
+import policies
 from dess import InputError
-from policies.ddqn.config import TrainingConfig, config_names, config_of, load_config
+from dess.scenario import load_scenario
+from policies.ddqn.config import (
+    TrainingConfig,
+    config_names,
+    config_of,
+    learner_of,
+    load_config,
+    resume_command,
+)
 from tests.policies.ddqn.tiny import PHASES, TINY, tiny, write_config
 
 PHASE = PHASES[0]
@@ -38,6 +47,11 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is not above n_step 60"),
     ({"replay": 4, "n_step": 3}, "replay: 4 is not above n_step 3 + 1"),
+    ({"uavs": [2, 3]}, "uavs is a field of the scenario; allowed: --set uavs=[2, 3], or uavs in"),
+    ({"set": {"batch": 3}}, "batch is a setting of the training, not a field of the scenario; "),
+    ({"set": {"uvs": 3}}, "scenario: scenario paper: uvs: unknown key (did you mean uavs?)"),
+    ({"set": {"uavs": "many"}}, "scenario: scenario paper: uavs: "),
+    ({"set": 3}, "set: "),
     ({"scenario": "nope"}, "scenario: nope: no such scenario; allowed: bay, fig1, fig4, paper"),
 ]
 
@@ -92,6 +106,22 @@ def test_overrides_come_last(tmp_path: Path) -> None:
         load_config(path, seed=-5)
 
 
+def test_fields_of_the_scenario_are_set(tmp_path: Path) -> None:
+    path = write_config(tmp_path, set={"uavs": 2, "quota": 400})
+    assert load_config(path).space == load_scenario("paper", uavs=2, quota=400)
+    config = load_config(path, {"uavs": 1})
+    assert config.space == load_scenario("paper", uavs=1, quota=400)
+    command = f"dess train {path} --out out --set uavs=1 --resume"
+    assert resume_command(config, str(path), Path("out")) == command
+    assert learner_of(config) != learner_of(load_config(path)) != learner_of(tiny())
+
+
+def test_the_shipped_policies_keep_the_identity_of_their_learner() -> None:
+    assert learner_of(load_config("ddqn")) == "ddqn 55f4b0b3"
+    names = ["ddqn", "ddqn-2", "ddqn-3"]
+    assert {policies.load(name).learner for name in names} == {learner_of(load_config("ddqn"))}
+
+
 def test_as_plain_values_and_back_it_is_the_same() -> None:
     config = tiny(discount=1 / 3, seed=7)
     assert config_of(config.model_dump(mode="json"), "here") == config
@@ -107,3 +137,10 @@ def test_the_shipped_configs_load() -> None:
         config = load_config(name)
         assert config.description
         assert config.ticks > 0
+
+
+def test_the_config_of_the_how_to_page_loads(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[3] / "docs/how-to/train.md").read_text("utf-8")
+    path = tmp_path / "my-config.toml"
+    path.write_text(text.partition("```toml\n")[2].partition("```")[0], "utf-8")
+    assert load_config(path).space == load_scenario("paper", uavs=2)

@@ -17,7 +17,8 @@ import policies
 from dess import InputError
 from dess.scenario import load_scenario
 from policies.ddqn import session
-from policies.ddqn.checkpoint import CHECKPOINT, CONFIG, MODEL, load_training
+from policies.ddqn.checkpoint import CONFIG, MODEL, load_training
+from policies.ddqn.config import CHECKPOINT
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.session import CURVE, EVENTS, device_of, memory_of, train
 from policies.ddqn.training import Training
@@ -77,7 +78,7 @@ def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
 def test_the_folder_has_a_policy_from_the_first_evaluation_on(tmp_path: Path) -> None:
     counts = []
     train(SHORT, tmp_path, progress=lambda *_: counts.append(len(files_of(tmp_path))))
-    assert counts == [1] * 7 + [4] * 33
+    assert counts == [1] * 1 + [4] * 39
 
 
 def test_the_curve_has_the_columns_of_all_its_rows(tmp_path: Path) -> None:
@@ -107,6 +108,32 @@ def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(
     assert pq.read_table(tmp_path / CURVE)["tick"].to_pylist() == [
         row["tick"] for row in whole.curve
     ]
+
+
+def test_a_training_that_was_interrupted_is_a_policy_that_says_so(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    stop = _at(1, lambda: signal.raise_signal(signal.SIGINT))
+    training = train(SHORT, tmp_path, progress=stop)
+    assert not training.curve
+    assert set(files_of(tmp_path)) == {CHECKPOINT, CONFIG, MODEL}
+    policies.load(tmp_path)
+    policies.load(tmp_path)
+    [record] = caplog.records  # it is said once
+    line = f"{tmp_path}: this training is not finished (1 of 40 ticks); "
+    assert record.getMessage().startswith(line)
+    assert record.getMessage().endswith(f"dess train CONFIG --out {tmp_path} --resume")
+    train(SHORT, tmp_path, resume=True)
+    caplog.clear()
+    policies.load(tmp_path)
+    assert not caplog.records
+
+
+def test_a_training_without_weights_is_no_policy(tmp_path: Path) -> None:
+    train(SHORT, tmp_path)
+    (tmp_path / CONFIG).unlink()
+    with pytest.raises(InputError, match="is a training that has no weights yet; continue it with"):
+        policies.load(tmp_path)
 
 
 def test_the_second_signal_ends_it_at_once(whole: Training, tmp_path: Path) -> None:

@@ -151,7 +151,7 @@ def test_a_phase_begins_with_missions_and_a_memory_of_its_own() -> None:
 
 
 def _scripted(monkeypatch: pytest.MonkeyPatch, scores: list[float]) -> None:
-    """Let the evaluations of selection give these scores."""
+    """Let the evaluations of selection give these scores; there is no early one."""
     left = iter(scores)
 
     def fly(space: ScenarioSpace, *_: Any) -> Any:
@@ -160,6 +160,7 @@ def _scripted(monkeypatch: pytest.MonkeyPatch, scores: list[float]) -> None:
         return records
 
     monkeypatch.setattr(module, "simulate_batch", fly)
+    monkeypatch.setattr(Training, "_evaluate_early", lambda training: None)
 
 
 @pytest.mark.parametrize(
@@ -388,9 +389,34 @@ def test_the_share_of_low_starts(share: float) -> None:
 # --- curves ---
 
 
+def test_an_early_evaluation_shows_a_result_and_changes_nothing(
+    whole: Training, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    early, *others = story_of(whole)
+    assert early["tick"] == whole.config.evaluate_every // module.EARLY
+    assert early["is_best"]
+    monkeypatch.setattr(Training, "_evaluate_early", lambda training: None)
+    without = Training(whole.config, CPU)
+    without.run(1000)
+    assert story_of(without) == others
+    whole_weights, weights = weights_of(whole), weights_of(without)
+    assert all(torch.equal(value, whole_weights[name]) for name, value in weights.items())
+
+
+def test_the_weights_that_are_kept_are_the_present_ones_until_the_first_evaluation() -> None:
+    training = Training(tiny(average_rate=1.0), CPU)
+    training.run(3)
+    assert not training.curve
+    online = training.learner.online.state_dict()
+    assert all(torch.equal(value, online[name]) for name, value in training.kept.items())
+    assert not all(torch.equal(value, online[name]) for name, value in training.best.items())
+    training.run(3)
+    assert training.kept is training.best
+
+
 def test_the_curve_tells_how_the_training_stands(whole: Training) -> None:
     config = whole.config
-    ticks = [25, 50, 75, 80, 100, 125, 150, 160]
+    ticks = [6, 25, 50, 75, 80, 100, 125, 150, 160]
     assert [row["tick"] for row in whole.curve] == ticks
     assert [row["updates"] for row in whole.curve] == ticks
     # A mission has three UAVs at most, and a last row in which nobody acts.

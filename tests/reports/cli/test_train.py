@@ -7,11 +7,13 @@ import subprocess
 import sys
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 import torch
 
 import policies
+from dess.code import libraries
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import load_config
 from reports import cli
@@ -52,6 +54,7 @@ def test_a_training_leaves_a_policy_that_flies(dess, tmp_path):
     assert out.startswith("runs/tiny: 20 updates, ")
     assert "best product 0." in out
     assert "replay memory: " in err
+    assert "curves: tensorboard --logdir runs/tiny/tensorboard\n" in err
     names = ["checkpoint.safetensors", "config.json", "model.safetensors", "training.parquet"]
     assert list(files_of(tmp_path / "runs" / "tiny")) == names
     assert policies.load("runs/tiny").name == "tiny"
@@ -82,6 +85,20 @@ def test_the_seed_can_be_set(dess):
     assert dess("train", "tiny.toml", "--out", "a", "--resume", "--seed", 5)[0] == 0
 
 
+def test_fields_of_the_scenario_can_be_set(dess):
+    arguments = ("train", "tiny.toml", "--out", "run", "--set", "uavs=1")
+    assert dess(*arguments)[0] == 0
+    assert json.loads(Path("run/config.json").read_text())["training"]["set"] == {"uavs": 1}
+    assert "of another config" in dess("train", "tiny.toml", "--out", "run", "--resume")[2]
+    assert dess(*arguments, "--resume")[0] == 0
+
+
+def test_where_tensorboard_is_absent_the_line_says_how_to_install_it(dess, monkeypatch):
+    monkeypatch.setitem(libraries.EXTRAS, "tensorboard", ("no_such_library",))
+    _, _, err = dess("train", "tiny.toml", "--out", "run")
+    assert "a live view of the curves needs no_such_library, which is not installed: pip " in err
+
+
 # Arguments, and what the line on stderr must name.
 BAD = {
     "train nope --out out": ["nope: no such config", "or a TOML file"],
@@ -94,6 +111,9 @@ BAD = {
     "train tiny.toml --out tiny.toml": ["tiny.toml: cannot be written"],
     "train tiny.toml --out done": ["done: holds a training", "--resume", "another folder"],
     "train other.toml --out done --resume": ["of another config (num_envs differ)"],
+    "train tiny.toml --out out --set batch=2": ["batch is a setting of the training", "config"],
+    "train tiny.toml --out out --set uvs=2": ["uvs: unknown key (did you mean uavs?)"],
+    "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
     "evaluate --policy broken": ["broken/config.json: no readable description of a policy"],
     "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
 }
@@ -106,16 +126,17 @@ def test_bad_input_gets_one_line_and_changes_nothing(arguments, dess, tmp_path, 
         assert dess("train", "tiny.toml", "--out", "done")[0] == 0
         text = (tmp_path / "tiny.toml").read_text().replace("num_envs = 8", "num_envs = 4")
         (tmp_path / "other.toml").write_text(text)
-    for name in ("broken", "empty"):
+    for name in ("begun", "broken", "empty"):
         (tmp_path / name).mkdir()
     (tmp_path / "broken" / "config.json").write_text("{}")
+    (tmp_path / "begun" / "checkpoint.safetensors").write_text("")
     before = files_of(tmp_path)
     code, out, err = dess(*arguments.split(" "))
     assert (code, out) == (2, "")
     *notes, line = err.splitlines()
     assert line.startswith("dess: error: ")
     for note in notes:
-        assert note.startswith(("replay memory: ", "compiling the simulator"))
+        assert note.startswith(("replay memory: ", "curves: tensorboard", "compiling the sim"))
     for part in BAD[arguments]:
         assert part in line
     assert files_of(tmp_path) == before
@@ -151,8 +172,8 @@ def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_pat
     assert (running.returncode, out) == (130, "")
     stopped = load_training(tmp_path / "out" / "checkpoint.safetensors", load_config(config), CPU)
     assert 0 < stopped.tick < 340
-    hint = f"interrupted at tick {stopped.tick}: continue with "
-    hint += "dess train tiny.toml --out out --device cpu --resume"
+    hint = f"interrupted at tick {stopped.tick} of 340: the policy so far is --policy out; "
+    hint += "continue with dess train tiny.toml --out out --device cpu --resume"
     assert err.splitlines()[-1] == hint
     assert "Traceback" not in err
     assert not [name for name in files_of(tmp_path) if name.endswith(".new")]
