@@ -11,13 +11,13 @@
 # %% [markdown]
 # # Learned against heuristic
 #
-# The best learned policy and the best heuristic in the same missions: how far apart they are, where
-# in the space of parameters, in which missions the learned one loses, and what a decision costs.
+# This page compares the best learned policy and the best heuristic in the same missions: how much
+# they differ, for which parameters and in which missions, and how long their decisions take.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders comparison and timing
 learned = None  # the learned policy to show; None for the best of the study
-heuristic = None  # the policy to set beside it; None for the best that has not learned
+heuristic = None  # the policy to compare it with; None for the best that is not learned
 
 # %%
 from pathlib import Path
@@ -39,18 +39,19 @@ policy, title = pair.policy, f"{pair.policy} − {pair.baseline}"
 missions = head_to_head.duels(study, pair)
 
 # %% [markdown]
-# ## On the same missions
+# ## Differences in the same missions
 
 # %%
 html.say(head_to_head.introduction(study, pair, missions))
 
 # %% [markdown]
-# Unless another is named, the metric is collection ratio and communication, the product of success
-# and collection ratio, in percentage points. Every mission has parameters of its own (Table II) and
-# the same realisation of initial data, arrivals and shadowing for both policies: they are compared
-# mission by mission. Verdicts are by p-values at the 5 % level, after Holm's correction for the
-# number of comparisons and Bonferroni's for the choice of the pair, or of the best policy, by these
-# data: ▲ ahead, ▼ behind, ≈ inconclusive. The 95 % intervals are of one difference each.
+# Unless another metric is named, differences are in collection ratio and communication (the product
+# of success and collection ratio), in percentage points. Every mission draws its own parameters
+# (Table II), and both policies meet the same initial data, arrivals and shadowing, so they are
+# compared mission by mission. The signs mean: ▲ significantly better, ▼ significantly worse, ≈
+# inconclusive. They follow from p-values at the 5 % level, corrected for the number of comparisons
+# (Holm) and for choosing the policies by the same data (Bonferroni). Each 95 % interval is for a
+# single difference.
 
 # %%
 learners = head_to_head.learners_against_baseline(study)
@@ -59,29 +60,27 @@ worth = head_to_head.pairing(comparison)
 display(
     html.table(
         head_to_head.by_metric(comparison),
-        f"With missions of its own for each policy, it would take {worth} for intervals as narrow",
+        f"With independent missions for each policy, equally narrow intervals would need {worth}",
     ),
     html.table(head_to_head.by_metric(learners, "learner"), "Every learner and the best heuristic"),
     html.table(head_to_head.by_metric(summary.comparisons(study)), "Every policy and the best one"),
 )
 
 # %% [markdown]
-# Of a learner with several trainings, the interval of the points is a confidence interval of the
-# expected difference: of the mean over all trainings that the learner might have. A single training
-# may lie outside of it. *One new training* is the 95 % prediction interval of the difference that
-# one more training of this learner would have. Of a learner with a single training, the claim is
-# about this checkpoint, and nothing is known of another training.
-# The rest of this page is about one policy: of several trainings the first, whatever came of it.
+# For a learner with several trainings, the confidence interval is about the expected difference:
+# the mean over all trainings that the learner might have. *One new training* is the 95 % prediction
+# interval for one more training. For a learner with a single training, the result is only about
+# this checkpoint. The rest of this page is about one policy, which is the first of several
+# trainings.
 
 # %% [markdown]
 # ### Mission by mission
 #
-# A mission that fails counts 0, so a single failure weighs as much as many small leads. Failures
-# are rare because all policies here act under the return guard, which allows only actions after
-# which a UAV can still reach the charging zone in time.
-#
-# In the figure, the 95 % band holds the whole curve. Where the curve crosses 0 is the share of
-# missions that are lost. Up to 0.5 % of the missions lie beyond each end of the axis.
+# A failed mission counts 0, so a single failure has as much weight as many small differences.
+# Failures are rare because all policies here act under the return guard, which allows only actions
+# after which a UAV can still reach the charging zone in time. In the figure, the 95 % band is for
+# the complete curve, whose height at 0 is the share of missions in which the policy is not better.
+# Up to 0.5 % of the missions are beyond each end of the axis.
 
 # %%
 html.table(head_to_head.outcomes(missions, pair), "Outcomes, with 95 % intervals of their shares")
@@ -92,23 +91,24 @@ html.figure(
     figures.distribution(missions, pair),
     f"Distribution of the difference {title} over the missions",
     f"Share of the missions (n = {len(missions):,}) in which the difference is at most the value "
-    f"below; the lowest is {lowest} points, the highest {highest}.",
+    f"on the axis; the lowest is {lowest} points, the highest {highest}.",
 )
 
 # %% [markdown]
-# ## Over the space of parameters
+# ## Differences by parameter
 #
-# Every parameter is cut into at most five bins with about as many missions; the initial data are
-# the mean of a mission's nodes. In the figures, blue is ahead, orange behind; what is inconclusive
-# (after Holm's correction for all bins) is hollow and grey; dashed is the mean of all missions.
+# The values of every parameter are divided into at most five bins with about equally many missions;
+# for the initial data, the mean over the nodes of a mission counts. In the figures, blue means
+# better, orange worse, and hollow grey inconclusive (after Holm's correction for all bins). The
+# dashed line is the mean of all missions.
 
 # %%
 lead = regions.along(missions, pair.candidates)
 html.table(
     regions.spread(lead, regions.dependence(missions)),
-    f"{policy} is {regions.tally(lead)} bins. Of every parameter the bins with the lowest and the "
-    "highest mean difference [points], the share of the variance that its bins explain, and the "
-    "test of equal means (Alexander and Govern, Holm's correction for the number of parameters)",
+    f"{policy} is {regions.tally(lead)} bins. For every parameter: the bins with the lowest and "
+    "the highest mean difference [points], the share of the variance that its bins explain, and "
+    "the test of equal means (Alexander and Govern, Holm's correction)",
 )
 
 # %%
@@ -124,9 +124,9 @@ html.gallery(
 )
 
 # %% [markdown]
-# The two parameters that explain most of the difference, at once: chosen by the missions of even
-# replications, drawn from those of odd replications, which had no part in the choice. In brackets:
-# inconclusive (p of the paired t test, Holm's correction for all cells).
+# The next figure shows the two parameters that explain most of the difference. They were chosen by
+# the missions of even replications; the figure shows those of odd replications, which were not used
+# for the choice. Values in brackets are inconclusive (paired t test, Holm's correction).
 
 # %%
 chosen, cells = regions.strongest(missions, pair.candidates)
@@ -141,12 +141,11 @@ if len(cells):
     display(html.figure(figures.heat(cells, *chosen["field"]), alt, caption))
 
 # %% [markdown]
-# ## Where it loses
+# ## Regions in which the policy is better or worse
 #
-# A regression tree cuts the space into regions in which the difference differs most. It is grown on
-# one half of the missions, those of even replications, and judged on the other half, which had no
-# part in it: else the regions that chance favours would look real. Parameters that are not named
-# may have any value. The intervals are at 95 %.
+# A regression tree divides the parameter space into regions with different mean differences. It is
+# fitted to one half of the missions (even replications), and the means are computed from the other
+# half, which was not used for the fit. Parameters that are not named may have any value.
 
 # %%
 leaves = regions.rules(missions, pair.candidates)
@@ -155,11 +154,10 @@ html.table(regions.listed(leaves, policy), f"{policy} is {regions.tally(leaves)}
 # %% [markdown]
 # ## The worst missions
 #
-# Those with the lowest product, of equal ones those with less collected; and of all others those
-# in which the policy is furthest behind. Points are the difference in the product. The commands
-# simulate a mission of the results folder again and draw it; another `--policy` of the study acts
-# in the same mission. The first two are drawn below, by both policies, if their records are still
-# the same when simulated again.
+# The first table has the missions with the lowest product, the second one other missions with the
+# largest differences in the product. The commands simulate a mission of the results folder again
+# and draw it; another `--policy` of the study acts in the same mission. The first two are drawn
+# below for both policies, if their records are the same when simulated again.
 
 # %%
 worst = head_to_head.worst(missions, 5)
@@ -177,21 +175,20 @@ maps = figures.maps(kept_missions(study, head_to_head.drawn(missions, pair), res
 display(html.say("{commands}", commands=html.commands(lines)), *map(html.gallery, maps))
 
 # %% [markdown]
-# ## What a decision costs
+# ## The time of a decision
 #
-# A policy is asked once in a mission slot for all UAVs of a mission that must act. Timed is this
-# call alone, with all that the policy works out from what it sees, in one mission at a time; and in
-# the same missions all at once in the batch engine, where a call decides for many. Times are of one
-# machine and will differ on another. Is that fast enough? A decision must be ready within a mission
-# slot. The model gives a slot no length in seconds; but in one, a UAV flies a cell: the last column
-# is the speed at which it crosses a cell in the time that 95 % of the calls keep below.
+# In every mission slot, a policy is called once for all UAVs of a mission that must act. The time
+# of this call was measured for one mission at a time, then for many missions in the batch engine.
+# Times depend on the machine. A decision must be ready within a mission slot, in which a UAV flies
+# one cell. The model does not define the length of a slot in seconds, so the last column gives the
+# speed at which a UAV crosses a cell in the time of a slow call (95 % quantile).
 
 # %%
 costs = decision_costs.timed(times, study.policies)
 alt = "Time of a decision of every policy, for one mission and in the batch"
 caption = (
     f"n = {min(cost.calls for cost in costs):,} calls or more per policy. A line goes from the "
-    "median to what 95 % of the calls keep below: the spread of the calls, no interval of a mean."
+    "median to the 95 % quantile of the calls; it is not a confidence interval."
 )
 display(
     html.say(decision_costs.remarks(times, study, pair)),

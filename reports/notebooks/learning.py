@@ -11,11 +11,11 @@
 # %% [markdown]
 # # Learning
 #
-# How the learned policies came about: with and without transfer learning as in the paper's Fig. 3,
-# what each means of learning is worth, and the curves of the policies that are shipped.
+# This page shows how the learned policies were trained: with and without transfer learning as in
+# the paper's Fig. 3, the effect of each method of learning, and the curves of the shipped policies.
 
 # %% tags=["parameters"]
-trained = None  # folder with curves.parquet and a folder per policy; None for those shipped
+trained = None  # folder with curves.parquet and a folder per policy; None for the shipped ones
 
 # %%
 from pathlib import Path
@@ -42,16 +42,17 @@ baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
 # %% [markdown]
 # ## <a id="fig-3"></a>With and without transfer learning: the paper's Fig. 3
 #
-# With transfer learning, phase I trains without any battery decrease, and phase II begins with its
-# weights (the paper's Algorithm 1); without, every step is one of phase II. The paper claims that
-# the agent with transfer learning has the higher reward throughout, passes the other in collection
-# ratio and communication, and ends higher; without it, training levels off early and low.
+# With transfer learning, phase I trains without battery decrease, and phase II begins with the
+# weights of phase I (the paper's Algorithm 1). Without it, all steps belong to phase II. The paper
+# claims that the agent with transfer learning has a higher reward at every step, overtakes the
+# other one in collection ratio and communication, and ends higher, and that training without
+# transfer learning levels off early at a low value.
 
 # %%
 html.say(
-    "Each training makes {updates} updates and sees {slots} million UAV-slots; those of a variant "
-    "differ in their seed alone. The curves show the greedy policy on evaluation missions. Left of "
-    "the vertical line, in phase I, these have no battery decrease either.",
+    "Each training makes {updates} updates and simulates {slots} million UAV-slots; trainings of a "
+    "variant differ only in their seed. The curves show the policy without exploration on "
+    "evaluation missions. Left of the vertical line, in phase I, these have no battery decrease.",
     updates=numbers.span(last["updates"]),
     slots=numbers.span(last["uav_slots"] / 1e6, "{:.1f}"),
 )
@@ -82,16 +83,16 @@ html.say(
 # %%
 html.table(
     learning.transfer_table(transfers, verdicts),
-    "By the mean curves, and by the last difference with its 99 % interval; of the product, "
-    "collection ratio and communication, in percentage points",
+    "The verdicts follow from the mean curves and from the last difference with its 99 % interval "
+    "(for collection ratio and communication, in percentage points)",
 )
 
 # %%
 best = last.groupby("variant")[final].max().map(numbers.percent)
 html.say(
-    "The trainings here have {steps:,} steps. The paper sees its crossing at {paper:,}: by the "
-    "rules shorter ones are inconclusive. With {name}, the best training with transfer reaches "
-    "{ends[0]}, the best without {ends[1]} in collection ratio and communication.",
+    "The trainings here have {steps:,} steps. In the paper, the curves cross at {paper:,} steps; "
+    "by the rules, shorter trainings are inconclusive. With {name}, the best training with "
+    "transfer reaches {ends[0]} in collection ratio and communication, the best without {ends[1]}.",
     steps=last["updates"].max(),
     paper=paper.CROSSING,
     name=[*pairs][-1],
@@ -99,45 +100,47 @@ html.say(
 )
 
 # %% [markdown]
-# ## What each means of learning is worth
+# ## The effect of each method of learning
 #
-# Trainings of the config `quick`, each with one thing changed and the same number of updates. The
-# weights that were kept are evaluated on the same missions, used by no training or selection.
+# These are trainings of the config `quick`, each with one change and the same number of updates.
+# The selected weights are evaluated on the same missions, which were used neither for training nor
+# for selecting weights.
 #
-# - **guard**: the return guard masks actions that leave no way back to the charger.
+# - **guard**: the return guard masks actions after which it is too late to return for charging.
 # - **low-battery starts**: some missions begin in the zone, with little battery left.
-# - **early returns**: some UAVs come home to charge as soon as they may.
-# - **none of the three**: none of these; the paper's means alone.
+# - **early returns**: some UAVs return to charge as soon as they may.
+# - **none of the three**: none of these methods; only those of the paper.
 # - **transfer**: phase I without battery decrease comes first.
 # - **nodes**, **maps**: another observation and network; **maps** is the paper's.
-# - **environments**: missions side by side; fewer bring less fresh experience per update.
+# - **environments**: missions simulated in parallel; with fewer, an update has less new experience.
 
 # %%
 table = ablation.ablation(last, final, baseline)
 html.figure(
     figures.ablation(table, last, final, baseline),
     "Collection ratio and communication that the trainings of every variant reach",
-    "Dots are trainings, n of them; a diamond is their mean, with its 95 % interval by Student's t "
-    "over the trainings. One training has no interval, and no diamond. Dashed: the mean of "
-    f"{baseline}. An arrow: all trainings are left of the axis.",
+    "A dot is a training; a diamond is the mean of n trainings with its 95 % interval (Student's t "
+    "over the trainings). A single training has neither interval nor diamond. The dashed line is "
+    f"the mean of {baseline}. An arrow means that all trainings are left of the axis.",
 )
 
 # %%
 html.table(
     ablation.ablation_table(table, last, baseline),
     "Means over n trainings with 95 % confidence intervals of the expected result, then the 95 % "
-    "prediction interval of one new training; none of one training, or where all are the same. "
-    f"Differences: Welch's t; of a single training, Student's t with the spread of {baseline}, so "
-    f"the interval holds 0 if one more training of {baseline} might have come out like that. "
-    "▲ the whole interval is above 0: better; ▼ below it: worse; ≈ around it: inconclusive",
+    "prediction interval of one new training, except for single or equal trainings. Differences "
+    "have Welch's t interval. For a single training it is Student's t with the variance of "
+    f"{baseline}; it contains 0 if the training could be one more training of {baseline}. "
+    "▲ the interval is above 0 (better), ▼ below 0 (worse), ≈ contains 0 (inconclusive)",
 )
 
 # %% [markdown]
-# Of so many intervals some miss by chance; the p-values are corrected for their number (Holm). Of
-# a variant that was trained once only large differences show.
+# With so many intervals, some do not contain the true value by chance; the p-values are corrected
+# for the number of tests (Holm). For a variant that was trained once, only large differences can be
+# significant.
 
 # %% [markdown]
-# ## The policies that are shipped
+# ## The shipped policies
 
 # %%
 shipped = policies.trained_policies(folder)
@@ -148,7 +151,7 @@ def several(group: list[policies.Trained], metric: str) -> tuple[Figure, str, st
     drawing = figures.trainings(policies.curves_of(group, names), metric, {names: group[0].name})
     caption = figures.trainings_caption([len(group)])
     alt = f"{figures.NAMES[metric]} of {names} against training step"
-    return drawing, alt, f"{names}: trainings that differ in their seed alone. {caption}"
+    return drawing, alt, f"{names}: trainings that differ only in their seed. {caption}"
 
 
 learners = policies.several_trainings(shipped)
@@ -166,15 +169,17 @@ html.gallery([once(policy) for policy in shipped])
 
 # %%
 html.say(
-    "Where more training stops paying, by the exponential moving average of collection ratio and "
-    "communication. Minutes are those of the clock, whatever else the machine did.\n\n{courses}",
+    "From which step on the exponential moving average of collection ratio and communication does "
+    "not improve any more. Minutes are elapsed time, and other programs may have slowed the "
+    "training down.\n\n{courses}",
     courses="\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped),
 )
 
 # %% [markdown]
 # ## Where the figures come from
 #
-# No study is read: the curves come with the policies, in `policies/trained`. To make them anew:
+# This page reads no study: the curves are shipped with the policies, in `policies/trained`. These
+# commands make them again:
 
 # %%
 curves = "python -m reports.tools.learning_curves --out runs/learning"

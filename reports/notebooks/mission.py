@@ -11,13 +11,14 @@
 # %% [markdown]
 # # Missions
 #
-# Where UAVs fly, which sensor node they serve on the way, when they charge and what they leave
-# behind: missions like those of the paper's Fig. 1 and Fig. 4, drawn, and played slot by slot.
+# This page shows where the UAVs fly, which sensor nodes they serve on the way, when they charge,
+# and how much data is left. Missions like those of the paper's Fig. 1 and Fig. 4 are drawn, and can
+# be played slot by slot.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders of the studies fig1 and fig4
 policy = None  # the policy to show; None for the best by collection ratio and communication
-replication = 0  # the replication to show, one whose event log is kept
+replication = 0  # the replication to show; the study must have stored its event log
 
 # %%
 from pathlib import Path
@@ -50,10 +51,10 @@ best = best_policy(fig1.missions)
 example = missions.logged_mission(fig1, best, 0, replication)
 mean = missions.estimate(fig1, best)
 html.say(
-    "A map of {grid} x {grid} cells with {nodes} nodes. The paper draws this example without "
-    "numbers, so there is nothing to compare with; the policy of this mission is **{best}**, of "
-    "{policies} the best by collection ratio and communication: {mean}, n = {n:,} missions. What "
-    "is learned is learned on one map, so no learned policy can be used here.",
+    "The map has {grid} x {grid} cells and {nodes} nodes. The paper draws this example without "
+    "numbers, so nothing can be compared. The policy of this mission is **{best}**, the best of "
+    "{policies} by collection ratio and communication: {mean}, n = {n:,} missions. A learned "
+    "policy works only on the map of its training, so none can be used here.",
     grid=example.scenario.grid, nodes=len(example.scenario.nodes), best=best,
     policies=numbers.words(fig1.policies), mean=numbers.estimate(mean), n=mean["n"],
 )  # fmt: skip
@@ -67,15 +68,16 @@ alt = "Map of the mission; battery, residual data and charging"
 html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 
 # %% [markdown]
-# **How to read the map.** Every sensor node has a colour. An arrow is the move of one mission slot,
-# in the colour of the node that was served in most of the slot's communication slots (the last of
-# them on a tie); grey where none was. A cross is a slot of hovering, in the same colours, a star a
-# slot of charging. A numbered diamond is where a UAV starts, a dot where its mission ends. UAVs
-# that share a path are drawn side by side. y grows south.
+# **How to read the map.** Every sensor node has a colour. An arrow is the move of a UAV in one
+# mission slot; it has the colour of the node that was served in most communication slots of that
+# slot (on a tie, the last of them), and is grey if no node was served. A cross is a slot in which
+# the UAV hovered, in the same colours, a star a slot in which it charged. A UAV starts at a
+# numbered diamond, and its mission ends at a dot. UAVs on the same path are drawn side by side. The
+# y axis points south.
 #
-# **How to read the curves.** C<sub>S</sub> is the battery at or below which a UAV may start to
-# charge, C<sub>C</sub> the one at which charging ends. A band of residual data is one node, in its
-# colour; bands that stay are nodes that nobody has emptied.
+# **How to read the curves.** A UAV may start to charge when its battery is at or below
+# C<sub>S</sub>; charging ends at C<sub>C</sub>. Each band of residual data is one node, in its
+# colour. A band that remains at the end is a node that still has data.
 
 # %% [markdown]
 # ## <a id="fig-4"></a>From one to three UAVs: the paper's Fig. 4
@@ -84,10 +86,10 @@ html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 mean = missions.estimate(fig4, shown_policy)
 html.say(
     "The policy is **{policy}**: the mean of its collection ratio and communication over the three "
-    "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all); the best "
-    "of the study is {best}. Each column is a single mission, replication "
-    "{replication} of seed {seed}: an example, not an average. All three have the same "
-    "realisation: initial data, arrivals and shadowing are equal, only the number of UAVs differs.",
+    "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all). The best "
+    "policy of the study is {best}. Each column is a single mission, replication {replication} of "
+    "seed {seed}: an example, not an average. All three have the same random initial data, "
+    "arrivals and shadowing; only the number of UAVs differs.",
     policy=shown_policy, mean=numbers.estimate(mean), n=mean["n"],
     best=best_policy(fig4.missions), replication=replication, seed=seed,
 )  # fmt: skip
@@ -119,7 +121,7 @@ html.gallery([captioned(point) for point in points])
 # %%
 display(
     html.say(
-        "The same missions, to play, to pause and to leaf through on a screen. {reading}",
+        "The players show the same missions: press *Play*, or move the slider. {reading}",
         reading=READING,
     )
 )
@@ -137,7 +139,7 @@ for mission in shown:
     display(player(mission.log, mission.scenario, name, title, caption))
 
 # %% [markdown]
-# ## What one sees
+# ## The missions in numbers
 
 # %%
 html.table(missions.outcome_table(shown), "The three missions; data in data units")
@@ -148,13 +150,13 @@ html.table(missions.outcome_table(shown), "The three missions; data in data unit
 # %%
 html.table(
     missions.uav_table(shown),
-    "Communications are the communication slots that count toward the quota",
+    "Communications are the communication slots that count towards the quota",
 )
 
 # %% [markdown]
 # ## Where the figures come from
 #
-# Each mission can be simulated again:
+# These commands simulate the missions again:
 
 # %%
 command = (

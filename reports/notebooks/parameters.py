@@ -11,14 +11,14 @@
 # %% [markdown]
 # # Scenario parameters
 #
-# What the number of UAVs, the charging thresholds, the initial data and the flying time do to a
-# mission: one by one as in the paper's Fig. 5, all together at the best setting, and as shares of
-# the variance.
+# This page shows the effects of the number of UAVs, the charging thresholds, the initial data and
+# the flying time: one parameter at a time as in the paper's Fig. 5, the best setting of all
+# parameters, and the share of the variance that each parameter explains.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folders of fig5, sweet-spot and sensitivity
 learned = None  # the learned policy to show; None for the best of the study, if there is one
-heuristic = None  # the other policy to show; None for the best that has not learned
+heuristic = None  # the other policy to show; None for the best that is not learned
 
 # %%
 from pathlib import Path
@@ -52,14 +52,13 @@ rule, checks = sweet.manifest["study"]["selection"], summary.checks(sweet)
 
 # %%
 html.say(
-    "Of the best learned policy of the study, if there is one, and the best heuristic: "
-    "{policies}. Every value of a parameter was simulated in {n:,} missions per policy, everything "
-    "else drawn from Table II. All values, and all policies, have the same realisation of all "
-    "other random draws. So the lowest panel shows more than the others: the change from the "
-    "first value on, mission by mission, without what the missions have in common. Its axis is "
-    "its own; those of the metrics are the same for all parameters. Both policies act under the "
-    "return guard, which allows only actions after which a UAV can still reach the charging zone "
-    "in time: that is why nearly all missions succeed whatever the values are.",
+    "The policies are the best learned one of the study, if there is one, and the best heuristic: "
+    "{policies}. Every value of a parameter was simulated in {n:,} missions per policy, with all "
+    "other parameters drawn from Table II. All values and policies have the same other random "
+    "draws (common random numbers), so the paired difference from the first value, in the lowest "
+    "panel, shows most. This panel has its own axis. Nearly all missions succeed, since both "
+    "policies act under the return guard, which allows only actions after which a UAV can still "
+    "reach the charging zone in time.",
     policies=numbers.words([f"**{policy}**" for policy in policies]),
     n=effects["n"].min(),
 )
@@ -78,35 +77,32 @@ html.gallery(
 )
 
 # %% [markdown]
-# ### What one sees
+# ### The effects in words
 #
-# Two values differ if they do mission by mission, at the 5 % level after Holm's correction for the
-# number of pairs. Along the values, a metric *rises* if some values differ and all that do go up,
-# *falls* if all go down, *stays level* if none differ; *rises, then falls* if nothing before a
-# value falls and nothing behind it rises.
-#
-# A value that is the highest may be one of several that do not differ. The largest difference is
-# that of any two values.
+# Two values differ significantly if their paired difference does, at the 5 % level after Holm's
+# correction for the number of pairs. A metric *rises* if some values differ significantly and all
+# these differences are increases, *falls* if all are decreases, and *stays level* if no values
+# differ. It *rises, then falls* if there is a value with no decrease before it and no increase
+# after it. Several values may have the highest mean if they do not differ significantly.
 
 # %%
 html.table(
     main_effects.listed(effects, changes, ratios),
-    f"Collection ratio and communication; differences in percentage points, with {level} "
-    "intervals. Beside the last minus the first value stands the same difference of the collection "
-    "ratio alone, which failed missions do not lower",
+    f"Collection ratio and communication; differences in points with {level} intervals. The last "
+    "minus the first value is also shown for the collection ratio, which failures do not lower",
 )
 
 # %% [markdown]
-# ### What the paper sees
+# ### The paper's claims
 
 # %%
 studies = {"fig5": fig5, "sweet-spot": sweet}
 rows = scorecard.of_policy(studies, leading, FIG_5)
 rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
 html.say(
-    "The claims of the paper on its Fig. 5, and their verdicts for {leading}, by the rules of the "
-    "replication scorecard. One is inconclusive where the missions are too few for either "
-    "answer. They overlap, so their number is no score.\n\n{claims}",
+    "These are the claims of the paper about its Fig. 5, and the verdicts for {leading} by the "
+    "rules of the replication scorecard. A claim is inconclusive if the missions are too few for "
+    "either answer. The claims overlap, so the number of verdicts is not a score.\n\n{claims}",
     leading=leading,
     claims=scorecard.listed(rows),
 )
@@ -117,10 +113,10 @@ html.say(
 # %%
 html.say(
     "Of {n:,} settings, the one with the highest mean of {metric} was selected for every policy, "
-    "by `{rule[procedure]}` with an indifference of {margin}. A winner's mean is too high, because "
-    "it won for it; so it was simulated in {rule[check]:,} further missions that had no part in "
-    "the selection, and only these are shown beside the paper's figures (means of {paper:,} "
-    "missions, all parameters at their best).",
+    "by `{rule[procedure]}` with an indifference of {margin}. The mean of a selected setting tends "
+    "to be too high, because it was selected for its high mean. So each selected setting was "
+    "simulated in {rule[check]:,} additional missions, and only these are compared with the "
+    "paper's numbers (means of {paper:,} missions, with all parameters at their best).",
     n=len(sweet.manifest["points"]),
     metric=names.METRICS[rule["metric"]].lower(),
     rule=rule,
@@ -129,12 +125,12 @@ html.say(
 )
 
 # %%
-caption = "The check: n = {:,} missions per policy, bars are {} intervals. Dashed: the paper."
+caption = "The check: n = {:,} missions per policy, bars are {} intervals. Dashed line: the paper."
 html.gallery(
     [
         (
             performance(checks, metric, paper.SWEET_SPOT[metric]),
-            f"{name} of every policy at its best setting, beside the paper's figure",
+            f"{name} of every policy at its best setting, and the paper's number",
             caption.format(checks["n"].min(), level),
         )
         for metric, name in names.METRICS.items()
@@ -145,44 +141,37 @@ html.gallery(
 # %%
 html.table(
     sweet_spot.table(sweet),
-    f"The setting selected, and its check: means with {level} intervals, ▲ wholly above "
-    "the paper's figure, ▼ below it, ≈ around it. Then the missions that the selection took, and "
-    "the settings that were not ruled out, itself among them",
+    f"The selected setting and its check: means with {level} intervals (▲ above the paper's "
+    "number, ▼ below, ≈ contains it), the number of missions of the selection, and the number of "
+    "settings that were not ruled out, the selected one included",
 )
 
 # %%
-html.say(
-    "What is known of the selections:\n\n{guarantees}", guarantees=sweet_spot.guarantees(sweet)
-)
+html.say("The guarantees of the selections:\n\n{text}", text=sweet_spot.guarantees(sweet))
 
 # %%
 contrary = sweet_spot.against_main_effects(sweet, effects, changes)
 if contrary:
-    display(
-        html.say(
-            "Where a selected value is lower than another by its main effect above:\n\n{contrary}",
-            contrary=contrary,
-        )
-    )
+    intro = "By the main effects above, some selected values are lower than another value:"
+    display(html.say("{intro}\n\n{contrary}", intro=intro, contrary=contrary))
 
 # %% [markdown]
-# ## What matters at all: sensitivity
+# ## Sensitivity: which parameters matter
 
 # %%
 html.say(
     "Here all parameters are drawn together: {ranges}. A Sobol index is the share of a metric's "
-    "variance that a parameter accounts for: *alone*, or *with all interactions* that it takes "
-    "part in. The replication, which is the realisation of all random draws, is a parameter too: "
-    "what it accounts for, no setting removes.",
+    "variance that a parameter explains, *alone* or *with all interactions* that it takes part in. "
+    "The replication, which determines all random draws, counts as a parameter: its share is noise "
+    "that no setting removes.",
     ranges=sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"]),
 )
 
 # %% [markdown]
-# The figures are about the collection ratio: the product differs from it in failed missions alone,
-# and these are too few here to take shares of. The intervals come from a bootstrap over the blocks
-# of the design, a block being a mission of each base sample and those between them; they are wider
-# than need be where the parameters rule. Estimates are not cut: that of a small share may be
-# negative, an interval may go beyond 100 %. Below the dotted line: noise.
+# The figures show the collection ratio. The product differs from it only in failed missions, which
+# are too few here. The intervals come from a bootstrap over the blocks of the design; they are too
+# wide where the parameters dominate. Estimates are not limited to 0 to 100 %; that of a small share
+# may be negative. Below the dotted line is the noise.
 
 # %%
 indices = summary.sensitivities(sobol)
@@ -199,9 +188,9 @@ html.gallery(
 # %%
 html.table(
     sensitivity.index_table(indices),
-    f"Sobol indices as shares of the variance, with {level} intervals (bootstrap over the blocks "
-    "of the design). A metric that is the same in all missions of both base samples has no "
-    f"variance to take shares of, and no row. Rows of success and of the product rest on {failed}",
+    f"Sobol indices as shares of the variance, with {level} intervals (bootstrap over blocks). A "
+    "metric without variance has no row. Rows of success and of the product depend on only "
+    f"{failed}",
 )
 
 # %% [markdown]

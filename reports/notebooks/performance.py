@@ -11,8 +11,8 @@
 # %% [markdown]
 # # Performance
 #
-# How often every policy fills its communication quota and how much of the data it brings home,
-# beside the figures that the paper prints for its learned policy.
+# This page shows how often every policy fills its communication quota, and how much of the data it
+# collects, and compares both with the numbers that the paper prints for its learned policy.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders of the studies table4 and fig4
@@ -50,8 +50,8 @@ html.gallery(
     [
         (
             figures.performance(overall, metric, paper.TABLE_IV[metric]),
-            f"{name} of every policy, beside the paper's figure",
-            f"{caption} Dashed: the paper.",
+            f"{name} of every policy, and the paper's number",
+            f"{caption} The dashed line is the paper's number.",
         )
         for metric, name in METRICS.items()
     ]
@@ -60,8 +60,8 @@ html.gallery(
 # %%
 html.table(
     printed.beside(overall, paper.TABLE_IV),
-    "Means with 95 % intervals, and the difference to the paper in percentage points. "
-    "▲ the whole interval is above the paper's figure, ▼ below it, ≈ around it: inconclusive.",
+    "Means with 95 % intervals, and the difference from the paper in percentage points. ▲ the "
+    "interval is above the paper's number, ▼ it is below, ≈ it contains the number (inconclusive).",
 )
 
 # %%
@@ -80,9 +80,10 @@ html.say(
 
 # %%
 html.say(
-    "The paper prints no intervals. Its figures are themselves means of {n:,} missions: a success "
-    "of that size alone has a 95 % interval of {interval}. And where the paper is silent, such as "
-    "on the place of the charging zone or the transmit power, the scenario here decides.",
+    "The paper prints no intervals, although its numbers are means over {n:,} missions. For its "
+    "success, for example, the 95 % interval is {interval}. The paper does not give all constants, "
+    "such as the place of the charging zone or the transmit power; for these, the scenario here "
+    "has its own values.",
     n=paper.TABLE_IV_MISSIONS,
     interval=numbers.interval(*paper.spread(paper.TABLE_IV[SUCCESS], paper.TABLE_IV_MISSIONS)),
 )
@@ -90,7 +91,7 @@ html.say(
 # %% [markdown]
 # ## By number of UAVs
 #
-# The same missions, split by the size of the fleet that they drew.
+# These are the same missions, grouped by the number of UAVs that each mission drew.
 
 # %%
 caption = f"n = {numbers.span(fleets['n'])} missions per policy and size, bars are 95 % intervals."
@@ -111,7 +112,7 @@ html.table(fleet_table(fleets), "Means with 95 % intervals")
 html.say(
     "C<sub>S</sub> {charge_start[0]} %, C<sub>C</sub> {charge_complete[0]} %, {initial_data[0]:g} "
     "data units per node, flying time {flying_time[0]}; {n:,} missions per policy and fleet size. "
-    "The paper does not say over how many missions its figures are means.",
+    "The paper does not say over how many missions its numbers are means.",
     n=fig4_fleets["n"].min(),
     **fig4.manifest["scenario"],
 )
@@ -122,8 +123,8 @@ html.gallery(
     [
         (
             figures.by_fleet(fig4_fleets, m, {i: p[m] for i, p in paper.FIG_4.items()}),
-            f"{METRICS[m]} against the number of UAVs, beside the paper's figures",
-            f"{caption}, bars are 95 % intervals. Diamonds: the paper.",
+            f"{METRICS[m]} against the number of UAVs, and the paper's numbers",
+            f"{caption}, bars are 95 % intervals. Diamonds are the paper's numbers.",
         )
         for m in paper.FIG_4[1]
     ]
@@ -132,7 +133,7 @@ html.gallery(
 # %%
 html.table(
     printed.beside_by_fleet(fig4_fleets, paper.FIG_4),
-    "Means with 95 % intervals; ▲ wholly above the paper's figure, ▼ below it, ≈ around it",
+    "Means with 95 % intervals. ▲ the interval is above the paper's number, ▼ below, ≈ contains it",
 )
 
 # %% [markdown]
