@@ -48,10 +48,9 @@ html.say(head_to_head.introduction(study, pair, missions))
 # Unless another metric is named, differences are in collection ratio and communication (the product
 # of success and collection ratio), in percentage points. Every mission draws its own parameters
 # (Table II), and both policies meet the same initial data, arrivals and shadowing, so they are
-# compared mission by mission. The signs mean: ▲ significantly better, ▼ significantly worse, ≈
-# inconclusive. They follow from p-values at the 5 % level, corrected for the number of comparisons
-# (Holm) and for choosing the policies by the same data (Bonferroni). Each 95 % interval is for a
-# single difference.
+# compared mission by mission. ▲ means significantly better, ▼ significantly worse, ≈ inconclusive
+# (p-values at the 5 % level, corrected for the number of comparisons by Holm and for choosing the
+# policies by these data by Bonferroni). Each 95 % interval is for a single difference.
 
 # %%
 learners = head_to_head.learners_against_baseline(study)
@@ -97,10 +96,9 @@ html.figure(
 # %% [markdown]
 # ## Differences by parameter
 #
-# The values of every parameter are divided into at most five bins with about equally many missions;
-# for the initial data, the mean over the nodes of a mission counts. In the figures, blue means
-# better, orange worse, and hollow grey inconclusive (after Holm's correction for all bins). The
-# dashed line is the mean of all missions.
+# The values of every parameter are divided into at most five bins with about equally many missions
+# (for initial data, by the mean over the nodes). Blue means better, orange worse, hollow grey
+# inconclusive (Holm's correction for all bins). The dashed line is the mean of all missions.
 
 # %%
 lead = regions.along(missions, pair.candidates)
@@ -125,8 +123,7 @@ html.gallery(
 
 # %% [markdown]
 # The next figure shows the two parameters that explain most of the difference. They were chosen by
-# the missions of even replications; the figure shows those of odd replications, which were not used
-# for the choice. Values in brackets are inconclusive (paired t test, Holm's correction).
+# the missions of even replications; the figure shows the others. Brackets mean inconclusive.
 
 # %%
 chosen, cells = regions.strongest(missions, pair.candidates)

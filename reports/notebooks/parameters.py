@@ -147,7 +147,7 @@ html.table(
 )
 
 # %%
-html.say("The guarantees of the selections:\n\n{text}", text=sweet_spot.guarantees(sweet))
+html.say("The guarantees of the selections:\n\n{known}", known=sweet_spot.guarantees(sweet))
 
 # %%
 contrary = sweet_spot.against_main_effects(sweet, effects, changes)

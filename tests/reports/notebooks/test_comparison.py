@@ -138,7 +138,7 @@ def test_without_times_it_says_how_to_take_them(results: Path, tmp_path: Path) -
 
 def test_policies_can_be_chosen(results: Path) -> None:
     text = said(results, learned="random", heuristic="nearest")
-    assert "random is a policy of the study that has not learned, nearest a policy" in text
+    assert "random is a policy of the study that has not learned, nearest is a policy" in text
     assert "random minus nearest" in text
     # success, then collection ratio
     assert re.search(r"random − nearest [^▲▼≈]*[▲▼≈][^▲▼≈]*▼", text)
@@ -162,7 +162,7 @@ def test_several_trainings_are_one_learner_and_the_first_is_shown(
         results, tmp_path / "results", policies=["greedy", "ddqn", "ddqn-2"], missions=60
     )
     text = said(folder)
-    assert "ddqn is training 1 of 2 of the best learner of the study, greedy the best" in text
+    assert "ddqn is training 1 of 2 of the best learner of the study, greedy is the best" in text
     assert "ddqn (2 trainings) − greedy" in text
     for team in load_results(folder / NAME).store.manifest.policies:
         for member in team.members:

@@ -52,5 +52,5 @@ def test_the_learning_page_judges_by_the_curves_it_is_given(
     text = said_by("learning", trained=str(tmp_path))
     assert text.count(f"{verdict} is above in all of phase II") == 2
     assert f"The trainings here have {length:,} steps." in text
-    assert "ddqn and ddqn-2: trainings that differ in their seed alone." in text
+    assert "ddqn and ddqn-2: trainings that differ only in their seed." in text
     assert "no transfer 3 40.2 % [40.0, 40.4] −40.0 [−40.2, −39.8] ▼" in text

@@ -51,7 +51,7 @@ def test_every_uav_has_a_row(results: Path, text: str) -> None:
 def test_the_policy_of_the_example_is_the_best_one(results: Path, text: str) -> None:
     missions = pd.read_parquet(results / "fig1" / "missions")
     means = missions.groupby("policy")[PRODUCT].mean()
-    assert f"the policy of this mission is {means.idxmax()}, of " in text
+    assert f"The policy of this mission is {means.idxmax()}, the best of " in text
     assert f"collection ratio and communication: {100 * means.max():.1f} % [" in text
 
 

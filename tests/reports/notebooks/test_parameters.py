@@ -82,4 +82,4 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
     text = said_by("parameters", results=str(folder))
     assert "if there is one, and the best heuristic: greedy." in text
-    assert "their verdicts for greedy" in text
+    assert "the verdicts for greedy" in text
