@@ -46,7 +46,7 @@ STUDIES = {
     ),
     "one at a time": (
         {"design": {"kind": "one-at-a-time", "values": {"uavs": [1, 2], "quota": [20, 60]}}},
-        ["The lowest panel has the change"],
+        ["The lowest panel shows the paired difference"],
         ["Orange frames", "One panel for each field"],
     ),
     "a sample": (
