@@ -6,11 +6,13 @@
   that shows this file. So the same link works in the repository and in the site.
 """
 
+import json
 import os
 import re
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import typer.main
 from mkdocs.config.defaults import MkDocsConfig
@@ -37,14 +39,20 @@ def commands() -> str:
 
 
 def scenario_fields() -> str:
-    """A table of the fields of a scenario: meaning, allowed values, default."""
-    rows = ["| field | meaning | unit | allowed | default |", "| --- | --- | --- | --- | --- |"]
-    for field in fields(dess.load_scenario("paper")):
-        default = str(field.default) if len(str(field.default)) < 40 else "as in the paper"
-        rows.append(
-            f"| `{field.name}` | {field.meaning} | {field.unit} | {field.allowed} | {default} |"
-        )
-    return "\n".join(rows)
+    """A table of the fields of a scenario, with the values of the paper."""
+    heads = ("field", "meaning", "unit", "allowed", "default")
+    rows = [
+        (f"`{f.name}`", f.meaning, f.unit, f.allowed, _default(f.default))
+        for f in fields(dess.load_scenario("paper"))
+    ]
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _default(value: Any) -> str:
+    """A value as TOML has it, if it is short."""
+    text = "" if value is None else json.dumps(value)
+    return f"`{text}`" if 0 < len(text) < 40 else "as in the paper" if text else ""
 
 
 def names(package: str) -> str:
