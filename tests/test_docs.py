@@ -57,7 +57,7 @@ def command_lines(program: str) -> list[list[str]]:
 def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
     """The subcommand that arguments name, and those that are left for it."""
     command: Any = typer.main.get_command(cli.app)
-    while hasattr(command, "commands"):
+    while hasattr(command, "commands") and arguments != ["--version"]:
         if not arguments and command.invoke_without_command:  # such as dess policies
             break
         assert arguments, "no subcommand"

@@ -63,3 +63,10 @@ def test_every_command_that_prints_has_its_output_in_the_tutorial(printed: dict[
 def test_commands_print_what_the_tutorial_says(printed: dict[int, str], number: int) -> None:
     want, got = STEPS[number][2], printed[number - 1]
     assert doctest.OutputChecker().check_output(want, got, SAME), f"{STEPS[number - 1][2]}\n{got}"
+
+
+def test_the_policy_that_the_tutorial_trains_is_better_than_greedy(printed: dict[int, str]) -> None:
+    product = r"collection_ratio_and_communication +(\S+) +(\S+) +(\S+)"
+    (output,) = (text for text in printed.values() if "runs/sea " in text)
+    (_, low, _), (_, _, high) = re.findall(product, output)
+    assert float(low) > float(high)
