@@ -8,13 +8,13 @@ import pytest
 import dess as dess_package
 from analysis import load_study
 from dess import ScenarioSpace, load_scenario
-from policies.registry import trained_names
+from policies.registry import SHIPPED, trained_names
 from tests.analysis.small import environment
 
 
 def test_names_are_listed(dess):
     for command, names in {
-        "policies": ["random", "nearest", "greedy", "tour", *trained_names()],
+        "policies": [*SHIPPED, *trained_names()],
         "scenarios": ["bay", "fig1", "fig4", "paper"],
         "studies": [
             *("charge-limits", "comparison", "explorer", "fig1", "fig4", "fig5", "precise"),
