@@ -52,7 +52,7 @@ class Team(Document):
 
 
 class Acceptance(Document):
-    """A change of code that a run was told to accept (``--accept-code``).
+    """A change of code that was accepted by the option ``--accept-code``.
 
     Attributes:
         modules: The hashes, old and new, of the modules that differ; empty for one that is gone.

@@ -1,4 +1,4 @@
-"""Files of the learner: trained policies and checkpoints of trainings. Nothing is unpickled.
+"""Files of the learner: trained policies, and checkpoints of trainings; none needs unpickling.
 
 A policy is a folder with ``model.safetensors`` (the weights) and ``config.json`` (their
 description). A checkpoint is one file, ``checkpoint.safetensors``, with all arrays of a training
@@ -54,7 +54,7 @@ def save_policy(
         weights: The weights of the network.
         config: The settings of the training.
         space: The scenario space of the training.
-        run: Facts about the training for readers; ``load_policy`` ignores them.
+        run: Information about the training for readers; ``load_policy`` ignores it.
     """
     folder.mkdir(parents=True, exist_ok=True)
     tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
@@ -74,8 +74,8 @@ def save_policy(
 def load_policy(folder: Path) -> DDQN:
     """Load a policy that ``save_policy`` wrote.
 
-    Close decisions are computed in double precision, so that an action does not depend on the
-    number of rows that are decided together.
+    If the best two values are nearly equal, they are computed in double precision, so that an
+    action does not depend on the number of rows that are decided together.
 
     Raises:
         InputError: If a file is missing, damaged, of another version or of another shape.
@@ -112,7 +112,7 @@ def load_policy(folder: Path) -> DDQN:
 
 
 def save_training(path: Path, training: Training) -> None:
-    """Write a checkpoint from which a training continues as if it had not been stopped."""
+    """Write a checkpoint from which a training continues as if it had not been interrupted."""
     learner = training.learner
     tensors: Tensors = {"random.torch": torch.get_rng_state()}
     tensors["early"] = torch.from_numpy(training.early)
@@ -180,7 +180,7 @@ def load_training(path: Path, config: TrainingConfig, device: torch.device) -> T
 
 
 def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> None:
-    """Restore the state of a saved training in a new one."""
+    """Restore the state of a saved training in a new training."""
     training.restore(header["progress"])
     learner = training.learner
     with torch.no_grad():
@@ -220,7 +220,7 @@ def _log_once(line: str) -> None:
 
 
 def _digest(tensors: Tensors, use: list[Any]) -> str:
-    """A hash of the weights and of the settings ``use`` that they are used with."""
+    """A hash of the weights and of the settings ``use`` with which they are used."""
     digest = hashlib.sha256(json.dumps(use).encode())
     for name in sorted(tensors):
         digest.update(name.encode() + b"\0" + tensors[name].numpy().tobytes())
@@ -266,7 +266,7 @@ def _require_version(version: Any, observation: Any, path: Path) -> None:
 
 
 def _form(tensor: torch.Tensor) -> str:
-    """Type and shape, like ``float32 [5, 16]``."""
+    """The type and shape of a tensor, like ``float32 [5, 16]``."""
     return f"{str(tensor.dtype).removeprefix('torch.')} {list(tensor.shape)}"
 
 
@@ -279,7 +279,7 @@ def _part(tensors: Tensors, name: str) -> Tensors:
 
 
 def _bytes(array: np.ndarray) -> torch.Tensor:
-    """Any array, structured or not, as bytes."""
+    """The bytes of an array, which may be structured."""
     return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
 
 

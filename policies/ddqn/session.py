@@ -51,7 +51,7 @@ def device_of(name: str) -> torch.device:
 
 
 def memory_of(config: TrainingConfig) -> int:
-    """The size of the replay memory of a config [bytes]."""
+    """The size of the replay memory for a config [bytes]."""
     space = config.space
     return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
 

@@ -1,8 +1,8 @@
-"""Algorithm 1: many missions run in parallel; all UAVs train one network from one replay memory.
+"""Algorithm 1: missions run in parallel, and all UAVs train one network from one replay memory.
 
-A *tick* is one mission slot of all environments, followed by the updates. Missions of training, of
-the selection of weights and of evaluations have different seeds: ``MISSION_SEED`` + the seed of the
-training, the config's ``evaluation_seed``, and any other.
+A *tick* is one mission slot of all environments, followed by the updates. Missions for training
+have the seed ``MISSION_SEED`` + the seed of the training, missions for selecting weights have the
+config's ``evaluation_seed``, and missions for evaluations should have any other seed.
 """
 
 import time
@@ -47,7 +47,7 @@ MISSIONS_PER_PHASE = 2**28
 OBSERVATIONS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
-# The attributes of a training that are plain values.
+# The attributes of a training that are plain values, not arrays.
 _PROGRESS = (
     "tick",
     "updates",
@@ -79,9 +79,9 @@ class Training:
     """A training in progress, from its first tick to its last.
 
     Attributes:
-        config: Its settings.
-        learner: Networks and optimizer.
-        tick: Ticks done, over all phases.
+        config: The settings of the training.
+        learner: The networks and the optimizer.
+        tick: Number of ticks done, over all phases.
         curve: One row per evaluation: progress, metrics and losses.
     """
 
@@ -103,7 +103,7 @@ class Training:
 
     @property
     def phase(self) -> Phase:
-        """The phase that the next tick belongs to."""
+        """The phase to which the next tick belongs."""
         return self.config.phases[self.phase_index]
 
     @property
@@ -171,7 +171,7 @@ class Training:
             setattr(self, name, progress[name])
 
     def _enter_phase(self, index: int) -> None:
-        """Begin a phase: new missions, an empty replay memory, a new optimizer, no scores."""
+        """Begin a phase with new missions, an empty replay memory and a new optimizer, no scores."""
         self.phase_index, self.phase_start = index, self.tick
         config = self.config
         cost = 1 if self.phase.battery else 0
@@ -187,7 +187,7 @@ class Training:
         self.best_score: float | None = None
 
     def _launch(self, environments: np.ndarray) -> None:
-        """Start new missions, some with a low battery; draw the UAVs that return early."""
+        """Start new missions, some of them with a low battery; draw which UAVs return early."""
         self.stepper.launch(environments)
         draws = self.generator.random((len(environments), self.early.shape[1]))
         self.early[environments] = draws < self.config.early_returns
@@ -199,7 +199,7 @@ class Training:
             _lower_batteries(*self.stepper.state, low, draws)
 
     def _collect(self, epsilon: float) -> None:
-        """Run one slot of all environments under the exploring policy and store it."""
+        """Run one slot of all environments with the exploring policy, and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
         states = compact_states(state, self.config.guard)
@@ -240,9 +240,9 @@ class Training:
     def _homeward(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> np.ndarray:
-        """(R, 5) mask of the actions of UAVs that return early, so as to arrive with C_S left.
+        """The (R, 5) mask of the actions of UAVs that return early, to arrive with C_S left.
 
-        The actions lead nearer to the zone; in the zone a latched UAV hovers.
+        The actions lead nearer to the zone; in the zone, a latched UAV hovers.
         """
         rows, layout = states.uavs[missions, uavs], self.layout
         cells = rows[:, [X, Y]].astype(np.int64)
@@ -258,7 +258,7 @@ class Training:
         """Simulate the selection missions; keep the weights with the best moving average."""
         config, network = self.config, self.learner.evaluated
         records = self._selection_missions()
-        settled = len(self.scores) == config.window  # before that the latest weights are kept
+        settled = len(self.scores) == config.window  # before that, the latest weights are selected
         self.scores = [*self.scores, float(records[SELECT_BY].mean())][-config.window :]
         average = float(np.mean(self.scores))
         is_best = not settled or self.best_score is None or average > self.best_score
@@ -324,10 +324,10 @@ def _weights(network: nn.Module) -> dict[str, torch.Tensor]:
 
 @kernel
 def _lower_batteries(missions, uavs, residual, environments, draws):
-    """Let new missions start in the zone as if after a flight: latched, on a low battery.
+    """Let new missions start as if the UAVs had just returned: with a low battery, and latched.
 
-    The battery is uniform from 5 % to C_S and the same for the whole team. The communications
-    are those of the slots flown, and a uniform share of the nodes is empty.
+    The battery is drawn uniformly from 5 % to C_S and is the same for the whole team. The number of
+    communications fits the battery that was used, and a random share of the nodes is empty.
     """
     for n in range(len(environments)):
         mission, data = missions[environments[n]], residual[environments[n]]
