@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis import numbers
+from analysis.execution.reuse import sources
 from analysis.execution.runner import CHUNK, check_workers
 from analysis.results.chunks import check_parts, parts_of, split
-from analysis.results.reuse import sources
 from analysis.results.store import Store
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
+from analysis.execution.reuse import sources
 from analysis.execution.workers import Cluster, Here, Pool
 from analysis.results import commands
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
 from analysis.results.manifest import Cell, Selected
-from analysis.results.reuse import sources
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest

@@ -74,16 +74,17 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
         it is one of several that may be the best, ``WORSE`` if another one is significantly better,
         ``ONLY`` if there is no other one.
     """
-    verdicts = pd.Series(ONLY, index=means.index)
-    for metric, rows in means.groupby("metric", sort=False):
+    verdicts, policies = np.full(len(means), ONLY, object), means["policy"].to_numpy()
+    places = means.groupby(["metric", "point"], sort=False).indices
+    for metric in means["metric"].unique():
         wide = results.missions.pivot(
             index=["point", "replication"], columns="policy", values=metric
         )
-        for point, here in rows.groupby("point"):
+        for point, rows in wide.groupby(level="point"):
+            here = places.get((metric, point), [])
             if len(here) > 1:
-                values = wide.loc[point, here["policy"]].to_numpy(float)
-                may_be = may_be_best(values, metric in SHARES)
-                verdicts[here.index] = np.where(may_be, TIED if may_be.sum() > 1 else BEST, WORSE)
+                values = rows.to_numpy(float)[:, wide.columns.get_indexer(policies[here])]
+                verdicts[here] = _verdicts(values, metric in SHARES)
     return means.assign(verdict=verdicts)
 
 
@@ -237,6 +238,12 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     baseline = best_policy(results.missions, heuristics)
     table = compare_learners(results.missions, trained, baseline, [*METRICS])
     return for_choice(table, len(heuristics))
+
+
+def _verdicts(values: np.ndarray, share: bool) -> np.ndarray:
+    """The verdicts on K > 1 policies by their (R, K) values in the same replications."""
+    may_be = may_be_best(values, share) if len(values) > 1 else np.ones(values.shape[1], bool)
+    return np.where(may_be, TIED if may_be.sum() > 1 else BEST, WORSE)
 
 
 def _same_missions(results: Results) -> bool:
