@@ -21,7 +21,7 @@ PRIVATE = {
     r"as of ``": "as for, the result of",
     r"alike": "equal, the same",
 }
-PATTERNS = {re.compile(rf"\b{word}(?!\w)", re.I): term for word, term in PRIVATE.items()}
+PATTERNS = {re.compile(rf"\b{word}(\b|(?<=`))", re.I): term for word, term in PRIVATE.items()}
 # From Python 3.12 on, the text of an f-string is a token of its own.
 TEXT = (tokenize.COMMENT, tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", -1))
 

@@ -34,7 +34,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     and a vertical line marks the beginning of the last phase.
 
     Args:
-        curves: Curves, as of ``analysis.questions.learning.curves``.
+        curves: Curves, see ``analysis.questions.learning.curves``.
         metric: One of ``NAMES``.
         labels: The variants to draw, with their names in the legend.
     """

@@ -177,8 +177,8 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
     """Comparisons as a table to print: marked differences and p-values, a row per policy.
 
     Args:
-        comparisons: A row per policy and metric, as of ``stats.paired.compare``, or per learner
-            and metric, as of ``stats.learners.compare_learners``: these have the prediction
+        comparisons: A row per policy and metric, as in ``stats.paired.compare``, or per learner
+            and metric, as in ``stats.learners.compare_learners``: these have the prediction
             interval of one new training as well.
         name: The column that tells the rows apart.
     """

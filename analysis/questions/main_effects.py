@@ -158,7 +158,7 @@ def significantly_lower(pairs: pd.DataFrame, values: Mapping[int, str], value: s
     """Whether another value of a parameter is significantly better than a value.
 
     Args:
-        pairs: As of ``changes``.
+        pairs: The result of ``changes``.
         values: The values in words, by their positions.
         value: The value in words; one that the study lacks is lower than none.
     """

@@ -50,8 +50,8 @@ def against_main_effects(
 
     Args:
         results: The study that selects.
-        effects: Of another study, as of ``main_effects.effects``.
-        changes: Of that study, as of ``main_effects.changes_by_field``.
+        effects: The result of ``main_effects.effects`` for another study.
+        changes: The result of ``main_effects.changes_by_field`` for that study.
 
     Returns:
         A list in Markdown, an item per policy and field; empty if there is no such value.

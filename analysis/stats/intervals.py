@@ -41,7 +41,7 @@ def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
 
 
 def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
-    """Mean of values from 0 to 1 with its interval, as of ``stats.bounded.bounded_ends``.
+    """Mean of values from 0 to 1 with its interval, see ``stats.bounded.bounded_ends``.
 
     Raises:
         ValueError: If there are no values.
@@ -158,7 +158,7 @@ def summary(
 
 
 def column_intervals(values: pd.DataFrame, metric: str = "", level: float = LEVEL) -> pd.DataFrame:
-    """Means of columns with their intervals, as of ``interval_of``, for many columns at once.
+    """Means of columns with their intervals (``interval_of``), for many columns at once.
 
     Args:
         values: (R, K) a row per replication, a column per group; nan where a group lacks one.

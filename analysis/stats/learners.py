@@ -130,7 +130,7 @@ def compare_learners(
         ``about`` says what ``low``, ``high`` and ``p`` are about: the expected difference over all
         trainings of ``the learner``, or ``this checkpoint``, the only one there is. ``new_low`` and
         ``new_high`` bound the difference of one new training. Shares have the intervals and the
-        p-value with one gain and one loss added, as of ``paired``.
+        p-value with one gain and one loss added, as in ``paired``.
 
     Raises:
         InputError: As for ``compare``, and if a learner has no checkpoint, or one twice.

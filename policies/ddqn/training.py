@@ -171,7 +171,7 @@ class Training:
             setattr(self, name, progress[name])
 
     def _enter_phase(self, index: int) -> None:
-        """Begin a phase with new missions, an empty replay memory and a new optimizer, no scores."""
+        """Begin a phase with new missions, an empty replay memory and a new optimizer."""
         self.phase_index, self.phase_start = index, self.tick
         config = self.config
         cost = 1 if self.phase.battery else 0

@@ -116,7 +116,7 @@ def render_study(
     Raises:
         InputError: If the folder holds no complete results, a parameter is unknown or refused, or
             ``out`` cannot be written. Nothing is written then.
-        ReportError: If the notebook fails, as of ``render``.
+        ReportError: If the notebook fails, as in ``render``.
     """
     folder, out, values = Path(folder), Path(out), parameters or {}
     report = report_of(folder, values)

@@ -47,7 +47,7 @@ def several_trainings(policies: Iterable[Trained]) -> list[list[Trained]]:
 
 
 def curves_of(trainings: Iterable[Trained], variant: str) -> pd.DataFrame:
-    """The curves of trainings as those of one variant, as of ``learning.curves``."""
+    """The curves of trainings as those of one variant, as in ``learning.curves``."""
     return pd.concat(t.curve.assign(variant=variant, seed=t.config.seed) for t in trainings)
 
 
