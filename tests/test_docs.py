@@ -57,7 +57,7 @@ def command_lines(program: str) -> list[list[str]]:
 def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
     """The subcommand that arguments name, and those that are left for it."""
     command: Any = typer.main.get_command(cli.app)
-    while hasattr(command, "commands") and arguments != ["--version"]:
+    while hasattr(command, "commands"):
         if not arguments and command.invoke_without_command:  # such as dess policies
             break
         assert arguments, "no subcommand"
@@ -120,6 +120,9 @@ def test_the_readme_opens_with_the_two_commands() -> None:
 @pytest.mark.usefixtures("outside")
 @pytest.mark.parametrize("arguments", command_lines("dess"), ids=" ".join)
 def test_commands_are_accepted(arguments: list[str]) -> None:
+    if arguments == ["--version"]:
+        assert cli.main(arguments) == 0
+        return
     command, rest = leaf(arguments)
     given = command.make_context(command.name, list(rest)).params
     trained = {a[a.index("--out") + 1] for a in command_lines("dess") if a[0] == "train"}
