@@ -26,7 +26,8 @@ from reports.cli import ranges, settings
 from reports.tools import learning_curves
 
 ROOT = Path(__file__).parents[1]
-PATHS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")
+PATHS = [*(ROOT / name for name in TOP), *sorted((ROOT / "docs").rglob("*.md"))]
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text("utf-8") for path in PATHS}
 ALL = "\n".join(PAGES.values())
 README, OWN_POLICY = PAGES["README.md"], PAGES["docs/how-to/own-policy.md"]
