@@ -25,6 +25,7 @@ from analysis.stats.intervals import LEVEL, Interval
 from analysis.stats.paired import paired
 from dess import InputError
 
+_ENDS = ["difference", "low", "high"]
 LEVELS, RISES, FALLS = "stays level", "rises", "falls"
 PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and down"
 
@@ -219,9 +220,7 @@ def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFra
             values = rows.loc[(policy, field)]
             first, last = values.iloc[0], values.iloc[-1]
             change, of_ratio = (
-                of.set_index(["first", "second"]).loc[
-                    0, len(values) - 1, ["difference", "low", "high"]
-                ]
+                of.set_index(["first", "second"]).loc[(0, len(values) - 1), _ENDS]
                 for of in (pairs, ratios[field][policy])
             )
             along = shape(pairs)

@@ -7,8 +7,16 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from analysis.names import METRICS
 from analysis.stats.bootstrap import bootstrap_interval, expanded_level
-from analysis.stats.intervals import LEVEL, Interval, check_columns, check_share, groups
+from analysis.stats.intervals import (
+    LEVEL,
+    Interval,
+    bounded_interval,
+    check_columns,
+    check_share,
+    groups,
+)
 from dess import InputError
 
 # Views of ``distribution``: the quantiles, and the share of missions that counts as the worst.
@@ -32,8 +40,9 @@ def distribution(
 
     The mean of the worst missions is the conditional value at risk. Its BCa bootstrap interval is
     expanded for the size of the tail. It is reliable with about 30 missions or more in the tail
-    (600 missions for the worst 5 %), and too narrow with fewer. The quantiles have the intervals of
-    ``quantile_interval``, whose ends may be infinite.
+    (600 missions for the worst 5 %), and too narrow with fewer. Where all resamples agree, a metric
+    from 0 to 1 has the interval of a bounded mean of as many values as the tail has. The quantiles
+    have the intervals of ``quantile_interval``, whose ends may be infinite.
 
     Args:
         missions: A row per mission, with the metric and the fields of ``by``.
@@ -70,6 +79,9 @@ def distribution(
         views = [("quantile", q, quantile_interval(values, q, level)) for q in quantiles]
         expanded = expanded_level(level, tail * len(values))
         risk = bootstrap_interval(values, worst_mean, generator, expanded, resamples=resamples)
+        if metric in METRICS and risk.low == risk.high:
+            tail_values = np.full(max(int(tail * len(values)), 1), risk.mean)
+            risk = bounded_interval(tail_values, level)
         views.append(("worst mean", tail, risk))
         rows += [(*group, metric, view, q, *ends, len(part)) for view, q, ends in views]
     columns = [*by, "metric", "view", "share", "value", "low", "high", "n"]

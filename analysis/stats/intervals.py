@@ -149,8 +149,9 @@ def summary(
         ``mean``, ``low``, ``high`` and ``n``, the number of missions. The intervals are those of
         ``interval_of``.
     """
+    strata = "point" in missions and "point" not in by
     rows = [
-        (*group, metric, *_interval(part, metric, level), len(part))
+        (*group, metric, *_interval(part, metric, level, strata), len(part))
         for group, part in groups(missions, by)
         for metric in (*SHARES, *MEANS)
     ]
@@ -202,9 +203,9 @@ def groups(missions: pd.DataFrame, by: Sequence[str]) -> Iterator[tuple[tuple, p
     yield from missions.groupby(list(by), sort=False, dropna=False) if by else [((), missions)]
 
 
-def _interval(missions: pd.DataFrame, metric: str, level: float) -> Interval:
+def _interval(missions: pd.DataFrame, metric: str, level: float, strata: bool) -> Interval:
     """The mean of a group: over its missions, or over the points that these are at."""
-    if "point" in missions and missions["point"].nunique() > 1:
+    if strata and missions["point"].nunique() > 1:
         wide = missions.pivot(index="replication", columns="point", values=metric)
         if (wide.count() > 1).all():
             return stratified(wide.to_numpy(float), metric, level)

@@ -16,7 +16,9 @@ def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
     Args:
         values: (n,) a metric of missions; those after the last complete block are left out.
         size: Number of missions in a block.
-        share: Whether the metric is 0 or 1 and has Wilson's interval, or Student's t otherwise.
+        share: Whether the metric is 0 or 1 and has Wilson's interval, or Student's t otherwise:
+            both have a coverage of independent missions that is known in closed form. Tables print
+            wider intervals of the other metrics, as of ``stats.intervals.interval_of``.
 
     Returns:
         A row per block: ``mean``, ``low``, ``high``, ``reference`` (the mean of all missions) and

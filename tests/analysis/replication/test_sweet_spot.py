@@ -48,21 +48,22 @@ def test_a_selected_value_that_is_lower_by_its_main_effect_is_explained(results:
     choice = results.choice("greedy")
     assert choice is not None
     best = results.store.manifest.points[choice.best].values
-    assert best["uavs"] == 3
-    assert sweet_spot.against_main_effects(results, *one_by_one(("1", "3"), 1.0)) == ""
-    text = sweet_spot.against_main_effects(results, *one_by_one(("1", "3"), -1.0))
+    chosen, other = best["uavs"], 4 - best["uavs"]  # of 1 and 3
+    values = str(other), str(chosen)
+    assert sweet_spot.against_main_effects(results, *one_by_one(values, 1.0)) == ""
+    text = sweet_spot.against_main_effects(results, *one_by_one(values, -1.0))
     assert text.startswith(
-        "- **greedy, number of UAVs**: by the main effect, 3 is lower than 1 by "
+        f"- **greedy, number of UAVs**: by the main effect, {chosen} is lower than {other} by "
         "+20.0 [+10.0, +30.0] points"
     )
     points = [point.values for point in results.store.manifest.points]
-    there = [choice.best, points.index({**best, "uavs": 1})]
+    there = [choice.best, points.index({**best, "uavs": other})]
     missions = results.missions.query("policy == 'greedy'")
     both = missions.pivot(index="replication", columns="point", values=PRODUCT)[there].dropna()
     gap = numbers.difference((both[there[0]] - both[there[1]]).mean(), 0)
-    assert f"3 minus 1 is {gap} [" in text and f"(n = {len(both)} missions" in text
-    other = sweet_spot.against_main_effects(results, *one_by_one(("2", "3"), -1.0))
-    assert "has no setting with 2 and" in other
+    assert f"{chosen} minus {other} is {gap} [" in text and f"(n = {len(both)} missions" in text
+    text = sweet_spot.against_main_effects(results, *one_by_one(("2", str(chosen)), -1.0))
+    assert "has no setting with 2 and" in text
 
 
 def test_every_selection_says_what_is_known_of_it(results: Results) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from analysis.stats.bootstrap import bootstrap_interval
 from analysis.stats.distribution import distribution, quantile_interval, tail_mean
+from analysis.stats.intervals import bounded_interval
 from dess import InputError
 
 
@@ -96,3 +97,11 @@ def test_the_interval_of_the_worst_is_wider_than_that_of_its_bootstrap():
 def test_what_is_no_distribution_is_refused_in_a_line(arguments, line):
     with pytest.raises(InputError, match=line):
         spread(**arguments)
+
+
+def test_the_worst_mean_of_missions_that_all_fail_has_an_interval():
+    missions = pd.DataFrame({"policy": "tour", "collection_ratio": np.zeros(600)})
+    worst = spread(missions, "collection_ratio").iloc[-1]
+    expected = bounded_interval(np.zeros(30))
+    assert (worst["value"], worst["low"], worst["high"]) == expected
+    assert expected.high > 0
