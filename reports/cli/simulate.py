@@ -105,8 +105,8 @@ def simulate(
         asked = _Asked(space, policy or "greedy", seed, replication or 0, scenario)
     team = load_team(asked.policy, asked.space.uavs[1] if of else None)
     check_seed(asked.seed, asked.replication)
-    _check_suffix("--figure", figure, FIGURES, "picture")
-    _check_suffix("--animation", animation, ANIMATIONS, "animation")
+    _check_suffix("--figure", figure, FIGURES, "a picture")
+    _check_suffix("--animation", animation, ANIMATIONS, "an animation")
     if animation and animation.suffix == ".mp4":
         from reports.player.animation import check_ffmpeg
 
@@ -197,7 +197,7 @@ def _refuse_given(context: typer.Context, *names: str) -> None:
 
 def _check_suffix(option: str, path: Path | None, allowed: Sequence[str], kind: str) -> None:
     if path and path.suffix not in allowed:
-        raise InputError(f"{option}: {path} is not a {kind}; allowed: {', '.join(allowed)}")
+        raise InputError(f"{option}: {path} is not {kind}; allowed: {', '.join(allowed)}")
 
 
 @dataclass(frozen=True)
