@@ -118,6 +118,10 @@ def test_the_readme_opens_with_the_two_commands() -> None:
     assert blocks(README, "sh")[:2] == [f"{set_up} reports\n", f"{set_up} tests\n"]
 
 
+def test_the_readme_fits_two_screens() -> None:
+    assert len(README.splitlines()) <= 90
+
+
 @pytest.mark.usefixtures("outside")
 @pytest.mark.parametrize("arguments", command_lines("dess"), ids=" ".join)
 def test_commands_are_accepted(arguments: list[str]) -> None:
