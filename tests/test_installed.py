@@ -56,7 +56,8 @@ def test_a_plain_wheel_simulates_in_an_empty_environment(tmp_path: Path) -> None
     assert "success" in run(dess, "simulate", "--events", "log.parquet", folder=tmp_path)
     assert "greedy" in run(dess, "evaluate", "--policy", "greedy", folder=tmp_path)
     refused = [dess, "simulate", "--policy", "ddqn"]
-    done = subprocess.run(refused, cwd=tmp_path, capture_output=True, text=True)
+    variables = environment(tmp_path)
+    done = subprocess.run(refused, cwd=tmp_path, env=variables, capture_output=True, text=True)
     assert done.returncode == 2
     assert done.stderr.endswith("pip install 'dess[learning]'\n")
 
