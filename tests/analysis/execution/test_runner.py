@@ -105,7 +105,7 @@ def test_dask_leaves_the_same_bytes(tmp_path):
 
 def test_dask_is_an_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install dess\[distributed\]"):
+    with pytest.raises(InputError, match=r"pip install 'dess\[distributed\]'"):
         run_study(small_study(tmp_path), tmp_path / "out", scheduler="tcp://localhost:8786")
     assert not (tmp_path / "out").exists()
 
