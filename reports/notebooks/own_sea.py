@@ -38,8 +38,7 @@ from reports.pages import html
 # %% [markdown]
 # ## The sea
 #
-# A sea is described by a TOML file. The coordinates of its sensor nodes are in a second file in the
-# same folder:
+# A sea is a TOML file; a second file in the same folder has the coordinates of its sensor nodes:
 #
 # ```toml
 # nodes = "bay.csv"
