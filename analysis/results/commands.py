@@ -46,5 +46,6 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         fields = origin.space(values).model_dump(mode="json")
         changes = {key: value for key, value in fields.items() if value != paper[key]}
     settings = [word for k, v in changes.items() for word in ("--set", f"{k}={json.dumps(v)}")]
-    which = ["--policy", policy, "--seed", str(origin.seed), "--replication", str(replication)]
+    acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
+    which = ["--policy", acting, "--seed", str(origin.seed), "--replication", str(replication)]
     return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
