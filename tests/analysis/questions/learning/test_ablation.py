@@ -78,8 +78,8 @@ def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
     assert rows.loc["base"].tolist() == base
     assert rows.loc["once", "One new training"] == ""
     assert rows.loc["once", "Collection ratio and communication"] == "73.0 %"
-    assert rows.loc["worse", "To base [points]"].startswith("−61.0 [")
-    assert [cell[-1:] for cell in rows["To base [points]"]] == ["≈", "", "▼"]
+    assert rows.loc["worse", "Difference from base [points]"].startswith("−61.0 [")
+    assert [cell[-1:] for cell in rows["Difference from base [points]"]] == ["≈", "", "▼"]
     assert rows.loc["worse", "p (Holm)"] == "< 0.001"
 
 
