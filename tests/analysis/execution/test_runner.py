@@ -287,7 +287,8 @@ def test_an_interrupt_in_compiled_code_is_an_interrupt(tmp_path, monkeypatch):
         run_study(small_study(tmp_path), tmp_path / "out")
     assert not [*(tmp_path / "out" / "failures").iterdir()]
     assert (
-        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")]) == 1
+        cli.main(["study", "run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "b")])
+        == 130
     )
 
 
