@@ -18,7 +18,7 @@ def blocks(values: np.ndarray, size: int, share: bool) -> pd.DataFrame:
         size: Number of missions in a block.
         share: Whether the metric is 0 or 1 and has Wilson's interval, or Student's t otherwise:
             both have a coverage of independent missions that is known in closed form. Tables print
-            wider intervals of the other metrics, as of ``stats.intervals.interval_of``.
+            wider intervals of the other metrics, as for ``stats.intervals.interval_of``.
 
     Returns:
         A row per block: ``mean``, ``low``, ``high``, ``reference`` (the mean of all missions) and

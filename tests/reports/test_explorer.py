@@ -15,6 +15,7 @@ from analysis.results.tables import Results
 from dess import InputError
 from reports.explorer import Grid, explorer
 from tests.analysis.small import grid, small_study
+from tests.by_hand import bounded
 from tests.reports.browser import Visit
 
 DESIGN = {"uavs": [1, 2, 3], "charge_complete": [40, 60], "initial_data": [[1, 2], 5]}
@@ -55,7 +56,7 @@ def estimate(results: Results, places: tuple[int, ...], policy: str, metric: str
     if metric == SUCCESS:
         ends = stats.binomtest(int(sample.sum()), MISSIONS).proportion_ci(0.95, "wilson")
     else:
-        ends = stats.ttest_1samp(sample, 0).confidence_interval(0.95)
+        _, *ends = bounded(sample.to_numpy(float))
     return [100 * sample.mean(), 100 * ends[0], 100 * ends[1]]
 
 

@@ -53,7 +53,7 @@ def test_fig_3_shows_every_training(table, panel):
 
 
 def test_fig_3_has_a_band_where_the_trainings_are_enough(table, panel):
-    rows = curves.bands(curves.smoothed(table, METRIC))
+    rows = curves.bands(curves.smoothed(table, METRIC), share=True)
     bands = [a for a in panel.collections if (a.get_gid() or "").startswith("band")]
     known = rows.dropna().groupby(["variant", "phase"], sort=False)
     assert len(bands) == len(known) == 2  # both phases of the variant with three trainings

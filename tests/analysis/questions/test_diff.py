@@ -136,7 +136,9 @@ def test_the_most_changed_missions_come_first_with_their_commands(results):
     rows = most_changed(found, 3)
     named = [(r.policy_a, r.point_a, r.replication) for r in rows.itertuples()]
     assert named == [("greedy", 1, 7), ("random", 1, 0), ("greedy", 0, 3)]
-    assert rows["command_a"].tolist() == [results.command(*mission) for mission in named]
+    again = "dess simulate --of {} --point {} --policy {} --replication {}"
+    folder = results.store.folder
+    assert rows["command_a"].tolist() == [again.format(folder, p, n, r) for n, p, r in named]
     assert rows["command_b"].tolist() == rows["command_a"].tolist()
     assert found.changed.iloc[3][["fields", "replication"]].tolist() == ["reward", 8]
 

@@ -199,8 +199,8 @@ def test_missions_without_point_and_seed_are_paired_by_replication():
         ),
         (
             lambda: compared(STUDY[[*STUDY.columns[:7]]], metrics=["speed"]),
-            "speed: no such column; allowed: policy, point, quota, seed, replication, uavs, "
-            "collection_ratio",
+            "speed: no such column (did you mean seed?); allowed: policy, point, quota, seed, "
+            "replication, uavs, collection_ratio",
         ),
         (
             lambda: compared(STUDY.assign(collection_ratio=[np.nan] * 3 + [1.0] * 93)),

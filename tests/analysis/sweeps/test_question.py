@@ -173,9 +173,9 @@ REFUSED = {
     "'gredy' is unknown": {"policies": ["gredy"]},
     "greedy is listed twice": {"policies": ["greedy", "greedy"]},
     "policies: Tuple should have at least 1": {"policies": []},
-    "missions: Input should be greater than or equal to 1": {"missions": 0},
+    "missions: 0 is out of range; allowed: an integer 1..": {"missions": 0},
     "name: String should match": {"name": "../mine"},
-    "costs.uav: Input should be greater than or equal to 0, not -1": {"prices": {"uav": -1}},
+    "costs.uav: -1 is out of range; allowed: a number from 0": {"prices": {"uav": -1}},
     "prices: 'uaf' is unknown; allowed: currency, uav": {"prices": {"uaf": 1}},
     "requirements: need prices": {"requirements": {"success": 0.9}},
     "requirements: 'speed' is unknown; allowed: success": {

@@ -68,8 +68,8 @@ def test_what_is_not_allowed_is_never_chosen(
     space: ScenarioSpace, guarded: bool, seed: int, replication: int
 ) -> None:
     layout = layout_of(space)
-    policies = [_checked(_random(layout, guarded, weights)) for weights in (1, 2)]
-    record = simulate(space, policies, seed, replication)
+    team = [_checked(_random(layout, guarded, weights)) for weights in (1, 2)][: space.uavs[1]]
+    record = simulate(space, team, seed, replication)
     event(f"charged {(record.uavs['slots_charging'] > 0).any()}")
 
 

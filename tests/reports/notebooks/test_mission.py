@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import t
 
 from analysis import load_results
+from tests.by_hand import bounded
 from tests.reports.small import run_small_studies, said_by
 
 RATIO, PRODUCT = "collection_ratio", "collection_ratio_and_communication"
@@ -28,8 +27,7 @@ def test_missions_and_their_means(results: Path, text: str) -> None:
     for point, printed in enumerate(("63.4 %", "89.4 %", "93.8 %")):
         at_point = missions[missions["point"] == point]
         values = at_point[RATIO].to_numpy(float)
-        half = t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
-        low, mean, high = 100 * (values.mean() + half * np.array([-1, 0, 1]))
+        mean, low, high = (100 * end for end in bounded(values))
         assert f"is {mean:.1f} % [{low:.1f}, {high:.1f}], the paper's {printed}." in text
         (mission,) = at_point[at_point["replication"] == 0].itertuples()
         total = mission.initial + mission.arrived

@@ -3,15 +3,14 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import t
 
 from analysis import load_results, load_study, run_study
 from analysis.replication.claims import FIG_5
 from analysis.replication.scorecard import scorecard
 from analysis.replication.verdict_rules import NO_RESULTS
+from tests.by_hand import bounded
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
 PRODUCT = "collection_ratio_and_communication"
@@ -50,8 +49,7 @@ def test_the_sweet_spot_is_checked_by_missions_of_its_own(results: Path, text: s
     checks = load_results(results / "sweet-spot").checks
     for policy in POLICIES:
         values = checks.loc[checks["policy"] == policy, PRODUCT].to_numpy(float)
-        half = t.ppf(0.975, len(values) - 1) * values.std(ddof=1) / np.sqrt(len(values))
-        low, mean, high = values.mean() + half * np.array([-1, 0, 1])
+        mean, low, high = bounded(values)
         mark = "▲" if low > PRINTED else "▼" if high < PRINTED else "≈"
         shown = f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}] {mark}"
         assert shown.replace("-", "−") in text

@@ -5,11 +5,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import t
 
+from tests.by_hand import Z, bounded
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
-Z = 1.959963984540054  # of the normal distribution, for 95 %
 # Table IV of the paper.
 PRINTED = {
     "success": 0.901,
@@ -29,14 +28,13 @@ def text(results: Path) -> str:
 
 
 def by_hand(values: np.ndarray, is_share: bool) -> tuple[float, float, float]:
-    """Mean with Wilson's interval of a share, or Student's."""
+    """Mean with Wilson's interval of a share, or the interval of bounded values."""
     n, mean = len(values), values.mean()
     if is_share:
         centre, scale = mean + Z**2 / (2 * n), 1 + Z**2 / n
         half = Z * np.sqrt(mean * (1 - mean) / n + Z**2 / (4 * n**2))
         return mean, (centre - half) / scale, (centre + half) / scale
-    half = t.ppf(0.975, n - 1) * values.std(ddof=1) / np.sqrt(n)
-    return mean, mean - half, mean + half
+    return bounded(values)
 
 
 def in_percent(mean: float, low: float, high: float) -> str:

@@ -46,19 +46,25 @@ def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"settings": {"uav": 5}}, r"scenario paper: uav: unknown key; allowed: .*uavs"),
+        (
+            {"settings": {"uav": 5}},
+            r"scenario paper: uav: unknown key .did you mean uavs",
+        ),
         ({"settings": {"uavs": 99}}, r"uavs: 99 is not within 1\.\.16"),
         ({"baseline": {"quota": 0}}, r"scenario paper: quota: .*0"),
         ({"settings": {}}, r"settings: none is given; allowed: .*uavs"),
         ({"settings": {"uavs": [1, 3]}}, r"uavs is 1 to 3 in the baseline already; allowed: an"),
         ({"settings": {"uavs": 2}, "baseline": {"uavs": 2}}, r"uavs is 2 in the baseline already"),
         ({"settings": {"pads": 16}}, r"pads is 16 in the baseline already"),
-        ({"policies": ["gredy"]}, r"question: policies: .*'gredy' is unknown; allowed: .*greedy"),
+        (
+            {"policies": ["gredy"]},
+            r"question: policies: .*'gredy' is unknown .did you mean greedy",
+        ),
         ({"policies": []}, r"question: policies: .*at least 1"),
         ({"missions": 1}, r"missions: 1 is too few; allowed: 2 or more"),
         ({"missions": "many"}, r"question: missions: .*'many'"),
         ({"seed": -1}, r"question: seed: .*-1"),
-        ({"scenario": "papr"}, r"papr: no such scenario; allowed: .*paper"),
+        ({"scenario": "papr"}, r"papr: no such scenario .did you mean paper.*bay, "),
     ],
 )
 def test_what_is_no_question_is_refused_in_one_line(values, message):

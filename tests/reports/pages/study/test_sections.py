@@ -91,7 +91,7 @@ def test_the_page_says_what_the_study_can_answer(name, tmp_path):
         assert part in text, part
     for part in unsaid:
         assert part not in text, part
-    assert "dess simulate --scenario paper" in text  # the worst missions
+    assert "dess simulate --of results/trial " in text  # the worst missions
 
 
 def test_tags_of_the_notebook_are_those_that_have_a_meaning():
