@@ -46,7 +46,7 @@ def effect(
         for policy, shift in zip(changes, style.shifts(len(changes), half_width), strict=True):
             _changes(changes[policy], shift, style.dot(policy, colours), axes[3])
         axes[3].set(
-            title=f"Paired difference of the last metric from its value at {values[0]}",
+            title=f"Paired difference from the value at {values[0]}",
             ylabel="points",
         )
         axes[3].yaxis.set_major_formatter(FuncFormatter(style.signed_points))

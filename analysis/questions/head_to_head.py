@@ -178,8 +178,8 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
 
     Args:
         comparisons: A row per policy and metric, as in ``stats.paired.compare``, or per learner
-            and metric, as in ``stats.learners.compare_learners``: these have the prediction
-            interval of one new training as well.
+            and metric, as in ``stats.learners.compare_learners``: the product of these has the
+            prediction interval of one new training as well.
         name: The column that tells the rows apart.
     """
     lines: list[dict[tuple[str, str], str]] = []
@@ -189,7 +189,7 @@ def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
             side = position_by_test(row.difference, row.p_adjusted)
             points = numbers.points(row.difference, row.low, row.high)
             line[METRICS[row.metric], "points"] = f"{points} {MARKS[side]}"
-            if "new_low" in rows:
+            if row.metric == PRODUCT and "new_low" in rows:
                 line[METRICS[row.metric], "one new training"] = new_training(row)
             line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
         lines.append(line)

@@ -235,7 +235,6 @@ def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFra
                     "Last − first": numbers.points(*change),
                     "Of the ratio alone": numbers.points(*of_ratio),
                     "Highest at": " or ".join(peaks),
-                    "Largest difference": f"{100 * pairs['difference'].abs().max():.1f}",
                 }
             )
     return pd.DataFrame(lines)

@@ -68,9 +68,9 @@ display(
 # %% [markdown]
 # For a learner with several trainings, the confidence interval is about the expected difference:
 # the mean over all trainings that the learner might have. *One new training* is the 95 % prediction
-# interval for one more training. For a learner with a single training, the result is only about
-# this checkpoint. The rest of this page is about one policy, which is the first of several
-# trainings.
+# interval of the product for one more training. For a learner with a single training, the result is
+# only about this checkpoint. The rest of this page is about one policy, which is the first of
+# several trainings.
 
 # %% [markdown]
 # ### Mission by mission

@@ -140,7 +140,6 @@ def test_the_table_has_a_row_per_parameter_and_policy():
         "+30.0 [+29.9, +30.1]",
         "+20.0 [+19.9, +20.1]",
         "",
-        "30.0",
     ]
     assert table.loc["mine", "Highest at"] == "2"
     assert table.loc["mine", "Last − first"] == "0.0 [−0.1, +0.1]"
