@@ -1,0 +1,124 @@
+"""Results folders as somebody would make them who wants to harm their reader.
+
+The files are valid: parquet files have the hashes in their names, and the cells have their keys. So
+a command that reads such a folder gets as far as with sound results, and shows the strings.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from analysis.results import parquet
+from analysis.results.chunks import Chunk, Part, check_parts, parts_of
+from analysis.results.manifest import Manifest
+from analysis.results.rows import rows_of
+from analysis.results.store import FOLDERS, Store
+
+LONGEST = 120  # bytes of a file's name that are made of the text
+
+
+def hostile_folder(sound: Path, into: Path, text: str) -> Path:
+    """Copy a small complete results folder, with a text in its strings and in names of files.
+
+    The text enters every string that is free: the names of policies, of their members, weights and
+    learners, the description, the scenario and the currency of the study. All other strings, such
+    as hashes and versions, have a form that reading checks: ``with_text`` puts the text there. The
+    names of the policies end in their numbers, since they have to differ.
+
+    Args:
+        sound: The results folder; it is not changed.
+        into: The folder to write, which must not exist.
+        text: The text. Reading refuses it if it has characters that cannot be printed.
+
+    Returns:
+        The folder ``into``.
+    """
+    source = Store.read(sound)
+    # Nothing is validated, so that texts that reading refuses reach the folder as well.
+    manifest = source.manifest.model_copy(update=_changed(source.manifest, text))
+    for name in ("cells", "scenarios", "values", "costs", "selection", "settings"):
+        manifest.__dict__.pop(name, None)  # cached properties of the original
+    into.mkdir(parents=True)
+    store = Store(into, manifest)
+    for name in FOLDERS:
+        (into / name).mkdir()
+    for team, cells in enumerate(manifest.cells):
+        for parts in (parts_of(source.manifest, team), check_parts(source.manifest, team)):
+            if parts:
+                _copy(source, store, parts, [cells[part.cell.point] for part in parts])
+    for cell, replication in source.logged:
+        log = source.load_log(cell, replication)
+        assert log is not None
+        columns = dict(zip(log.column_names, log.columns, strict=True))
+        store.write_log(manifest.cells[cell.team][cell.point], replication, columns)
+    (into / "manifest.json").write_text(manifest.text, "utf-8")
+    _add_files(into, text)
+    return into
+
+
+def with_text(document: Any, text: str) -> list[Any]:
+    """Copies of a JSON document, each with the text in place of one of its strings.
+
+    The keys of objects count as strings, except where they are names of fields.
+    """
+    copies = []
+    for path in _strings(document):
+        copy = json.loads(json.dumps(document))
+        *above, last = path
+        place = copy
+        for key in above:
+            place = place[key]
+        place[last] = text
+        copies.append(copy)
+    return copies
+
+
+def _changed(manifest: Manifest, text: str) -> dict[str, Any]:
+    """The fields of the manifest that contain free strings."""
+    names = {team.policy: f"{text}{n}" for n, team in enumerate(manifest.policies)}
+    teams = []
+    for team in manifest.policies:
+        strings = {"name": text, "weights": text, "learner": text}
+        members = [member.model_copy(update=strings) for member in team.members]
+        teams.append(team.model_copy(update={"policy": names[team.policy], "members": members}))
+    study = manifest.study | {
+        "policies": [names[name] for name in manifest.study["policies"]],
+        "description": text,
+        "scenario": text.replace("/", "\u2215"),  # the name of a file
+    }
+    if study["costs"]:
+        study["costs"] = study["costs"] | {"currency": text[:16]}
+    return {"policies": teams, "study": study}
+
+
+def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
+    """Copy missions as one file under the keys of other cells."""
+    chunk = Chunk(
+        parts[0].cell.team,
+        tuple(Part(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
+    )
+    held = [tables for (team, _), tables in source._tables.items() if team == chunk.team]
+    rows = [rows_of(parts, kind) for kind in zip(*held, strict=True)]
+    store._keep(chunk, parquet.tables_with(chunk, *rows))
+
+
+def _add_files(folder: Path, text: str) -> None:
+    """Files and folders with the text in their names, among those that belong to the results."""
+    safe = text.replace("/", "\u2215").replace("\0", "\u2400")
+    name = safe.encode("utf-8", "surrogateescape")[:LONGEST].decode("utf-8", "ignore")
+    for parent in (folder, *(folder / kind for kind in FOLDERS)):
+        (parent / f"{name}.json").write_text(json.dumps(text))
+        (parent / f"policy={name}").mkdir(exist_ok=True)
+        (parent / f"policy={name}" / f"{name}.parquet").write_bytes(b"PAR1")
+
+
+def _strings(document: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The paths of all strings in a JSON document."""
+    if isinstance(document, str):
+        return [path]
+    items: Any = ()
+    if isinstance(document, dict):
+        items = document.items()
+    elif isinstance(document, list):
+        items = enumerate(document)
+    return [found for key, value in items for found in _strings(value, (*path, key))]
