@@ -93,7 +93,7 @@ def load(name: str | Path) -> Policy:
         return policy
     if file := FILE.fullmatch(name):
         path, kind = Path(file["path"]), file["kind"]
-        if not path.is_file():
+        if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
         return _made(kind, str(path), lambda: _class_of(_importable(path), kind))
     outside = _outside()
@@ -101,6 +101,24 @@ def load(name: str | Path) -> Policy:
         _check_untrained(Path(name))
         raise InputError(f"policy: {name!r} is unknown{one_of(name, names(), _OTHERS)}")
     return _made(name, outside[name].value, outside[name].load)
+
+
+def runs_code(team: str) -> bool:
+    """Whether ``load_team`` would run code for a team that is not part of dess.
+
+    Such code is a class of a Python file or a policy of another package. Nothing is imported to
+    find out. A user may name code on the command line; a name that was read from data, such as a
+    results folder that somebody has sent, must not be loaded if this is true.
+
+    Args:
+        team: ``"P"`` or ``"P,P,..."``, as ``load_team`` takes it.
+    """
+    others = {name.strip() for name in team.split(",")} - SHIPPED.keys()
+    outside = _outside() if others else {}
+    return any(
+        not folder_of(name) and (FILE.fullmatch(name) is not None or name in outside)
+        for name in others
+    )
 
 
 def folder_of(name: str) -> Path | None:

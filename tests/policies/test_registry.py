@@ -260,3 +260,23 @@ def test_what_a_policy_is_and_can_simulate(file: Path) -> None:
 @pytest.mark.usefixtures("outside")
 def test_the_package_of_a_policy_is_named() -> None:
     assert about("still").origin == "the package outside-policies 1"
+
+
+@pytest.mark.usefixtures("outside")
+def test_what_would_run_code_is_known_without_running_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "trap.py").write_text("raise SystemExit('this code ran')")
+    for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X", "still"):
+        assert registry.runs_code(team), team
+    _trained(tmp_path / "data.py:Trap")  # a folder, whatever its name: it holds only data
+    for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
+        assert not registry.runs_code(team), team
+    assert not {"trap", "outside_policies"} & sys.modules.keys()
+
+
+@pytest.mark.parametrize("name", ["x" * 5000 + ".py:X", "a\0b.py:X", "\udcff.py:X", "a\0b"])
+def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
+    with pytest.raises(InputError):
+        policies.load(name)
