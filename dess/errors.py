@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from reprlib import Repr
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -19,9 +20,47 @@ _WRONG_FORM = ("tuple_type", "missing", "too_long")
 
 _WORDS = {int: "an integer", float: "a number", bool: "a truth value", str: "text in quotes"}
 
+# A longer value is cut where a message quotes it, and a longer name where others are compared.
+_QUOTED = 60
+_REPR = Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = _QUOTED
+_REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = _QUOTED // 3
+
 
 class InputError(ValueError):
     """Bad input: one line that says where, what, and what is allowed."""
+
+
+def shown(value: object) -> str:
+    """A value of the input as a message quotes it: in Python's notation, printable and short."""
+    try:
+        text = printable(_REPR.repr(value))
+    except (ValueError, RecursionError):  # an integer of thousands of digits
+        text = "..."
+    return cut(text, _QUOTED)
+
+
+def printable(text: str) -> str:
+    """The text in one line, with escapes for all characters that could change the display.
+
+    These are control characters, such as those that move the cursor of a terminal, characters that
+    change the direction of text, and everything else that has no picture.
+    """
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else _escape(ord(c)) for c in text)
+
+
+def _escape(number: int) -> str:
+    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
+
+
+def cut(text: str, length: int) -> str:
+    """The text, without its middle if it is longer than ``length``."""
+    if len(text) <= length:
+        return text
+    end = (length - 5) // 2
+    return f"{text[: length - 5 - end]} ... {text[-end:]}"
 
 
 def one_of(name: object, names: Iterable[str], also: str = "") -> str:
@@ -37,7 +76,8 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     """
     known = list(dict.fromkeys(names))
     lower = {other.lower(): other for other in reversed(known)}
-    close = [lower[match] for match in get_close_matches(str(name).lower(), lower, cutoff=0.7)]
+    asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
+    close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
     meant = f" (did you mean {' or '.join(close)}?)" if close else ""
     allowed = ", ".join(known)
     if close and len(known) > _FEW:
@@ -65,17 +105,17 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
         return f"{place}: unknown key{one_of(loc[-1], fields)}"
     message = first["msg"].removeprefix("Value error, ")
     if kind == "value_error" or field is None:
-        return f"{place}: {message}" + (f", not {value!r}" if kind != "value_error" else "")
+        return f"{place}: {message}" + (f", not {shown(value)}" if kind != "value_error" else "")
     if kind == "missing" and is_whole:
         return f"{place}: is missing; allowed: {field.description}"
     if kind == "literal_error" and is_whole:
-        return f"{place}: {value!r} is unknown{one_of(value, _choices(field))}"
+        return f"{place}: {shown(value)} is unknown{one_of(value, _choices(field))}"
     problems = {kind: "is out of range" for kind in _OUT_OF_RANGE if is_whole}
     problems |= {kind: f"is not {kind_of(field)}" for kind in _OTHER_TYPE if is_whole}
     problems |= {kind: "has the wrong form" for kind in _WRONG_FORM}
     if kind in problems:
-        return f"{place}: {value!r} {problems[kind]}; allowed: {form_of(field)}"
-    return f"{place}: {message}, not {value!r}"
+        return f"{place}: {shown(value)} {problems[kind]}; allowed: {form_of(field)}"
+    return f"{place}: {message}, not {shown(value)}"
 
 
 def form_of(field: "FieldInfo") -> str:

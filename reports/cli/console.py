@@ -5,6 +5,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+from dess.errors import cut, printable
+
+MESSAGE = 300  # the longest line that says why a command fails
 INTERRUPTED = 130  # the exit code after Ctrl-C, as shells and typer have it: 128 + SIGINT
 
 
@@ -13,14 +16,22 @@ class Interruption(Exception):  # noqa: N818 - nothing went wrong
 
 
 def fail(message: str, code: int) -> int:
-    """Print one line on stderr that says why the command fails, and return the exit code."""
-    print(" ".join(message.split()), file=sys.stderr)
+    """Print one line on stderr that says why the command fails, and return the exit code.
+
+    The line has no control characters, and of a long one the beginning and the end.
+    """
+    print(cut(printable(" ".join(message.split())), MESSAGE), file=sys.stderr)
     return code
+
+
+def say(text: str) -> None:
+    """Print text on stdout, line by line, with escapes for control characters."""
+    print("\n".join(map(printable, text.expandtabs().split("\n"))))
 
 
 def print_list(entries: Iterable[tuple[str, str]]) -> None:
     """Print names with their descriptions, one per line."""
-    lines = [*entries]
+    lines = [(printable(name), printable(description)) for name, description in entries]
     width = max((len(name) for name, _ in lines), default=0)
     for name, description in lines:
         print(f"{name:{width}}  {description}".rstrip())
@@ -28,7 +39,7 @@ def print_list(entries: Iterable[tuple[str, str]]) -> None:
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
     """Print a table; its first columns are aligned to the left, the others to the right."""
-    lines = [header, *rows]
+    lines = [[*map(printable, line)] for line in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     aligns = [str.ljust if number < left else str.rjust for number in range(len(header))]
     aligned = [
