@@ -11,7 +11,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
 from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -71,6 +71,9 @@ def descriptions() -> dict[str, str]:
 
 def load(name: str | Path) -> Policy:
     """Load a policy by its name, from the folder of a trained policy, or from a Python file.
+
+    A name that was read from data, such as results or a study, is checked before
+    (``check_no_files``), because the policy of a Python file is code that runs.
 
     Args:
         name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``.
@@ -199,6 +202,32 @@ def load_team(text: str, uavs: int | None = None) -> list[Policy]:
         InputError: If one of them is unknown.
     """
     return [load(name.strip()) for name in text.split(",")[:uavs]]
+
+
+def files_of(team: str) -> list[str]:
+    """Those policies of a team that are classes of Python files, which loading them would run."""
+    return [name for name in map(str.strip, team.split(",")) if FILE.fullmatch(name)]
+
+
+def check_no_files(teams: Iterable[str], where: object, named: Collection[str] = ()) -> None:
+    """Refuse teams with policies of Python files, if it was not the user who named them.
+
+    Results, pages and studies may come from anybody, and must not decide which code is run.
+
+    Args:
+        teams: Teams that data name.
+        where: The file, page or folder with the data, for the message.
+        named: Teams that the user has named.
+
+    Raises:
+        InputError: If there is such a policy.
+    """
+    known = {file for team in named for file in files_of(team)}
+    for file in (file for team in teams for file in files_of(team) if file not in known):
+        raise InputError(
+            f"{where}: names policy {file!r}, a Python file, which is run only if you name "
+            "it; allowed: --policy FILE.py:CLASS, if you trust the file"
+        )
 
 
 def _outside_description(point: EntryPoint) -> str:

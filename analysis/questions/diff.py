@@ -162,7 +162,7 @@ def origins(found: Diff) -> list[str]:
 def at_hand(results: Results) -> str:
     """In words: whether the code, weights and libraries of this process made the results."""
     try:
-        changes = results.store.manifest.changes_here
+        changes = results.store.manifest.changes_here()
     except InputError as error:
         changes = [str(error)]
     return "; ".join(changes) or "made by the code, weights and libraries that are here"

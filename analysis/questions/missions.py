@@ -23,6 +23,7 @@ from analysis.results.tables import Results
 from analysis.stats.intervals import summary
 from dess import InputError
 from dess.scenario import SAMPLED, Scenario
+from policies.registry import check_no_files
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
@@ -106,7 +107,7 @@ def keep_logs(
     """Simulate missions again whose event logs are not in ``FOLDER``, and store the logs there.
 
     If the new record of a mission differs from the stored one, because other code simulated it, no
-    log is stored.
+    log is stored. Nor is one of a policy of a Python file, which may be anybody's code.
 
     Args:
         results: The study.
@@ -137,8 +138,9 @@ def kept_missions(
 
 def _keep_log(results: Results, policy: str, replication: int, folder: str | Path) -> None:
     try:
+        check_no_files([policy], results.store.folder)
         events = resimulate(results, policy, 0, replication).events
-    except InputError:  # the record is another one
+    except InputError:  # the record is another one, or the policy is a Python file
         return
     table = pa.table({name: events[name] for name in events})
     parquet.write(Path(folder, FOLDER), _name(results, policy, replication), table)

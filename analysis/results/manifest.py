@@ -1,6 +1,7 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
+from collections.abc import Collection
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path, PurePath
@@ -27,6 +28,7 @@ from analysis.study.stopping import Precision
 from analysis.study.study import CHECK, Study
 from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
+from policies.registry import files_of
 
 SCHEMA_VERSION = 3
 
@@ -107,23 +109,33 @@ class Origin(Document):
         """
         return ScenarioSpace.of(**self.scenario | values)
 
-    @property
-    def changes_here(self) -> list[str]:
+    def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.
+
+        Args:
+            named: The teams that the user has named. Policies of other Python files are not loaded,
+                so they are not compared.
 
         Raises:
             InputError: If a policy cannot be loaded.
         """
-        changes = []
+        known = {file for team in named for file in files_of(team)}
+        closed = [t for t in self.policies if not known.issuperset(files_of(t.policy))]
+        teams = [team for team in self.policies if team not in closed]
+        here, changes = code_behind(team.policy for team in teams), []
+        code = {name: code for name, code in self.code.items() if name in here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
-        elif modules := differing(self.code, code_behind(team.policy for team in self.policies)):
+        elif modules := differing(code, here):
             changes.append(f"made by other code of {', '.join(modules)}")
-        if weights := [t.policy for t in self.policies if t.weights != team_of(t.policy).weights]:
+        if weights := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
+        if closed:
+            files = ", ".join(team.policy for team in closed)
+            changes.append(f"made by a Python file that was not read, of policy {files}")
         versions = library_versions()
-        known = self.libraries  # torch may be absent, here or where the results were made
-        if others := [n for n in versions if n in known and known[n] != versions[n]]:
+        made = self.libraries  # torch may be absent, here or where the results were made
+        if others := [n for n in versions if n in made and made[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
 

@@ -24,6 +24,7 @@ from dess.files import Shipped
 from dess.scenario import Integer, ScenarioSpace, load_scenario, scenario_names
 from dess.streams import MAX_SEED
 from policies import load_team
+from policies.registry import check_no_files
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
 
@@ -229,7 +230,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
             than ``logged``, ``logged`` is reduced to it.
 
     Raises:
-        InputError: If there is no such study, or it is not valid.
+        InputError: If there is no such study, or it is not valid; or if the file, not ``policies``
+            among the overrides, names a policy of a Python file, which is code.
     """
     text = str(name_or_path)
     where, values = _STUDIES.load(name_or_path)
@@ -237,6 +239,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     scenario = values.get("scenario")
     if isinstance(scenario, str) and scenario not in scenario_names():
         values["scenario"] = str(Path(text).parent / scenario)
+    if isinstance(teams := values.get("policies"), list) and "policies" not in overrides:
+        check_no_files([team for team in teams if isinstance(team, str)], where)
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         raise InputError(

@@ -102,6 +102,14 @@ def verify(
         int | None,
         typer.Option(min=0, help="Seed of the random sample.  [default: a random number]"),
     ] = None,
+    policy: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="FILE.py:CLASS",
+            help="A policy of a Python file that the results name: they cannot start it themselves, "
+            "since anybody may have made them; repeatable.",
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check a page or results: simulate a random sample of the missions again, and compare."""
@@ -112,7 +120,7 @@ def verify(
     seed = secrets.randbelow(2**32) if seed is None else seed
     check = verify_results if path.is_dir() else verify_page
     with console.compile_notice():
-        verdicts = check(path, missions, seed)
+        verdicts = check(path, missions, seed, policy or [])
     if as_json:
         checks = [asdict(verdict) for verdict in verdicts]
         print(json.dumps({"seed": seed, "checks": checks}, indent=2))

@@ -159,13 +159,15 @@ def _of_study(
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
     from analysis.results.manifest import Manifest
     from analysis.results.store import MANIFEST
+    from policies.registry import check_no_files
 
     manifest = Manifest.read(folder / MANIFEST)
-    policies = [team.policy for team in manifest.policies]
+    policies, named = [team.policy for team in manifest.policies], [policy] if policy else []
     policy = _chosen("policy", policy, policies, ", ".join(policies))
+    check_no_files([policy], folder, named)
     points = range(len(manifest.points))
     point = _chosen("point", point, points, f"0..{len(points) - 1}")
-    if changes := manifest.changes_here:
+    if changes := manifest.changes_here(named):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
         print(line, file=sys.stderr)
     if replication is None:

@@ -7,6 +7,7 @@ missions again still shows the difference.
 """
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -21,6 +22,7 @@ from analysis.results.store import MANIFEST, Store
 from analysis.results.tables import results_of
 from dess import InputError, simulate
 from policies import load_team
+from policies.registry import check_no_files
 from reports.pages.html import FILES, STUDY, embedded
 
 # The place in a page that contains the checksum of the rest of the page.
@@ -56,13 +58,14 @@ def is_sealed(html: str) -> bool:
     return _SEAL.search(html) is not None and sealed(html) == html
 
 
-def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
+def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = ()) -> list[Check]:
     """Check a page: its checksum, the learned policies, and missions of its studies.
 
     Args:
         path: The page.
         missions: The largest number of missions to simulate again, for every study on the page.
         seed: Seed of the random choice of these missions.
+        named: Policies of Python files that the user has named, so that they may be run.
 
     Raises:
         InputError: If the file is not a page of dess, or a policy cannot be loaded.
@@ -77,11 +80,13 @@ def verify_page(path: Path, missions: int, seed: int) -> list[Check]:
     files = [_check_files(text, path) for text in embedded(FILES, html)]
     studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
     notes = [] if studies else ["contains no missions to simulate again"]
-    records = [check_records(evidence, missions, seed) for evidence in studies]
+    records = [check_records(evidence, missions, seed, named) for evidence in studies]
     return [Check("page", 1, altered, notes), *files, *records]
 
 
-def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
+def verify_results(
+    folder: Path, missions: int, seed: int, named: Collection[str] = ()
+) -> list[Check]:
     """Check results: the bytes of all files, and the records and event logs of random missions.
 
     If there are several results folders, one that cannot be read counts as differing, and an
@@ -91,6 +96,7 @@ def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
         folder: A results folder, or a folder with results folders.
         missions: The largest number of missions to simulate again, for every study.
         seed: Seed of the random choice of these missions.
+        named: Policies of Python files that the user has named, so that they may be run.
 
     Raises:
         InputError: If there are no results, they are incomplete, or a policy cannot be loaded.
@@ -99,12 +105,12 @@ def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
     if not folders:
         raise InputError(f"{folder}: contains no results and is not a page; {_ALLOWED}")
     if folders == [folder]:
-        return _check_study(Store.read(folder), missions, seed)
+        return _check_study(Store.read(folder), missions, seed, named)
     checks = []
     for path in folders:
         try:
             if (store := Store.read(path)).manifest.complete:
-                checks += _check_study(store, missions, seed)
+                checks += _check_study(store, missions, seed, named)
             else:
                 checks.append(Check(str(path), 0, notes=["incomplete, so not checked"]))
         except InputError as error:
@@ -112,25 +118,32 @@ def verify_results(folder: Path, missions: int, seed: int) -> list[Check]:
     return checks
 
 
-def _check_study(store: Store, missions: int, seed: int) -> list[Check]:
+def _check_study(store: Store, missions: int, seed: int, named: Collection[str]) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: has been changed since it was written" for path in store.damaged]
         return [Check(store.manifest.study["name"], 0, lines)]
-    records = check_records(Evidence.of(results_of(store), missions, seed), missions, seed)
+    evidence = Evidence.of(results_of(store), missions, seed)
+    records = check_records(evidence, missions, seed, named)
     return [records, _check_logs(store, missions, seed)] if store.logged else [records]
 
 
-def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
+def check_records(
+    evidence: Evidence, missions: int, seed: int, named: Collection[str] = ()
+) -> Check:
     """Simulate a random part of the sample again, with the SimPy engine, and compare the records.
 
     Args:
         evidence: The evidence of the study.
         missions: The largest number of missions.
         seed: Seed of the random choice.
+        named: Policies of Python files that the user has named, so that they may be run.
 
     Raises:
-        InputError: If a policy does not exist, or a scenario is not valid.
+        InputError: If a policy does not exist or is a file that is not named, or a scenario is not
+            valid.
     """
+    study = evidence.study["name"]
+    check_no_files((team.policy for team in evidence.policies), f"study {study}", named)
     lines, numbers = [], chosen(len(evidence.sample), missions, seed)
     for mission in (evidence.sample[number] for number in numbers):
         policy, values, replication = mission.policy, mission.values, mission.replication
@@ -140,7 +153,7 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
         if changed := difference(record, mission.record):
             command = commands.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
-    return Check(evidence.study["name"], len(numbers), lines, evidence.changes_here)
+    return Check(study, len(numbers), lines, evidence.changes_here(named))
 
 
 def _check_logs(store: Store, missions: int, seed: int) -> Check:
