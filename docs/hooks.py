@@ -22,7 +22,7 @@ from typer.cli import get_docs_for_click
 
 import dess
 from analysis.names import fields
-from reports import cli
+from reports.cli.commands import app
 
 ROOT = Path(__file__).parents[1]
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)")
@@ -34,7 +34,7 @@ PART = re.compile(r"^\[\[ (\w+)(?: (\w+))? \]\]$", re.M)
 
 def commands() -> str:
     """The help of every command."""
-    command = typer.main.get_command(cli.app)
+    command = typer.main.get_command(app)
     return get_docs_for_click(obj=command, ctx=typer.Context(command), name="dess", indent=1)
 
 

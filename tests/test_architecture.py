@@ -21,7 +21,10 @@ ROOMS = {
         *("names", "numbers", "stats", "study", "results", "execution", "questions"),
         *("replication", "verification", "figures", "sweeps"),
     ),
-    "reports": ("player", "tools", "pages", "explorer", "widgets", "crate", "cli", "__main__"),
+    "reports": (
+        *("player", "tools", "pages", "explorer", "widgets", "crate", "interrupts", "cli"),
+        "__main__",
+    ),
 }
 # What a floor must not import, besides the floors above it.
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}

@@ -22,7 +22,7 @@ from analysis.replication import paper
 from dess import load_scenario
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli
-from reports.cli import ranges, settings
+from reports.cli import commands, ranges, settings
 from reports.tools import learning_curves
 
 ROOT = Path(__file__).parents[1]
@@ -57,7 +57,7 @@ def command_lines(program: str) -> list[list[str]]:
 
 def leaf(arguments: list[str]) -> tuple[Any, list[str]]:
     """The subcommand that arguments name, and those that are left for it."""
-    command: Any = typer.main.get_command(cli.app)
+    command: Any = typer.main.get_command(commands.app)
     while hasattr(command, "commands"):
         if not arguments and command.invoke_without_command:  # such as dess policies
             break

@@ -6,47 +6,8 @@ imports the simulator, pandas or torch when it runs.
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated
 
-import typer
-from typer.exceptions import TyperException
-
-import dess
-from dess import InputError
-from dess.code.libraries import absence
-from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
-
-
-def _print_version(is_wanted: bool) -> None:
-    if is_wanted:
-        print(f"dess {dess.__version__}")
-        raise typer.Exit
-
-
-app = typer.Typer(
-    help="Discrete-event simulation of UAV data harvesting with charging at sea.",
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-
-
-@app.callback()
-def options(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
-        ),
-    ] = False,
-) -> None:
-    """Options of the command itself."""
-
-
-for group in (simulate, evaluate, train, sweep, report):
-    app.add_typer(group.app)
-for name in ("policies", "scenarios", "studies"):
-    app.add_typer(getattr(lists, name), name=name)
-app.add_typer(study.app, name="study")
+from reports.interrupts import Interrupts
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,27 +19,47 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else.
     """
-    try:
-        code = app(arguments, prog_name="dess", standalone_mode=False)
-    except TyperException as error:
+    words = sys.argv[1:] if arguments is None else [*arguments]
+    with Interrupts(is_last=arguments is None) as interrupts:
+        try:  # the imports take a while, in which a signal may come
+            from reports.cli.commands import app
+            from reports.cli.console import INTERRUPTED
+
+            code = app(words, prog_name="dess", standalone_mode=False) or 0
+            if code != INTERRUPTED:  # as typer ends a command after a Ctrl-C
+                return code
+            raise KeyboardInterrupt
+        except BaseException as error:
+            return _failed(error, words, interrupts.received)
+
+
+def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:
+    """Print the line for an error that ended a command, and return the exit code.
+
+    Args:
+        error: The error; one that has no line is raised again.
+        words: The arguments of the command.
+        is_interrupted: Whether there was a signal; a library may have made another error of it.
+    """
+    from typer.exceptions import TyperException
+
+    from dess import InputError
+    from dess.code.libraries import absence
+    from reports.cli import console
+
+    if isinstance(error, console.Interruption):
+        return console.fail(str(error), console.INTERRUPTED)
+    if is_interrupted or isinstance(error, KeyboardInterrupt):
+        line = "interrupted: run the same command again to complete it"
+        return console.fail(line, console.INTERRUPTED)
+    if isinstance(error, TyperException):
         context = getattr(error, "ctx", None)
         hint = f" (see {context.command_path} --help)" if context else ""
         return console.fail(f"dess: error: {error.format_message()}{hint}", error.exit_code)
-    except InputError as error:
+    if isinstance(error, InputError):
         return console.fail(f"dess: error: {error}", 2)
-    except console.Interruption as interruption:
-        return console.fail(str(interruption), console.INTERRUPTED)
-    except ModuleNotFoundError as error:
-        command = [*(sys.argv[1:] if arguments is None else arguments)][:1]
-        absent = absence(error, " ".join(["dess", *command]))
-        if absent is None:
-            raise
-        return console.fail(f"dess: error: {absent}", 2)
-    except SystemError as error:
-        from analysis.execution.jobs import was_interrupted
-
-        if not was_interrupted(error):
-            raise
-        code = console.INTERRUPTED
-    # Typer returns the same number for a Ctrl-C that no command has caught.
-    return console.fail("interrupted", code) if code == console.INTERRUPTED else code or 0
+    if isinstance(error, ModuleNotFoundError):
+        absent = absence(error, " ".join(["dess", *words[:1]]))
+        if absent is not None:
+            return console.fail(f"dess: error: {absent}", 2)
+    raise error

@@ -155,5 +155,6 @@ def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
     monkeypatch.setattr("dess.mission.simulate", fail)
     (tmp_path / "log.parquet").write_text("old")
     before = files_of(tmp_path)
-    assert dess("simulate", "--events", "log.parquet") == (130, "", "interrupted\n")
+    line = "interrupted: run the same command again to complete it\n"
+    assert dess("simulate", "--events", "log.parquet") == (130, "", line)
     assert files_of(tmp_path) == before

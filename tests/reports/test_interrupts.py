@@ -1,0 +1,117 @@
+"""SIGTERM and SIGHUP end a command as Ctrl-C does, whatever it is doing."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from reports import cli
+from reports.interrupts import Interrupts
+from tests.analysis.small import environment, files_of, small_study
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
+
+LINE = "interrupted: run the same command again to complete it\n"
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+
+
+@pytest.fixture(autouse=True)
+def heeded():
+    """The signals are not ignored, as they are in some jobs of a shell."""
+    handlers = [signal.signal(number, signal.default_int_handler) for number in SIGNALS]
+    yield
+    for number, handler in zip(SIGNALS, handlers, strict=True):
+        signal.signal(number, handler)
+
+
+def during(work, monkeypatch, capsys):
+    """The exit code, the output and the errors of a command while something else is done."""
+    monkeypatch.setattr("dess.mission.simulate", lambda *_, **__: work())
+    return cli.main(["simulate"]), *capsys.readouterr()
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_ends_a_command_with_one_line(number, monkeypatch, capsys):
+    before = [signal.getsignal(each) for each in SIGNALS], sys.unraisablehook
+    signalled = during(lambda: signal.raise_signal(number), monkeypatch, capsys)
+    assert signalled == (130, "", LINE)
+    assert ([signal.getsignal(each) for each in SIGNALS], sys.unraisablehook) == before
+
+
+def test_what_a_library_makes_of_a_signal_is_an_interruption(monkeypatch, capsys):
+    def replaced():
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise SystemError("returned a result with an exception set") from None
+
+    assert during(replaced, monkeypatch, capsys) == (130, "", LINE)
+
+
+def test_a_second_signal_does_not_disturb_the_cleanup(monkeypatch, capsys):
+    cleaned = []
+
+    def twice():
+        try:
+            signal.raise_signal(signal.SIGHUP)
+        finally:
+            signal.raise_signal(signal.SIGTERM)
+            cleaned.append(True)
+
+    assert during(twice, monkeypatch, capsys) == (130, "", LINE)
+    assert cleaned == [True]
+
+
+def test_a_signal_in_a_finalizer_is_not_lost(monkeypatch, capsys):
+    class Finalized:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+
+    def finalize():
+        Finalized()
+        threading.Event().wait(60)
+
+    begin = time.monotonic()
+    assert during(finalize, monkeypatch, capsys) == (130, "", LINE)
+    assert time.monotonic() - begin < 30
+
+
+def test_a_signal_that_was_ignored_stays_ignored(monkeypatch, capsys):
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    with Interrupts() as interrupts:
+        signal.raise_signal(signal.SIGHUP)
+    assert not interrupts.received
+    assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+
+
+def test_a_command_in_another_thread_has_no_handlers(monkeypatch, capsys):
+    codes = []
+    thread = threading.Thread(target=lambda: codes.append(cli.main(["--version"])))
+    thread.start()
+    thread.join()
+    assert codes == [0]
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_a_signal_during_the_imports_ends_the_command(number, tmp_path):
+    small_study(tmp_path)
+    before = files_of(tmp_path)
+    script = (
+        "import importlib.abc, os, sys\n"
+        "class Signal(importlib.abc.MetaPathFinder):\n"
+        "    def find_spec(self, name, path, target=None):\n"
+        f"        if name == 'typer': os.kill(os.getpid(), {int(number)})\n"
+        "from reports.cli import main\n"
+        "sys.meta_path.insert(0, Signal())\n"
+        "sys.exit(main())\n"
+    )
+    command = [sys.executable, "-c", script, "study", "run", "trial.toml", "--out", "out"]
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", LINE)
+    assert files_of(tmp_path) == before
