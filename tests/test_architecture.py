@@ -22,8 +22,8 @@ ROOMS = {
         *("replication", "verification", "figures", "sweeps"),
     ),
     "reports": (
-        *("player", "tools", "pages", "explorer", "widgets", "crate", "interrupts", "cli"),
-        "__main__",
+        *("folders", "player", "tools", "pages", "explorer", "widgets", "crate"),
+        *("interrupts", "cli", "__main__"),
     ),
 }
 # What a floor must not import, besides the floors above it.

@@ -4,6 +4,7 @@
 imports the simulator, pandas or torch when it runs.
 """
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -19,6 +20,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else.
     """
+    # Workers and kernels import nothing from the working directory, which may be a results folder.
+    os.environ["PYTHONSAFEPATH"] = "1"
     words = sys.argv[1:] if arguments is None else [*arguments]
     with Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come

@@ -1,7 +1,9 @@
 """Run notebooks in Jupyter kernels, two at a time.
 
 A kernel imports the same modules as this process, computes in one thread and writes nothing into
-the user's home folder. A kernel that dies before its first cell is started a second time.
+the user's home folder. It works in a new folder of its own, so it never imports or reads a file
+that merely lies beside results, such as ``pandas.py`` or ``matplotlibrc``. A kernel that dies
+before its first cell is started a second time.
 """
 
 import atexit
@@ -10,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import gettempdir
 from threading import Lock
 from typing import Any
 
@@ -23,20 +25,23 @@ from nbconvert.filters import strip_ansi
 from nbformat import NotebookNode
 
 from dess import InputError
+from reports.folders import temporary_folder
 from reports.pages.notebook import Report
 
 # Called after every cell, with the number of cells run so far and of all cells, and the report.
 Progress = Callable[[int, int, str], None]
 
 AT_ONCE = 2
+HOME = "dess-kernel-"  # beginning of the names of the kernels' folders
+PACKAGES = Path(__file__).parents[2]  # the folder from which this package was imported
 LONGEST_SOCKET_PATH = 90  # characters; systems allow about 100
 
 
 class Kernels:
-    """Runs reports in the folder that contains their results."""
+    """Runs reports, each in a kernel of its own."""
 
-    def __init__(self, results: Path, progress: Progress | None = None):
-        self.results, self.progress = results, progress
+    def __init__(self, progress: Progress | None = None):
+        self.progress = progress
         self._clients: list[NotebookClient] = []
         self._lock, self._stopped = Lock(), False
 
@@ -72,11 +77,10 @@ class Kernels:
         """Run a report; start a second kernel if the first one dies before the first cell."""
         for is_last in (False, True):
             try:
-                with TemporaryDirectory() as home:
-                    folder = self.results if "results" in report.parameters else Path(home)
-                    client = self._client(report, reports, folder, Path(home))
+                with temporary_folder(Path(gettempdir()), HOME) as home:
+                    client = self._client(report, reports, home)
                     self._clients.append(client)
-                    _run(client, _environment(Path(home)))
+                    _run(client, _environment(home))
                 return
             except CellExecutionError as error:
                 if error.ename == InputError.__name__:
@@ -89,9 +93,7 @@ class Kernels:
                     report.failure = f"{_cell(report)}: {error}"
                     return
 
-    def _client(
-        self, report: Report, reports: Sequence[Report], folder: Path, home: Path
-    ) -> NotebookClient:
+    def _client(self, report: Report, reports: Sequence[Report], home: Path) -> NotebookClient:
         """A client that runs a report in a folder and stores its progress in the report."""
 
         def begin(cell: NotebookNode, **_: Any) -> None:
@@ -107,7 +109,7 @@ class Kernels:
         return NotebookClient(
             report.notebook,
             km=_manager(home),
-            resources={"metadata": {"path": str(folder)}},
+            resources={"metadata": {"path": str(home)}},
             on_cell_execute=begin,
             on_cell_complete=count,
             timeout=None,
@@ -144,13 +146,17 @@ def _manager(home: Path) -> AsyncKernelManager:
 
 
 def _environment(home: Path) -> dict[str, str]:
-    """The environment of a kernel that writes to ``home`` only."""
+    """The environment of a kernel that writes to ``home`` only.
+
+    An empty entry of the path means the working directory of this process, where anything may lie.
+    """
     folders = ("IPYTHONDIR", "JUPYTER_CONFIG_DIR", "JUPYTER_RUNTIME_DIR")
-    path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
+    path = [*(os.path.abspath(entry) for entry in sys.path if entry), str(PACKAGES)]
     return {
         **os.environ,
         **dict.fromkeys(folders, str(home)),
-        "PYTHONPATH": path,
+        "PYTHONPATH": os.pathsep.join(path),
+        "PYTHONSAFEPATH": "1",  # do not put the working directory in front of it
         "OMP_NUM_THREADS": "1",
         "TQDM_DISABLE": "1",  # a page shows no progress bar
         "MPLBACKEND": "agg",

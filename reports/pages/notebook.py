@@ -89,8 +89,9 @@ class Report:
 
     @property
     def code(self) -> list[str]:
-        """The code of every cell; absolute paths are shortened to their last part."""
+        """The code of every cell; absolute paths are shortened, since they are of this machine."""
         names = {name: with_paths(v, os.path.basename) for name, v in self.parameters.items()}
+        names |= {"results": "."}
         changed = _parameters_cell(self.notebook)
         return [with_values(c.source, names) if c is changed else c.source for c in self.cells]
 

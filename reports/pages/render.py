@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 
@@ -26,6 +25,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.store import MANIFEST
 from dess import InputError
 from dess.files import writable
+from reports.folders import locked, temporary_folder
 from reports.pages import missions
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
@@ -91,7 +91,7 @@ def render(
     left_out = {report.title: [*lacking[report.name]] for report in reports if lacking[report.name]}
     reports = [report for report in reports if not lacking[report.name]]
     for report in reports:
-        report.set({"results": ".", **values})
+        report.set({"results": str(results.absolute()), **values})
     _write(reports, results, out, progress, values, notebooks, left_out)
     return out / INDEX
 
@@ -121,7 +121,7 @@ def render_study(
     folder, out, values = Path(folder), Path(out), parameters or {}
     report = report_of(folder, values)
     check_parameters([report], values)
-    report.set({"results": ".", **values})
+    report.set({"results": str(folder.absolute()), **values})
     _write([report], folder, out, progress, values, SHIPPED)
     return out / report.page
 
@@ -137,19 +137,19 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     needed = [out] + [results for report in reports if "results" in report.parameters]
-    with _folders(needed), TemporaryDirectory(dir=out, prefix=".rendering-") as folder:
+    with _folders(needed), temporary_folder(out, ".rendering-") as folder:
         missions.make([report.name for report in reports], results, values, progress)
-        Kernels(results, progress).run(reports)
+        Kernels(progress).run(reports)
         files = {report.page: _page(report) for report in reports}
         complete = [report for report in reports if not report.failure]
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
         shown = [read(name, notebooks) for name in names_in(notebooks)]
-        files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
-        with writable(out):
+        with locked(out, "index"), writable(out):  # the index shows the pages of other processes
+            files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
             for name, text in files.items():
-                Path(folder, name).write_bytes(text.encode())
+                (folder / name).write_bytes(text.encode())
             for name in files:
-                os.replace(Path(folder, name), out / name)
+                os.replace(folder / name, out / name)
             for report in complete:
                 (out / f"{report.name}.partial.html").unlink(missing_ok=True)
     if failed := [report for report in reports if report.failure]:
@@ -231,6 +231,7 @@ def html_of(notebook: NotebookNode) -> str:
         exclude_input=True,
         exclude_output_prompt=True,
         exclude_anchor_links=True,
+        extra_template_basedirs=[],  # otherwise templates in the working directory come first
     )
     return with_indices(exporter.from_notebook_node(notebook)[0])
 

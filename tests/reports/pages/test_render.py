@@ -420,7 +420,7 @@ def test_a_kernel_that_dies_at_its_start_is_started_once_more(
 
     monkeypatch.setattr(kernels, "_run", die)
     report = read("mission", notebooks)
-    kernels.Kernels(results).run([report])
+    kernels.Kernels().run([report])
     assert len(clients) == runs
     assert bool(report.failure) == (deaths > 1)
     if report.failure:
