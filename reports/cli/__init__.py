@@ -25,11 +25,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if arguments is None else [*arguments]
     with Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come
+            from reports.cli import console
             from reports.cli.commands import app
-            from reports.cli.console import INTERRUPTED
 
+            console.prepare()
             code = app(words, prog_name="dess", standalone_mode=False) or 0
-            if code != INTERRUPTED:  # as typer ends a command after a Ctrl-C
+            sys.stdout.flush()  # an error of the output is an error of the command
+            if code != console.INTERRUPTED:  # as typer ends a command after a Ctrl-C
                 return code
             raise KeyboardInterrupt
         except BaseException as error:
@@ -65,4 +67,10 @@ def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) ->
         absent = absence(error, " ".join(["dess", *words[:1]]))
         if absent is not None:
             return console.fail(f"dess: error: {absent}", 2)
+    if isinstance(error, OSError | SystemExit):
+        return console.refused(error)
+    if isinstance(error, MemoryError):
+        return console.fail("dess: error: there is not enough memory", 1)
+    if isinstance(error, RecursionError):
+        return console.fail("dess: error: the input is nested too deeply", 1)
     raise error

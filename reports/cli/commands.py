@@ -5,12 +5,12 @@ from typing import Annotated
 import typer
 
 import dess
-from reports.cli import evaluate, lists, report, simulate, study, sweep, train
+from reports.cli import console, evaluate, lists, report, simulate, study, sweep, train
 
 
 def _print_version(is_wanted: bool) -> None:
     if is_wanted:
-        print(f"dess {dess.__version__}")
+        console.say(f"dess {dess.__version__}")
         raise typer.Exit
 
 

@@ -1,13 +1,17 @@
 """Output of the command line: results as tables on stdout, progress and errors on stderr."""
 
+import io
+import logging
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TextIO
 
 from dess.errors import cut, printable
 
 MESSAGE = 300  # the longest line that says why a command fails
+_STREAMS = {"stdout": "standard output", "stderr": "standard error"}
 INTERRUPTED = 130  # the exit code after Ctrl-C, as shells and typer have it: 128 + SIGINT
 
 
@@ -15,18 +19,70 @@ class Interruption(Exception):  # noqa: N818 - nothing went wrong
     """A command was stopped by Ctrl-C; the message says how to go on."""
 
 
+class _Line(logging.Formatter):
+    """A message of a log as one line of printable characters."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return _line(record.getMessage())
+
+
+def prepare() -> None:
+    """Let stdout and stderr take any text, even if they are closed, and logs print lines."""
+    for name in _STREAMS:
+        if getattr(sys, name) is None:  # closed, as by >&-
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - as long as the process
+        if isinstance(stream := getattr(sys, name), io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    if logging.lastResort:  # prints the warnings of all modules
+        logging.lastResort.setFormatter(_Line())
+
+
+def refused(error: OSError | SystemExit) -> int:
+    """Print what the system refused to a command, and return the exit code.
+
+    A broken pipe, for which typer raises ``SystemExit``, is no error to tell: the program that
+    reads the output, such as ``head``, has seen enough. A stream that cannot be written is given
+    up, since Python would try it again at the end.
+    """
+    broken = []
+    for name in _STREAMS:
+        try:
+            (stream := getattr(sys, name)).flush()
+        except OSError:
+            broken.append(_STREAMS[name])
+            _give_up(stream)
+    if isinstance(error, BrokenPipeError | SystemExit):
+        return 1
+    place = error.filename or " and ".join(broken)
+    reason = error.strerror or str(error)
+    return fail(f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}", 1)
+
+
 def fail(message: str, code: int) -> int:
     """Print one line on stderr that says why the command fails, and return the exit code.
 
     The line has no control characters, and of a long one the beginning and the end.
     """
-    print(cut(printable(" ".join(message.split())), MESSAGE), file=sys.stderr)
+    try:
+        print(_line(message), file=sys.stderr)
+    except OSError:  # nobody can be told
+        _give_up(sys.stderr)
     return code
 
 
-def say(text: str) -> None:
-    """Print text on stdout, line by line, with escapes for control characters."""
-    print("\n".join(map(printable, text.expandtabs().split("\n"))))
+def _give_up(stream: TextIO) -> None:
+    """Let nothing more be written to a stream that cannot be written, not even at the end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _line(message: str) -> str:
+    return cut(printable(" ".join(message.split())), MESSAGE)
+
+
+def say(text: object, stream: TextIO | None = None) -> None:
+    """Print text on stdout or another stream, with escapes for all control characters."""
+    lines = str(text).expandtabs().split("\n")
+    print("\n".join(map(printable, lines)), file=stream or sys.stdout, flush=True)
 
 
 def print_list(entries: Iterable[tuple[str, str]]) -> None:
@@ -70,7 +126,7 @@ def counted_bar(unit: str) -> Iterator[Callable[..., None]]:
 
         def show(done: int, total: int, name: str = "") -> None:
             progress.total = total
-            progress.set_description(name, refresh=False)
+            progress.set_description(printable(name), refresh=False)
             progress.update(done - progress.n)
 
         yield show

@@ -92,7 +92,7 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
         speed = row["uav_slots"] / row["seconds"]
-        print(
+        console.say(
             f" {row['missions']} missions, {row['uav_slots']} UAV-slots in "
             f"{row['seconds']:.2f} s: {speed:,.0f} UAV-slots/s"
         )

@@ -42,11 +42,13 @@ def show_policy(
         print(json.dumps(found._asdict(), indent=2))
         return
     any_place = "any scenario" if not found.requires else f"only {_settings(found.requires)}"
-    print(f"{found.name}: {found.origin} ({found.code})")
-    print(f"scenarios: {any_place}; of the shipped ones {', '.join(found.scenarios) or 'none'}")
+    console.say(f"{found.name}: {found.origin} ({found.code})")
+    console.say(
+        f"scenarios: {any_place}; of the shipped ones {', '.join(found.scenarios) or 'none'}"
+    )
     if found.trained_on:
-        print(f"trained on: {_settings(found.trained_on)}")
-    print(f"\n{found.card.strip()}")
+        console.say(f"trained on: {_settings(found.trained_on)}")
+    console.say(f"\n{found.card.strip()}")
 
 
 @scenarios.callback()
@@ -81,7 +83,7 @@ def show_scenario(
         print(json.dumps({"scenario": name, "description": description, "fields": rows}, indent=2))
         return
     if description:
-        print(description)
+        console.say(description)
     heads = ["field", "value", "default", "unit", "allowed", "meaning"]
     rows_ = [
         [f.name, _value(f.value), _value(f.default), f.unit, f.allowed, f.meaning]

@@ -72,9 +72,9 @@ def report(
     reports = [name for name in names or [] if name not in folders]
     with rendering() as progress:
         if reports or not folders:
-            print(render(reports, results, out, progress=progress, parameters=values))
+            console.say(render(reports, results, out, progress=progress, parameters=values))
         for folder in folders:
-            print(render_study(folder, out, progress=progress, parameters=values))
+            console.say(render_study(folder, out, progress=progress, parameters=values))
 
 
 @contextmanager
@@ -138,7 +138,7 @@ def _print_verdicts(path: Path, verdicts: "list[Check]") -> None:
     rows = [[v.what, str(v.compared), str(len(v.differing))] for v in verdicts]
     console.print_table([str(path), "compared", "differing"], rows)
     for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):
-        print(f"note: {note}")
+        console.say(f"note: {note}")
 
 
 @app.command()

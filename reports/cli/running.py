@@ -61,7 +61,7 @@ def _bar() -> "Iterator[tuple[Progress, Announce]]":
                 bar.set_description(f"round {started.number + 1}", refresh=False)
             else:
                 present = f", {started.present:,} of them present" if started.present else ""
-                print(f"{started.missions:,} missions{present}", file=sys.stderr)
+                console.say(f"{started.missions:,} missions{present}", sys.stderr)
             bar.total = started.missions
             bar.initial += started.present  # took no time
 

@@ -169,7 +169,7 @@ def _of_study(
     point = _chosen("point", point, points, f"0..{len(points) - 1}")
     if changes := manifest.changes_here(named):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
-        print(line, file=sys.stderr)
+        console.say(line, sys.stderr)
     if replication is None:
         replication = manifest.points[point].replication
     names = manifest.study["scenario"], manifest.study["name"]

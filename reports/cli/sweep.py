@@ -114,18 +114,18 @@ def sweep(
     answer = Sweep(study, folder, found)
     if not as_json:  # the answer comes before the page, which takes longer
         _print(answer)
-        print(f"study: {file}", flush=True)
+        console.say(f"study: {file}")
     page = _render(folder, out)
     if as_json:
         _print_json(answer, page, file)
     elif page:
-        print(f"page: {page}")
+        console.say(f"page: {page}")
 
 
 def _render(folder: Path, out: Path) -> Path | None:
     """Write the page; a line says so where the libraries of pages are not installed."""
     if absent := missing("reports", "the page of a sweep"):
-        print(f"no page: {absent}", file=sys.stderr)
+        console.say(f"no page: {absent}", sys.stderr)
         return None
     from reports.pages.render import render_study
 
@@ -151,9 +151,10 @@ def _print(answer: "Sweep") -> None:
         rows.append([f"{row['rank']}", mark, row["policy"], *values, *metrics, *cost])
     console.print_table(heads, rows)
     more = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
-    print(f"{len(table):,} settings{more}; ≈: the product may be as good as that of the first")
+    end = "≈: the product may be as good as that of the first"
+    console.say(f"{len(table):,} settings{more}; {end}")
     for line in answer.answers():
-        print(line)
+        console.say(line)
 
 
 def _print_json(answer: "Sweep", page: Path | None, file: Path) -> None:

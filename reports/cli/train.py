@@ -52,8 +52,8 @@ def train(
     def announce(memory: int) -> None:
         """Print the size of the replay memory [bytes], and how to see the curves."""
         view = missing("tensorboard", "a live view of the curves")
-        print(f"replay memory: {memory / 2**20:,.0f} MiB", file=sys.stderr)
-        print(view or f"curves: tensorboard --logdir {out / EVENTS}", file=sys.stderr)
+        console.say(f"replay memory: {memory / 2**20:,.0f} MiB", sys.stderr)
+        console.say(view or f"curves: tensorboard --logdir {out / EVENTS}", sys.stderr)
 
     with console.compile_notice(), _bar(config.ticks) as progress:
         training = train(
@@ -65,11 +65,11 @@ def train(
             f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
             f"--policy {out}; continue with {command}"
         )
-    print(
+    console.say(
         f"{out}: {training.updates} updates, {training.uav_slots} UAV-slots in "
         f"{training.seconds:.0f} s; best product {training.best_score:.3f} in selection"
     )
-    print(f"compare: dess evaluate --policy {out} --policy greedy")
+    console.say(f"compare: dess evaluate --policy {out} --policy greedy")
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import pandas as pd
 
 from analysis.questions import diff
 from analysis.questions.summary import settings
+from reports.cli import console
 from reports.cli.study.tables import differences, print_frame
 
 MANY, FIELDS = 10, 4  # rows on differences, and fields of a mission, that are printed
@@ -13,13 +14,13 @@ def print_diff(found: diff.Diff, most: int) -> None:
     """Print how many missions of two results differ, by how much, and the most changed ones."""
     missions, differ = len(found.missions), len(found.changed)
     if found.identical:
-        print(f"identical: {missions:,} missions")
+        console.say(f"identical: {missions:,} missions")
     elif not differ:
-        print(f"identical: the {missions:,} missions that both have")
+        console.say(f"identical: the {missions:,} missions that both have")
     else:
-        print(f"{differ:,} of {missions:,} missions differ")
+        console.say(f"{differ:,} of {missions:,} missions differ")
     for origin in diff.origins(found):
-        print(f" {origin}")
+        console.say(f" {origin}")
     _print_alone(found.alone)
     if differ:
         _print_effects(found)
@@ -30,9 +31,11 @@ def _print_alone(alone: pd.DataFrame) -> None:
     """What only one of the folders has."""
     for side, rows in alone.groupby("only_in"):
         for row in rows[:MANY].itertuples():
-            print(f" only in {side}: {row.what} ({row.missions:,} missions)")
+            console.say(f" only in {side}: {row.what} ({row.missions:,} missions)")
         if len(rows) > MANY:
-            print(f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them")
+            console.say(
+                f" only in {side}: {len(rows) - MANY:,} more groups of missions; --json has them"
+            )
 
 
 def _print_effects(found: diff.Diff) -> None:
@@ -54,21 +57,23 @@ def _print_differences(table: pd.DataFrame) -> None:
     cells.insert(0, "missions that differ", counts)
     print_frame("B - A [points]", cells)
     if (more := len(names) - MANY) > 0:
-        print(f" {more:,} more rows; --json has them")
+        console.say(f" {more:,} more rows; --json has them")
     if same := table["who"].nunique() - len(names):
-        print(f" {same:,} more without any difference")
+        console.say(f" {same:,} more without any difference")
 
 
 def _print_most_changed(found: diff.Diff, most: int) -> None:
     """The most changed missions, with the commands that simulate them again."""
     points = settings(found.a)
     for side, results in (("A", found.a), ("B", found.b)):
-        print(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
-    print(" most changed missions:")
+        console.say(f" {side}, {results.store.folder}: {diff.at_hand(results)}")
+    console.say(" most changed missions:")
     for row in diff.most_changed(found, most).itertuples():
         where = f"{row.policy_a} {points[row.point_a]}".strip()
-        print(f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}")
-        print(f"     A: {row.command_a}\n     B: {row.command_b}")
+        console.say(
+            f"   {where}, replication {row.replication}: {_shortened(row.fields.split(', '))}"
+        )
+        console.say(f"     A: {row.command_a}\n     B: {row.command_b}")
 
 
 def _shortened(fields: list[str]) -> str:

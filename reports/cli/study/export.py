@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from dess.files import replacing
+from reports.cli import console
 from reports.cli.report import rendering
 
 
@@ -40,4 +41,5 @@ def export(
             with rendering() as progress:
                 page = render_study(folder, pages, progress)
         write_crate(results, page, temporary, date.today(), licence)
-    print(f"{crate}: {len(results.missions):,} missions with {page.name}, licence {licence}")
+    missions = f"{len(results.missions):,} missions"
+    console.say(f"{crate}: {missions} with {page.name}, licence {licence}")

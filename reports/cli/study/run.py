@@ -89,12 +89,12 @@ def run(
         ),
     )
     print_summary(results, out, short=True)
-    print(f"more: dess study show {out}")
+    console.say(f"more: dess study show {out}")
     if page:
         from reports.pages.render import render_study
 
         with rendering() as progress:
-            print(render_study(out, PAGES, progress))
+            console.say(render_study(out, PAGES, progress))
 
 
 def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
@@ -108,9 +108,9 @@ def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
     if plan.at_most is not None:
         rule = "selection" if study.selection else "precision"
         per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
-    print(
+    console.say(
         f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
         f"x {plan.points} design points x {per_cell})"
     )
     more = "at least " if plan.at_most is not None else ""
-    print(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
+    console.say(f"about {more}{plan.seconds:,.0f} s with {workers} at work")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dess.errors import InputError, one_of
+from reports.cli import console
 from reports.cli.ranges import all_settings
 from reports.cli.settings import JsonOption
 
@@ -60,7 +61,7 @@ def show(
     means = summary.meeting(summary.means(results), targets)
     means = summary.with_verdicts(results, means)
     if as_csv:
-        print(_with_values(results, means).to_csv(index=False), end="")
+        console.say(_with_values(results, means).to_csv(index=False).rstrip())
     elif as_json:
         tables = _tables(results, means, policy, worst, folder)
         print(json.dumps(_document(results, tables, targets), indent=2))

@@ -20,16 +20,16 @@ MANY_POINTS = 40  # more design points are not listed
 def print_summary(results: Results, folder: Path, short: bool) -> None:
     """Print the means at the only design point, or the selected points and their check."""
     study = results.manifest["study"]
-    print(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
+    console.say(f"{folder}: {len(results.missions):,} missions of study {study['name']}")
     for change in results.store.manifest.accepted:
-        print(f" accepted: {change.text}")
+        console.say(f" accepted: {change.text}")
     printed = paper.PRINTED.get(study["name"], {})
     if study["selection"]:
         selected = summary.selections(results)
         _print_selections(selected)
         if results.store.manifest.costs and "condition" in selected:
             for text in costs.answers(results, costs.judged(results)):
-                print(f" {text.translate(str.maketrans('', '', '*`'))}")
+                console.say(f" {text.translate(str.maketrans('', '', '*`'))}")
         if len(results.checks):
             means, checks = summary.checks(results), study["selection"]["check"]
             if "condition" in selected:
@@ -75,13 +75,13 @@ def _print_selections(selected: pd.DataFrame) -> None:
     cells["missions"] = cells["missions"].map("{:,}".format)
     print_frame("selected for", cells)
     for guarantee in dict.fromkeys(selected["guarantee"]):
-        print(f" {guarantee}")
+        console.say(f" {guarantee}")
 
 
 def _print_costs(table: pd.DataFrame, currency: str) -> None:
     """The settings, the cheapest first, with success, and the probability to be on the front."""
     if len(table) > MANY_POINTS:
-        print(f"the costs of {len(table)} settings are too many to list; --json has them")
+        console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
         return
     cells = table[["condition", "policy"]].set_index(table["fleet"])
     ends = table[[COST, f"{COST}_low", f"{COST}_high"]].to_numpy(float)
@@ -107,7 +107,7 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
     if len(points) == 1:
         return
     if len(points) > MANY_POINTS:
-        print(f"{len(points)} design points are too many to list; --json has them")
+        console.say(f"{len(points)} design points are too many to list; --json has them")
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
@@ -116,7 +116,7 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
             cells["best"] = _best(rows)
         print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
         if "best" in cells:
-            print(
+            console.say(
                 " best: significantly better than the others on common replications (95 %, at "
                 "each design point by itself); ≈: these may all be the best"
             )
@@ -141,7 +141,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(points) * policies:,}"
     meet = "meets" if len(product) == 1 else "meet"
-    print(f"{count} settings {meet} {numbers.words(asked)}, by the lower end of the interval")
+    console.say(f"{count} settings {meet} {numbers.words(asked)}, by the lower end of the interval")
     if product.empty:
         return
     cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], ["policy", "point"])
@@ -149,7 +149,7 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
     names = [f"{policy} {points[point]}".rstrip() for policy, point in cells.index]
     print_frame("setting", cells.set_axis(names, axis="index")[:MANY_POINTS])
     if len(cells) > MANY_POINTS:
-        print(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
+        console.say(f" {len(cells) - MANY_POINTS:,} more settings; --csv has them")
 
 
 def _print_distributions(table: pd.DataFrame) -> None:
@@ -225,7 +225,7 @@ def _gain(reduction: float) -> str:
 def _print_worst(table: pd.DataFrame) -> None:
     """The worst missions of a policy, with the commands that simulate them again."""
     policy = table["policy"].iloc[0]
-    print(f" worst missions of {policy}, by collection ratio and communication:")
+    console.say(f" worst missions of {policy}, by collection ratio and communication:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
-        print(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")
+        console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")

@@ -1,8 +1,18 @@
-"""Notices on stderr."""
+"""Output of the command line: what reaches the terminal, and streams that take nothing."""
 
+import logging
+import subprocess
+import sys
+
+import pytest
 from numba import njit
 
+from reports import cli
 from reports.cli import console
+from tests.analysis.small import environment
+
+# Colours, a new title of the window, and a name that is written from right to left.
+RAW = "\x1b[31mred\x1b]0;title\x07\x9b2J \u202egpj.exe\r\x00"
 
 
 def test_compilation_is_announced_once(capsys):
@@ -13,3 +23,77 @@ def test_compilation_is_announced_once(capsys):
     with console.compile_notice():
         assert double(2) == 4
     assert capsys.readouterr().err == ""
+
+
+def is_printable(text: str) -> bool:
+    return all(line.isprintable() for line in text.split("\n"))
+
+
+@pytest.mark.parametrize(
+    "tell",
+    [
+        lambda: console.fail(RAW, 2),
+        lambda: console.say(f"{RAW}\n{RAW}"),
+        lambda: console.print_list([(RAW, RAW)]),
+        lambda: console.print_table([RAW, "head"], [[RAW, RAW]]),
+    ],
+    ids=["fail", "say", "list", "table"],
+)
+def test_no_control_character_reaches_the_terminal(tell, capsys):
+    tell()
+    told = "".join(capsys.readouterr())
+    assert is_printable(told)
+    assert r"\u001b[31mred" in told
+    assert r"\u202egpj.exe" in told
+
+
+def test_a_warning_is_a_line_of_printable_characters(monkeypatch, capsys):
+    monkeypatch.setattr(logging.root, "handlers", [])  # those of pytest
+    assert cli.main(["scenarios"]) == 0
+    logging.getLogger("policies.ddqn").warning("%s\nuses other settings", RAW)
+    err = capsys.readouterr().err
+    assert is_printable(err)
+    assert err.count("\n") == 1
+    assert "uses other settings" in err
+
+
+def test_a_long_error_keeps_its_beginning_and_its_end(capsys):
+    assert console.fail(f"dess: error: {'x' * 10**6}; allowed: less", 2) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert len(line) == 300
+    assert line.startswith("dess: error: xxx")
+    assert line.endswith("xxx; allowed: less")
+
+
+ENDS = {
+    "scenarios >/dev/full": (1, "dess: error: standard output: No space left on device\n"),
+    "--help >/dev/full": (1, "dess: error: standard output: No space left on device\n"),
+    "scenarios >&-": (0, ""),
+    "scenarios show nope 2>/dev/full": (2, ""),
+    "scenarios show nope 2>&-": (2, ""),
+    "scenarios | true": (1, ""),
+    "scenarios show paper --json | head -1": (1, ""),
+}
+
+
+@pytest.mark.parametrize("line", ENDS)
+def test_output_that_nobody_takes_ends_the_command_without_a_traceback(line):
+    arguments, redirection = line.rsplit(" ", 1) if "|" not in line else line.split(" | ")
+    command = f"{sys.executable} -m reports {arguments}"
+    pipe = "| (exec <&-; sleep 3)" if "|" in line else redirection
+    script = f"{command} {pipe}; exit ${{PIPESTATUS[0]}}"
+    variables = {k: v for k, v in environment().items() if k != "PYTHONUNBUFFERED"}
+    done = subprocess.run(
+        ["bash", "-c", script], env=variables, capture_output=True, text=True, timeout=100
+    )
+    assert (done.returncode, done.stderr) == ENDS[line]
+
+
+@pytest.mark.parametrize(("error", "line"), [(MemoryError(), "memory"), (RecursionError(), "deep")])
+def test_what_no_command_expects_of_its_input_is_a_line(monkeypatch, capsys, error, line):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr("dess.scenario.scenario_names", fail)
+    assert cli.main(["scenarios"]) == 1
+    assert line in capsys.readouterr().err
