@@ -7,7 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
-    from analysis.execution.runner import evaluate as evaluate
+    from analysis.execution.evaluation import evaluate as evaluate
     from analysis.execution.runner import run_study as run_study
     from analysis.results.resimulate import resimulate as resimulate
     from analysis.results.tables import Results as Results
@@ -28,7 +28,7 @@ _HOME = {
     "load_study": "study.study",
     "study_names": "study.study",
     "run_study": "execution.runner",
-    "evaluate": "execution.runner",
+    "evaluate": "execution.evaluation",
     "Results": "results.tables",
     "load_results": "results.tables",
     "resimulate": "results.resimulate",

@@ -1,4 +1,4 @@
-"""Run studies: split them into jobs, and let a pool of workers run these; evaluate single teams.
+"""Run studies: split them into jobs, and let a pool of workers run these.
 
 The result of a job depends only on its fields, so the results of a study are the same wherever and
 in whatever order the jobs are run. If a rule decides the number of missions, they are simulated in
@@ -6,7 +6,6 @@ rounds. What a round needs depends only on the missions of the rounds before.
 """
 
 import shlex
-import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import closing
@@ -17,21 +16,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from analysis.execution.effort import check_workers
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.reuse import sources
 from analysis.execution.workers import Cluster, Here, Pool
 from analysis.results import commands
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
-from analysis.results.manifest import Cell, Selected
+from analysis.results.manifest import Selected
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
-from dess import InputError, simulate_batch
-from dess.record import Records
-from dess.scenario import ScenarioSpace
-from dess.view import check_team
-from policies import load_team
 
 # Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
 # interrupted.
@@ -106,16 +101,6 @@ def run_study(
     with pool, Store.open(study, out, accept_code) as store:
         _Run(study, store, pool, progress, announce, reuse).complete()
         return results_of(store)
-
-
-def check_workers(workers: int) -> None:
-    """Refuse a number of workers below 1.
-
-    Raises:
-        InputError: If it is below 1.
-    """
-    if workers < 1:
-        raise InputError(f"workers: {workers} is out of range; allowed: 1 or more")
 
 
 @dataclass
@@ -261,85 +246,3 @@ def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
             parts += [Part(cell, gap) for gap in new]
             earlier += new
     return parts
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Many missions of one team.
-
-    Attributes:
-        policy: The team.
-        records: The records of the missions.
-        seconds: Time of the simulation [s], without compilation and the start of workers.
-    """
-
-    policy: str
-    records: Records
-    seconds: float
-
-    @property
-    def uav_slots(self) -> int:
-        """Mission slots in which a UAV was active, summed over the UAVs of all missions."""
-        return int(self.records.missions["uav_slots"].sum())
-
-
-def evaluate(
-    scenario: ScenarioSpace,
-    team: str,
-    missions: int = 1000,
-    seed: int = 0,
-    engine: str = "batch",
-    workers: int = 1,
-    progress: Progress | None = None,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Evaluation:
-    """Simulate replications 0, 1, ... of a team, and measure the time.
-
-    Args:
-        scenario: The scenario space from which the missions are drawn.
-        team: ``"P"`` or ``"P,P,..."``.
-        missions: Number of missions.
-        seed: Seed of the missions.
-        engine: ``batch`` or ``events``.
-        workers: Threads of the batch engine, processes of the event engine.
-        progress: Called with the number of missions done since its last call.
-        clock: Returns the time [s].
-
-    Raises:
-        InputError: If a policy is unknown, a number is out of range, or the team has more policies
-            than the largest fleet has UAVs.
-    """
-    check_workers(workers)
-    policies = load_team(team)
-    check_team(len(policies), [scenario])
-    if engine == "batch":
-        simulate_batch(scenario, policies, seed, 1)  # compiles
-        begin = clock()
-        records = simulate_batch(
-            scenario, policies, seed, missions, workers=workers, progress=progress
-        )
-        return Evaluation(team, records, clock() - begin)
-    pool, one = Here(workers), Part(Cell(0, 0, "", 0), range(missions))
-    jobs = [
-        MissionsJob(chunk, (scenario,) * len(chunk.parts), team, seed, engine)
-        for chunk in split([one], CHUNK[engine])
-    ]
-    _results(pool, [next(jobs[0].alone())] * (1 if workers == 1 else 2 * workers))  # warms up
-    begin = clock()
-    chunks = _results(pool, jobs, progress)
-    seconds = clock() - begin
-    records = Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))
-    return Evaluation(team, records, seconds)
-
-
-def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
-    """The results of all jobs, in the order of the jobs.
-
-    Raises:
-        RuntimeError: If one of them failed.
-    """
-    done = dict(pool.run(jobs, progress))
-    for result in done.values():
-        if isinstance(result, Problem):
-            raise RuntimeError(f"{result.error}\n{result.traceback}")
-    return [done[number] for number in range(len(jobs))]

@@ -8,7 +8,7 @@ of a replication: compare them by ``analysis.compare``. Intervals are two-sided.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import pandas as pd
@@ -26,6 +26,77 @@ class Interval(NamedTuple):
     mean: float
     low: float
     high: float
+
+
+class Moments(NamedTuple):
+    """What the interval of a mean depends on: it takes no more memory for more values.
+
+    Attributes:
+        n: Number of values.
+        total: Their sum.
+        squares: Sum of their squared deviations from the mean.
+        least: The smallest value.
+        most: The largest value.
+    """
+
+    n: int
+    total: float
+    squares: float
+    least: float
+    most: float
+
+    @classmethod
+    def of(cls, values: Sequence[float] | np.ndarray) -> Self:
+        """The moments of values.
+
+        Raises:
+            ValueError: If there are no values.
+        """
+        sample = np.asarray(values, float)
+        if not sample.size:
+            raise ValueError("moments: no values")
+        total = float(sample.sum())
+        squares = float(((sample - total / sample.size) ** 2).sum())
+        return cls(sample.size, total, squares, float(sample.min()), float(sample.max()))
+
+    @property
+    def mean(self) -> float:
+        """The mean of the values."""
+        return self.total / self.n
+
+    def with_others(self, others: "Moments") -> "Moments":
+        """The moments of these values and others together.
+
+        Source: T. F. Chan, G. H. Golub, R. J. LeVeque, Algorithms for computing the sample
+        variance, The American Statistician 37 (1983) 242-247, eq. 1.5b.
+        """
+        n, apart = self.n + others.n, others.mean - self.mean
+        return Moments(
+            n,
+            self.total + others.total,
+            self.squares + others.squares + apart**2 * (self.n / n) * others.n,
+            min(self.least, others.least),
+            max(self.most, others.most),
+        )
+
+    def interval(self, metric: str, level: float = LEVEL) -> Interval:
+        """The mean of a metric with the interval of ``interval_of``."""
+        if metric in SHARES:
+            return wilson(int(self.total), self.n, level)
+        return self.bounded(level) if metric in BOUNDED else self.student(level)
+
+    def bounded(self, level: float = LEVEL) -> Interval:
+        """The mean of values from 0 to 1 with the interval of ``bounded_interval``."""
+        low, high = bounded_ends(self.mean, self.squares / self.n, self.n, level)
+        return Interval(self.mean, float(low), float(high))
+
+    def student(self, level: float = LEVEL) -> Interval:
+        """The mean with the interval of ``mean_interval``."""
+        if self.least == self.most:
+            return Interval(self.mean, self.mean, self.mean)
+        error = np.sqrt(self.squares / (self.n - 1)) / np.sqrt(self.n)
+        low, high = stats.t.interval(level, self.n - 1, self.mean, error)
+        return Interval(self.mean, float(low), float(high))
 
 
 def wilson(successes: int, n: int, level: float = LEVEL) -> Interval:
@@ -46,12 +117,7 @@ def bounded_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL)
     Raises:
         ValueError: If there are no values.
     """
-    sample = np.asarray(values, float)
-    if not sample.size:
-        raise ValueError("bounded_interval: no values")
-    mean = float(sample.mean())
-    low, high = bounded_ends(mean, float(sample.var()), sample.size, level)
-    return Interval(mean, float(low), float(high))
+    return Moments.of(values).bounded(level)
 
 
 def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) -> Interval:
@@ -64,14 +130,7 @@ def mean_interval(values: Sequence[float] | np.ndarray, level: float = LEVEL) ->
     Raises:
         ValueError: If there are no values.
     """
-    sample = np.asarray(values, float)
-    if not sample.size:
-        raise ValueError("mean_interval: no values")
-    mean = float(sample.mean())
-    if np.ptp(sample) == 0:
-        return Interval(mean, mean, mean)
-    low, high = stats.t.interval(level, sample.size - 1, mean, stats.sem(sample))
-    return Interval(mean, float(low), float(high))
+    return Moments.of(values).student(level)
 
 
 def interval_of(
@@ -85,10 +144,7 @@ def interval_of(
     Raises:
         ValueError: If there are no values.
     """
-    if metric in SHARES:
-        sample = np.asarray(values)
-        return wilson(int(sample.sum()), sample.size, level)
-    return (bounded_interval if metric in BOUNDED else mean_interval)(values, level)
+    return Moments.of(values).interval(metric, level)
 
 
 def stratified(values: np.ndarray, metric: str, level: float = LEVEL) -> Interval:

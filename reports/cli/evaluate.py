@@ -1,11 +1,12 @@
 """``dess evaluate``: metrics of many missions, with intervals."""
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from reports.cli import completion, console
+from reports.cli.running import YesOption
 from reports.cli.settings import (
     JsonOption,
     ScenarioOption,
@@ -14,9 +15,6 @@ from reports.cli.settings import (
     WorkersOption,
     load_space,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
 
 app = typer.Typer()
 
@@ -42,21 +40,18 @@ def evaluate(
         typer.Option(help="batch is faster; both engines give the same records."),
     ] = "batch",
     workers: WorkersOption = 1,
+    yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate many missions and print the means of their metrics with 95 % intervals."""
-    from analysis.execution.runner import evaluate
-    from dess.state import check_seed
-    from dess.view import check_team
-    from policies import load_team
+    from analysis.execution.evaluation import check_evaluation, means
 
     space = load_space(scenario, settings)
-    for team in policy:
-        check_team(len(load_team(team)), [space])
-    check_seed(seed, missions - 1)
+    with console.compile_notice():
+        check_evaluation(space, policy, missions, seed, engine, workers, yes)
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
         evaluations = [
-            evaluate(space, team, missions, seed, engine, workers, bar.update) for team in policy
+            means(space, team, missions, seed, engine, workers, bar.update) for team in policy
         ]
     rows = [
         {
@@ -67,23 +62,13 @@ def evaluate(
             "uav_slots": evaluation.uav_slots,
             "seconds": evaluation.seconds,
         }
-        | _intervals(evaluation.records.missions)
+        | {name: of.interval(name)._asdict() for name, of in evaluation.moments.items()}
         for evaluation in evaluations
     ]
     if as_json:
         print(json.dumps(rows, indent=2))
     else:
         _print_rows(rows)
-
-
-def _intervals(missions: "np.ndarray") -> dict[str, dict[str, float]]:
-    """Mean, low and high of every metric."""
-    import pandas as pd
-
-    from analysis.stats.intervals import summary
-
-    rows = summary(pd.DataFrame(missions), by=[]).set_index("metric")[["mean", "low", "high"]]
-    return rows.to_dict("index")
 
 
 def _print_rows(rows: list[dict[str, Any]]) -> None:

@@ -1,0 +1,118 @@
+"""What work takes, in time and in memory: what takes too much is refused before it begins.
+
+The command line refuses what would take more than ``LONG_RUN`` or more memory than is available,
+unless ``--yes`` is given. Functions of Python have the same checks where they have the argument
+``yes``; ``run_study``, ``evaluate`` and ``simulate_batch`` do what they are asked to do.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from analysis import numbers
+from dess import InputError, simulate, simulate_batch
+from dess.code.memory import check_memory
+from dess.scenario import ScenarioSpace
+
+Clock = Callable[[], float]
+
+MAX_WORKERS = 1024
+WORKER_MEMORY = 160 * 2**20  # of a process [bytes], without what processes share
+
+# Missions that are timed to estimate the time of all: ONE, if it takes longer than SLOW seconds;
+# otherwise TRIAL, or LONG_TRIAL if TRIAL missions take less than ENOUGH seconds.
+ONE, TRIAL, LONG_TRIAL = 1, 48, 240
+SLOW, ENOUGH = 5.0, 0.2
+TRIAL_SEED = 400_000_000
+
+# A run that takes longer than this [s] has to be confirmed. Few missions need no estimate.
+LONG_RUN, FEW = 3600.0, 10_000
+ORDINARY = 3 * 500  # UAVs times mission slots of the missions that FEW counts
+
+CONFIRMED = "--yes, or less"
+
+
+def check_workers(workers: int) -> None:
+    """Refuse a number of workers that is out of range.
+
+    Raises:
+        InputError: If it is below 1 or above ``MAX_WORKERS``.
+    """
+    if not 1 <= workers <= MAX_WORKERS:
+        raise InputError(f"workers: {workers} is out of range; allowed: 1..{MAX_WORKERS:,}")
+
+
+def are_few(missions: int, space: ScenarioSpace) -> bool:
+    """Whether missions are so few and so short that no estimate of their time is needed."""
+    longer = space.uavs[1] * space.max_slots / ORDINARY
+    return missions * max(longer, 1.0) <= FEW
+
+
+def seconds_per_mission(
+    spaces_of: Callable[[int], Sequence[ScenarioSpace]],
+    team: Sequence[Any],
+    engine: str = "batch",
+    clock: Clock = time.perf_counter,
+) -> float:
+    """The mean time of a mission [s], measured on some missions.
+
+    Args:
+        spaces_of: Returns the scenarios of that many missions.
+        team: The policies.
+        engine: ``batch`` or ``events``.
+        clock: Returns the time [s].
+    """
+
+    def trial(missions: int) -> float:
+        spaces = spaces_of(missions)
+        begin = clock()
+        if engine == "batch":
+            fleet = max(space.uavs[1] for space in spaces)
+            simulate_batch(spaces, team[:fleet], TRIAL_SEED, missions)
+        else:
+            for replication, space in enumerate(spaces):
+                simulate(space, team[: space.uavs[1]], TRIAL_SEED, replication)
+        return (clock() - begin) / missions
+
+    trial(ONE)  # compiles
+    if (seconds := trial(ONE)) > SLOW:
+        return seconds
+    seconds = trial(TRIAL)
+    return trial(LONG_TRIAL) if seconds * TRIAL < ENOUGH else seconds
+
+
+def check_time(what: str, seconds: float, allowed: str = CONFIRMED) -> None:
+    """Refuse work that takes long.
+
+    Args:
+        what: The work and its size.
+        seconds: The estimated time [s].
+        allowed: What is allowed instead.
+
+    Raises:
+        InputError: If it takes more than ``LONG_RUN``.
+    """
+    if seconds > LONG_RUN:
+        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {allowed}")
+
+
+def check_processes(what: str, workers: int, spaces: Iterable[ScenarioSpace], more: float) -> None:
+    """Refuse workers that take more memory than is available.
+
+    Args:
+        what: What they do, for the message.
+        workers: Number of processes.
+        spaces: Scenarios of the missions.
+        more: What this process needs in addition [bytes].
+
+    Raises:
+        InputError: If they do.
+    """
+    each = max(map(channel_memory, spaces), default=0) + (WORKER_MEMORY if workers > 1 else 0)
+    check_memory(f"{what}, workers: {workers:,}", workers * each + more, CONFIRMED)
+
+
+def channel_memory(space: ScenarioSpace) -> int:
+    """The memory [bytes] of the tables of ``dess.channel.World``, if all rows are filled."""
+    nodes = len(space.nodes)
+    return 5 * space.grid**2 * (8 * nodes * space.communication_slots + 2 * (nodes + 1))

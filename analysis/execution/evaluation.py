@@ -1,0 +1,281 @@
+"""Evaluate single teams: many missions of one scenario, kept as records or as means alone."""
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.execution.effort import (
+    Clock,
+    are_few,
+    check_processes,
+    check_time,
+    check_workers,
+    seconds_per_mission,
+)
+from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
+from analysis.execution.runner import CHUNK
+from analysis.execution.workers import Here, Pool
+from analysis.names import MEANS, SHARES
+from analysis.results.chunks import Part, split
+from analysis.results.manifest import Cell
+from analysis.stats.intervals import Moments
+from dess import InputError, simulate_batch
+from dess.record import MISSION_RECORD, UAV_RECORD, Records
+from dess.scenario import ScenarioSpace
+from dess.state import check_seed
+from dess.streams import MAX_REPLICATION
+from dess.view import check_team
+from policies import load_team
+
+METRICS = (*SHARES, *MEANS)
+
+# Missions whose values are added up together. The sums depend on it, and on nothing else. It is a
+# multiple of the number of missions that are simulated together.
+BLOCK = 2**20
+MEMORY = 2**24  # of the records of missions that are simulated together [bytes]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Many missions of one team.
+
+    Attributes:
+        policy: The team.
+        records: The records of the missions.
+        seconds: Time of the simulation [s], without compilation and the start of workers.
+    """
+
+    policy: str
+    records: Records
+    seconds: float
+
+    @property
+    def uav_slots(self) -> int:
+        """Mission slots in which a UAV was active, summed over the UAVs of all missions."""
+        return int(self.records.missions["uav_slots"].sum())
+
+
+@dataclass(frozen=True)
+class Means:
+    """The metrics of many missions of one team, whose records are not kept.
+
+    Attributes:
+        policy: The team.
+        moments: For each metric its moments, which have its mean and interval.
+        uav_slots: Mission slots in which a UAV was active, summed over the UAVs of all missions.
+        seconds: Time of the simulation [s], without compilation and the start of workers.
+    """
+
+    policy: str
+    moments: dict[str, Moments]
+    uav_slots: int
+    seconds: float
+
+
+def evaluate(
+    scenario: ScenarioSpace,
+    team: str,
+    missions: int = 1000,
+    seed: int = 0,
+    engine: str = "batch",
+    workers: int = 1,
+    progress: Progress | None = None,
+    clock: Clock = time.perf_counter,
+) -> Evaluation:
+    """Simulate replications 0, 1, ... of a team, and measure the time.
+
+    The records of all missions are kept: some 300 bytes for each of them. ``means`` keeps none.
+
+    Args:
+        scenario: The scenario space from which the missions are drawn.
+        team: ``"P"`` or ``"P,P,..."``.
+        missions: Number of missions.
+        seed: Seed of the missions.
+        engine: ``batch`` or ``events``.
+        workers: Threads of the batch engine, processes of the event engine.
+        progress: Called with the number of missions done since its last call.
+        clock: Returns the time [s].
+
+    Raises:
+        InputError: If a policy is unknown, a number is out of range, or the team has more policies
+            than the largest fleet has UAVs.
+    """
+    _check(scenario, team, missions, seed, workers)
+    pieces = [range(missions)]
+    (all_of_it,) = _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock)
+    return all_of_it
+
+
+def means(
+    scenario: ScenarioSpace,
+    team: str,
+    missions: int = 1000,
+    seed: int = 0,
+    engine: str = "batch",
+    workers: int = 1,
+    progress: Progress | None = None,
+    clock: Clock = time.perf_counter,
+) -> Means:
+    """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
+
+    Neither the number of workers nor the number of missions that are simulated together changes
+    the result.
+
+    Args:
+        scenario: As for ``evaluate``, as all other arguments.
+        team: The team.
+        missions: Number of missions.
+        seed: Seed of the missions.
+        engine: The engine.
+        workers: Number of threads or processes.
+        progress: Called while the missions are simulated.
+        clock: Returns the time [s].
+
+    Raises:
+        InputError: As for ``evaluate``.
+    """
+    _check(scenario, team, missions, seed, workers)
+    sums, uav_slots, seconds = _Sums(), 0, 0.0
+    pieces = _pieces_of(missions, _together(scenario))
+    for piece in _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock):
+        sums.add(piece.records.missions)
+        uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
+    return Means(team, sums.all(), uav_slots, seconds)
+
+
+def check_evaluation(
+    scenario: ScenarioSpace,
+    teams: Sequence[str],
+    missions: int,
+    seed: int = 0,
+    engine: str = "batch",
+    workers: int = 1,
+    yes: bool = False,
+    clock: Clock = time.perf_counter,
+) -> None:
+    """Refuse ``means`` of several teams that are not valid, or that would take too much.
+
+    Args:
+        scenario: The scenario space.
+        teams: The teams.
+        missions: Number of missions of each team.
+        seed: Seed of the missions.
+        engine: The engine.
+        workers: Number of threads or processes.
+        yes: Whether any time and memory is allowed.
+        clock: Returns the time [s].
+
+    Raises:
+        InputError: If a team is unknown or a number is out of range; if it would take long, or more
+            memory than is available.
+    """
+    for team in teams:
+        _check(scenario, team, missions, seed, workers)
+    if yes:
+        return
+    what = f"evaluate: {missions * len(teams):,} missions (policies: {len(teams)})"
+    check_processes(what, workers, [scenario], MEMORY)
+    if not are_few(missions * len(teams), scenario):
+        each = [
+            seconds_per_mission(lambda n: [scenario] * n, load_team(team), engine, clock)
+            for team in teams
+        ]
+        check_time(f"{what}, workers: {workers:,}", missions * sum(each) / workers)
+
+
+def _check(scenario: ScenarioSpace, team: str, missions: int, seed: int, workers: int) -> None:
+    check_workers(workers)
+    if not 1 <= missions <= MAX_REPLICATION + 1:
+        allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
+        raise InputError(f"missions: {missions} is out of range; {allowed}")
+    check_seed(seed, missions - 1)
+    check_team(len(load_team(team)), [scenario])
+
+
+def _together(scenario: ScenarioSpace) -> int:
+    """Number of missions to simulate together: a power of two whose records fit in ``MEMORY``."""
+    each = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
+    return 2 ** ((MEMORY // each).bit_length() - 1)
+
+
+def _pieces_of(missions: int, size: int) -> Iterator[range]:
+    for begin in range(0, missions, size):
+        yield range(begin, min(begin + size, missions))
+
+
+class _Sums:
+    """The moments of metrics of missions that come in pieces."""
+
+    def __init__(self) -> None:
+        self._moments: dict[str, Moments] = {}
+        self._waiting: list[dict[str, np.ndarray]] = []  # values of at most BLOCK missions
+        self._missions = 0
+
+    def add(self, missions: np.ndarray) -> None:
+        """Add missions, of which ``BLOCK`` is a multiple if others follow."""
+        self._waiting.append({metric: missions[metric].astype(float) for metric in METRICS})
+        self._missions += len(missions)
+        if self._missions % BLOCK == 0:
+            self.all()
+
+    def all(self) -> dict[str, Moments]:
+        """The moments of all missions so far; those that come later form a new block."""
+        for metric in METRICS if self._waiting else ():
+            new = Moments.of(np.concatenate([values[metric] for values in self._waiting]))
+            held = self._moments.get(metric)
+            self._moments[metric] = held.with_others(new) if held else new
+        self._waiting.clear()
+        return self._moments
+
+
+def _evaluations(
+    scenario: ScenarioSpace,
+    team: str,
+    pieces: Iterable[range],
+    seed: int,
+    engine: str,
+    workers: int,
+    progress: Progress | None,
+    clock: Clock,
+) -> Iterator[Evaluation]:
+    """An evaluation for each piece of the replications."""
+    if engine == "batch":
+        policies = load_team(team)
+        simulate_batch(scenario, policies, seed, 1)  # compiles
+        for piece in pieces:
+            numbers = np.arange(piece.start, piece.stop)
+            begin = clock()
+            records = simulate_batch(
+                scenario, policies, seed, numbers, workers=workers, progress=progress
+            )
+            yield Evaluation(team, records, clock() - begin)
+        return
+    pool, is_warm = Here(workers), False
+    for piece in pieces:
+        jobs = [
+            MissionsJob(chunk, (scenario,) * len(chunk.parts), team, seed, engine)
+            for chunk in split([Part(Cell(0, 0, "", 0), piece)], CHUNK[engine])
+        ]
+        if not is_warm:
+            _results(pool, [next(jobs[0].alone())] * (1 if workers == 1 else 2 * workers))
+            is_warm = True
+        begin = clock()
+        chunks = _results(pool, jobs, progress)
+        seconds = clock() - begin
+        records = Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))
+        yield Evaluation(team, records, seconds)
+
+
+def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
+    """The results of all jobs, in the order of the jobs.
+
+    Raises:
+        RuntimeError: If one of them failed.
+    """
+    done = dict(pool.run(jobs, progress))
+    for result in done.values():
+        if isinstance(result, Problem):
+            raise RuntimeError(f"{result.error}\n{result.traceback}")
+    return [done[number] for number in range(len(jobs))]
