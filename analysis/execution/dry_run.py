@@ -1,28 +1,36 @@
 """The plan of a run: how many missions are needed, how many are present, how long it takes."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from analysis import numbers
+from analysis.execution.effort import (
+    CONFIRMED,
+    FEW,
+    Clock,
+    are_few,
+    check_processes,
+    check_time,
+    check_workers,
+    seconds_per_mission,
+)
 from analysis.execution.reuse import sources
-from analysis.execution.runner import CHUNK, check_workers
+from analysis.execution.runner import CHUNK
 from analysis.results.chunks import check_parts, parts_of, split
-from analysis.results.store import Store
+from analysis.results.store import MANIFEST, Store
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
 from analysis.study.study import MANY_POINTS, Study
-from dess import InputError, simulate, simulate_batch
+from dess import InputError, simulate_batch
+from dess.scenario import ScenarioSpace
 from policies import load_team
 
-# Missions that are timed to estimate the time of all: TRIAL, or LONG_TRIAL if TRIAL missions take
-# less than ENOUGH seconds.
-TRIAL, LONG_TRIAL, ENOUGH = 48, 240, 0.2
-TRIAL_SEED = 400_000_000
+# The memory [bytes] of a design point and of a mission, measured on studies of many of either.
+POINT_MEMORY, MISSION_MEMORY = 12_000, 1_000
 
-# A run that takes longer than this [s] has to be confirmed. Few missions need no estimate.
-LONG_RUN, FEW = 3600.0, 10_000
+FEW_LOGS = 1_000  # event logs that are counted as missing without a look into the folder
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ def plan_study(
     study: Study,
     out: str | Path,
     workers: int = 1,
-    clock: Callable[[], float] = time.perf_counter,
+    clock: Clock = time.perf_counter,
     accept_code: bool = False,
 ) -> Plan:
     """Plan a run; nothing is written.
@@ -85,27 +93,33 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    store = Store.peek(study, out, accept_code)
+    if study.size > MAX_SIZE:
+        raise InputError(
+            f"study {study.name}: {study.size:,} design points; allowed: {MAX_SIZE:,} at most"
+        )
+    many = study.size > MANY_POINTS and not (Path(out) / MANIFEST).exists()
+    store = None if many else Store.peek(study, out, accept_code)
     rows = []
     for team in range(len(study.policies)):
         missing, total = _missing(study, store, team)
-        seconds = missing * _seconds_per_mission(study, team, clock) if missing else 0.0
+        each = _seconds_per_mission(study, team, study.engine, clock) if missing else 0.0
+        seconds = missing * each
         rows.append(Planned(study.policies[team], total, total - missing, seconds))
     at_most = len(study.policies) * _budget(study) if study.rule else None
     seconds = sum(planned.seconds for planned in rows) / workers
-    return Plan(tuple(rows), len(study.points), at_most, seconds)
+    return Plan(tuple(rows), study.size, at_most, seconds)
 
 
 def check_effort(
     study: Study,
     out: str | Path,
     workers: int = 1,
-    clock: Callable[[], float] = time.perf_counter,
+    clock: Clock = time.perf_counter,
     accept_code: bool = False,
     reuse: Sequence[Path] = (),
     yes: bool = False,
 ) -> int:
-    """Refuse a run of more than an hour or of very many design points, before these are made.
+    """Refuse a run that takes too much time or memory, before the design points are made.
 
     Args:
         study: The study.
@@ -114,19 +128,20 @@ def check_effort(
         clock: Returns the time [s].
         accept_code: As for ``run_study``.
         reuse: As for ``run_study``.
-        yes: Whether a run of any length is allowed.
+        yes: Whether any time and memory is allowed.
 
     Returns:
         The number of missing missions; a lower bound if a rule decides it.
 
     Raises:
-        InputError: If the run would take long (the message has the number of missions and the
-            estimated time), the folder contains something else, or ``workers`` is below 1.
+        InputError: If the run would take long or more memory than is available (the message has
+            the number of missions and the estimate), has too many design points, the folder
+            contains something else, or ``workers`` is out of range.
     """
     check_workers(workers)
     teams = range(len(study.policies))
     if study.size > MANY_POINTS:
-        missing = [study.size * study.first for _ in teams]
+        missing, logs = [study.size * study.first for _ in teams], _logs(study)
     else:
         store = Store.peek(study, out, accept_code)
         missing = [_missing(study, store, team)[0] for team in teams]
@@ -134,18 +149,31 @@ def check_effort(
             for source in sources(reuse, store.manifest):
                 store.count(source)
             missing = [_missing(study, store, team)[0] for team in teams]
-    if sum(missing) <= FEW or (yes and study.size <= MAX_SIZE):
+        logs = _logs(study, store)
+    what = (
+        f"study {study.name}: {'at least ' if study.rule else ''}{sum(missing):,} missions to "
+        f"simulate (policies: {len(study.policies)}, design points: {study.size:,}, "
+        f"workers: {workers:,})"
+    )
+    if study.size > MAX_SIZE:
+        raise InputError(f"{what}; allowed: {MAX_SIZE:,} design points")
+    if yes:
         return sum(missing)
-    times = [missing[t] * _seconds_per_mission(study, t, clock) for t in teams if missing[t]]
+    ends = [study.point(number).scenario for number in {0, study.size - 1}]
+    held = study.size * POINT_MEMORY + study.size * study.first * len(teams) * MISSION_MEMORY
+    check_processes(what, workers, ends, held)
+    if study.size <= MANY_POINTS and all(are_few(sum(missing) + logs, space) for space in ends):
+        return sum(missing)
+    times = [
+        missing[team] * _seconds_per_mission(study, team, study.engine, clock)
+        + logs / len(teams) * (_seconds_per_mission(study, team, "events", clock) if logs else 0.0)
+        for team in teams
+        if missing[team] or logs
+    ]
     seconds = sum(times) / workers
-    if study.size > MANY_POINTS or seconds > LONG_RUN:
-        confirmed = "--yes, or less" if study.size <= MAX_SIZE else f"{MAX_SIZE:,} design points"
-        least = "at least " if study.rule else ""
-        raise InputError(
-            f"study {study.name}: {least}{sum(missing):,} missions to simulate "
-            f"(policies: {len(study.policies)}, design points: {study.size:,}, "
-            f"workers: {workers}), about {numbers.duration(seconds)}; allowed: {confirmed}"
-        )
+    if study.size > MANY_POINTS:
+        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
+    check_time(what, seconds)
     return sum(missing)
 
 
@@ -170,8 +198,10 @@ def check_policies(study: Study) -> None:
             continue
 
 
-def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
+def _missing(study: Study, store: Store | None, team: int) -> tuple[int, int]:
     """Number of missions of a team that are missing, and that are needed for now."""
+    if store is None:
+        return study.size * study.first, study.size * study.first
     manifest = store.manifest
     parts = parts_of(manifest, team) + check_parts(manifest, team)
     missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
@@ -182,28 +212,26 @@ def _missing(study: Study, store: Store, team: int) -> tuple[int, int]:
 def _budget(study: Study) -> int:
     """Largest number of missions of a policy that the rule of a study may ask for."""
     if study.selection:
-        checked = len(study.points) if isinstance(study.selection, Cheapest) else 1
+        checked = study.size if isinstance(study.selection, Cheapest) else 1
         return study.selection.budget + study.selection.check * checked
     assert study.precision
-    return study.precision.budget * len(study.points)
+    return study.precision.budget * study.size
 
 
-def _seconds_per_mission(study: Study, team: int, clock: Callable[[], float]) -> float:
-    """The mean time of a mission [s], measured on some missions of various design points."""
-    policies = load_team(study.policies[team])
+def _logs(study: Study, store: Store | None = None) -> int:
+    """Number of event logs that are missing; all, if the folder is not known."""
+    needed = study.logged * study.size * len(study.policies)
+    if store is None or needed <= FEW_LOGS:
+        return needed
+    cells = (cell for of_team in store.manifest.cells for cell in of_team)
+    return sum(len(store.missing_logs(cell, study.logged)) for cell in cells)
 
-    def trial(missions: int) -> float:
+
+def _seconds_per_mission(study: Study, team: int, engine: str, clock: Clock) -> float:
+    """The mean time of a mission [s], measured on missions of various design points."""
+
+    def spaces_of(missions: int) -> list[ScenarioSpace]:
         places = [(n * study.size) // missions for n in range(missions)]
-        spaces = [study.point(place).scenario for place in places]
-        begin = clock()
-        if study.engine == "batch":
-            fleet = max(space.uavs[1] for space in spaces)
-            simulate_batch(spaces, policies[:fleet], TRIAL_SEED, missions)
-        else:
-            for replication, space in enumerate(spaces):
-                simulate(space, policies[: space.uavs[1]], TRIAL_SEED, replication)
-        return (clock() - begin) / missions
+        return [study.point(place).scenario for place in places]
 
-    trial(1)  # compiles
-    seconds = trial(TRIAL)
-    return trial(LONG_TRIAL) if seconds * TRIAL < ENOUGH else seconds
+    return seconds_per_mission(spaces_of, load_team(study.policies[team]), engine, clock)

@@ -11,9 +11,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from analysis.study.stopping import StrictTable, of_its_kind
 from dess import InputError
@@ -99,7 +100,13 @@ class _Design(StrictTable):
 
     @cached_property
     def points(self) -> tuple[DesignPoint, ...]:
-        """The design points, in order."""
+        """The design points, in order.
+
+        Raises:
+            InputError: If there are more than ``MAX_SIZE``; none of them is made.
+        """
+        if self.count > MAX_SIZE:
+            raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
         return tuple(self._points())
 
     def point(self, number: int) -> DesignPoint:
@@ -132,8 +139,6 @@ class Grid(_Design):
         return DesignPoint({field: chosen[field] for field in self.values})
 
     def _points(self) -> Iterator[DesignPoint]:
-        if self.count > MAX_SIZE:
-            raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
         return map(self.point, range(self.count))
 
 
@@ -179,6 +184,21 @@ class _Sampled(_Design):
     )
     seed: Integer = Field(0, ge=0, le=MAX_SEED, description="of the sample, not of the missions")
 
+    @property
+    @abstractmethod
+    def _sample(self) -> np.ndarray:
+        """(count, ...) points of the unit cube, one for each design point."""
+
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number; the others are not made."""
+        return self._at(self._sample[number])
+
+    def _points(self) -> Iterator[DesignPoint]:
+        return map(self._at, self._sample)
+
+    def _at(self, unit: np.ndarray) -> DesignPoint:
+        return self._point(unit)
+
     def _point(self, unit: Iterable[float], replication: int = 0) -> DesignPoint:
         """The design point that belongs to a point of the unit cube."""
         places = zip(self.ranges.items(), unit, strict=True)
@@ -197,11 +217,11 @@ class LatinHypercube(_Sampled):
         """The field ``size``."""
         return self.size
 
-    def _points(self) -> Iterator[DesignPoint]:
+    @cached_property
+    def _sample(self) -> np.ndarray:
         from scipy.stats import qmc
 
-        sample = qmc.LatinHypercube(len(self.ranges), rng=self.seed).random(self.size)
-        return map(self._point, sample)
+        return qmc.LatinHypercube(len(self.ranges), rng=self.seed).random(self.size)
 
 
 class Saltelli(_Sampled):
@@ -240,12 +260,24 @@ class Saltelli(_Sampled):
         names = [*self.ranges, NOISE]
         return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
-    def _points(self) -> Iterator[DesignPoint]:
+    @model_validator(mode="after")
+    def _is_not_too_large(self) -> Self:
+        if self.count > MAX_SIZE:
+            most = 2 ** ((MAX_SIZE // (len(self.ranges) + 3)).bit_length() - 1)
+            raise ValueError(
+                f"base: {self.base:,} gives {self.count:,} design points; allowed: {most:,} at most"
+            )
+        return self
+
+    @cached_property
+    def _sample(self) -> np.ndarray:
         from SALib.sample import sobol
 
-        sample = sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
-        ends = (0, self.replications - 1)
-        return (self._point(unit, _scaled(noise, ends, True)) for *unit, noise in sample)
+        return sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
+
+    def _at(self, unit: np.ndarray) -> DesignPoint:
+        *fields, noise = unit
+        return self._point(fields, _scaled(noise, (0, self.replications - 1), True))
 
 
 def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -179,6 +180,11 @@ class Study(StrictTable):
         """The scenario that the design points change."""
         return load_scenario(self.scenario, **self.set)
 
+    @cached_property
+    def _fields(self) -> dict[str, Any]:
+        """The fields of ``_base``: its file is read once, and not for every design point."""
+        return dict(self._base)
+
     @property
     def size(self) -> int:
         """The number of design points, computed without making them."""
@@ -210,6 +216,9 @@ class Study(StrictTable):
         return Point(row.values, self._scenario_at(row.values), row.replication)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
+        if not values.keys() & {"grid", "cell_size"}:  # these move the nodes of a file
+            with suppress(InputError):  # raised below, in the words of the scenario's file
+                return ScenarioSpace.of(**self._fields | values)
         try:
             space = load_scenario(self.scenario, **self.set, **values)
             for field in ("grid", "cell_size"):

@@ -1,8 +1,9 @@
 import pytest
 
 from analysis import run_study
-from analysis.execution import dry_run
-from analysis.execution.dry_run import LONG_TRIAL, TRIAL, check_effort, plan_study
+from analysis.execution import dry_run, effort
+from analysis.execution.dry_run import check_effort, plan_study
+from analysis.execution.effort import LONG_TRIAL, ONE, TRIAL
 from dess import InputError
 from tests.analysis.small import files_of, grid, small_study
 
@@ -40,7 +41,7 @@ def test_a_plan_knows_what_is_there(tmp_path):
     assert done.seconds == 0.0
 
 
-@pytest.mark.parametrize(("step", "trial"), [(60.0, TRIAL), (0.01, LONG_TRIAL)])
+@pytest.mark.parametrize(("step", "trial"), [(60.0, ONE), (1.0, TRIAL), (0.01, LONG_TRIAL)])
 def test_the_time_is_that_of_a_trial(step, trial, tmp_path):
     plan = plan_study(small_study(tmp_path), tmp_path / "out", clock=Clock(step))
     assert [p.seconds for p in plan.policies] == pytest.approx([10 * step / trial] * 2)
@@ -75,6 +76,7 @@ def test_a_long_run_has_to_be_confirmed(tmp_path, monkeypatch):
     study, out = small_study(tmp_path), tmp_path / "out"
     check_effort(study, out, clock=Clock(1e9))  # few missions are run without a trial
     monkeypatch.setattr(dry_run, "FEW", 19)
+    monkeypatch.setattr(effort, "FEW", 19)
     check_effort(study, out, clock=Clock(1.0))
     before = files_of(tmp_path)
     line = (
@@ -82,7 +84,7 @@ def test_a_long_run_has_to_be_confirmed(tmp_path, monkeypatch):
         r"about 3 hours; allowed: --yes, or less"
     )
     with pytest.raises(InputError, match=line):
-        check_effort(study, out, workers=2, clock=Clock(3 * 3600 * 2 / 20 * TRIAL))
+        check_effort(study, out, workers=2, clock=Clock(3 * 3600 * 2 / 20))
     check_effort(study, out, clock=Clock(1e9), yes=True)
     assert files_of(tmp_path) == before
     run_study(study, out)
