@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
@@ -20,7 +21,7 @@ from pydantic import (
     model_validator,
 )
 
-from dess.errors import InputError, validation_line
+from dess.errors import InputError, shown, validation_line
 from dess.files import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
 
@@ -32,9 +33,25 @@ CHECKPOINT = "checkpoint.safetensors"
 # Seed of training missions: this plus the seed of the training.
 MISSION_SEED = 500_000_000
 
+# An evaluation is a row of the curve, which a checkpoint holds as text.
+MOST_EVALUATIONS = 50_000
+
 Count = Annotated[int, Field(strict=True, ge=1)]
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
-Rate = Annotated[float, Field(gt=0.0, le=1.0)]
+Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
+Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
+# Smaller rates and factors would change no weight in single precision.
+Rate = Annotated[float, Field(strict=True, ge=1e-12, le=1.0)]
+Factor = Annotated[float, Field(strict=True, ge=1e-6, le=1e6)]
+
+
+def _in_one_line(text: str) -> str:
+    """Refuse what a terminal would not show as it is: a name appears in messages and tables."""
+    if not text.isprintable():
+        raise ValueError(f"{shown(text)} has control characters; allowed: printable characters")
+    return text
+
+
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_in_one_line)]
 
 
 class _Settings(BaseModel):
@@ -44,27 +61,39 @@ class _Settings(BaseModel):
 class Phase(_Settings):
     """One phase of Algorithm 1."""
 
-    name: str = Field(description="name in curves and files")
-    ticks: Count = Field(description="mission slots of every environment")
+    name: Name = Field(description="name in curves and files")
+    ticks: Count = Field(le=10**8, description="mission slots of every environment")
     battery: StrictBool = Field(True, description="whether flying costs battery (line 7, 19)")
     epsilon: tuple[Share, Share] = Field(
         (0.1, 0.1), description="share of random actions at the beginning and the end"
     )
     epsilon_decay: Rate = Field(1.0, description="share of the phase over which epsilon moves")
     temperature: float = Field(
-        0.0, ge=0.0, description="of softmax exploration in scaled values; 0 for argmax"
+        0.0,
+        strict=True,
+        ge=0.0,
+        le=1e6,
+        description="of softmax exploration in scaled values; 0 for argmax",
     )
     learning_rate: tuple[Rate, Rate] = Field(
         (1e-3, 1e-4), description="of Adam at the beginning and the end"
     )
 
+    @model_validator(mode="after")
+    def _is_a_temperature(self) -> "Phase":
+        if 0.0 < self.temperature < 1e-6:  # values divided by it would be infinite
+            raise ValueError(f"temperature: {self.temperature} is too low; allowed: 0, 1e-6..1e6")
+        return self
+
 
 class TrainingConfig(_Settings):
     """All settings of a training."""
 
-    name: str = Field(description="name of the policy")
-    description: str = Field("", description="purpose of the policy")
-    scenario: str = Field("paper", description="scenario that missions are drawn from")
+    name: Name = Field(description="name of the policy")
+    description: str = Field("", max_length=10_000, description="purpose of the policy")
+    scenario: str = Field(
+        "paper", max_length=4096, description="scenario that missions are drawn from"
+    )
     set: dict[str, Any] = Field({}, description="fields of the scenario, in all missions")
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
         1, description="of the training: weights, exploration, missions"
@@ -73,8 +102,10 @@ class TrainingConfig(_Settings):
     observation: Literal["vector", "nodes", "maps"] = Field(
         "vector", description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a)"
     )
-    hidden: tuple[Count, ...] = Field(
-        (512, 512), description="units of the dueling network's layers; maps have the paper's"
+    hidden: tuple[Width, ...] = Field(
+        (512, 512),
+        max_length=8,
+        description="units of the dueling network's layers; maps have the paper's",
     )
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="of the hidden layers while training"
@@ -91,31 +122,33 @@ class TrainingConfig(_Settings):
     phases: tuple[Phase, ...] = Field(
         min_length=1, max_length=8, description="of Algorithm 1, in order"
     )
-    num_envs: Count = Field(64, description="missions that are simulated side by side")
+    num_envs: Count = Field(64, le=100_000, description="missions that are simulated side by side")
     learning_starts: Count = Field(
-        1000, description="slots of random actions per environment before learning starts"
+        1000, le=10**6, description="slots of random actions per environment before learning starts"
     )
-    replay: Count = Field(8000, description="slots per environment that the replay memory holds")
-    batch: Count = Field(512, description="transitions per update")
-    updates: Count = Field(1, description="updates per tick")
+    replay: Count = Field(
+        8000, le=10**7, description="slots per environment that the replay memory holds"
+    )
+    batch: Count = Field(512, le=10**6, description="transitions per update")
+    updates: Count = Field(1, le=100, description="updates per tick")
 
-    n_step: Count = Field(5, description="n of the n-step return")
+    n_step: Count = Field(5, le=1000, description="n of the n-step return")
     discount: Rate = Field(0.99, description="gamma per slot")
-    reward_scale: float = Field(0.05, gt=0.0, description="factor of all rewards")
+    reward_scale: Factor = Field(0.05, description="factor of all rewards")
     loss: Literal["huber", "mse"] = Field("huber", description="loss function")
-    gradient_norm: float = Field(10.0, gt=0.0, description="to which gradients are clipped")
+    gradient_norm: Factor = Field(10.0, description="to which gradients are clipped")
     target_rate: Rate = Field(0.005, description="tau of the soft target update (eq. 28)")
     average_rate: Rate = Field(
         1.0,
         description="rate of the slow copy of the weights that is evaluated; 1 for no copy",
     )
 
-    evaluate_every: Count = Field(2000, description="ticks between evaluations")
-    evaluation_missions: Count = Field(300, description="missions of an evaluation")
+    evaluate_every: Count = Field(2000, le=10**6, description="ticks between evaluations")
+    evaluation_missions: Count = Field(300, le=10**6, description="missions of an evaluation")
     evaluation_seed: Annotated[int, Field(strict=True, ge=0, lt=2**64)] = Field(
         700_000_001, description="of the evaluations that select the weights"
     )
-    window: Count = Field(3, description="evaluations in the moving average that selects")
+    window: Count = Field(3, le=1000, description="evaluations in the moving average that selects")
     checkpoint_replay: StrictBool = Field(
         True, description="whether checkpoints hold the replay memory; if not, a resumed training "
         "differs from an uninterrupted one"
@@ -131,6 +164,11 @@ class TrainingConfig(_Settings):
             )
         if self.observation == "nodes" and len(self.hidden) < 2:
             raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
+        if self.ticks // self.evaluate_every > MOST_EVALUATIONS:
+            raise ValueError(
+                f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "
+                f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
+            )
         if self.evaluation_seed == MISSION_SEED + self.seed:
             raise ValueError(f"evaluation_seed: {self.evaluation_seed} is that of the training")
         names = [phase.name for phase in self.phases]

@@ -1,0 +1,99 @@
+"""``config.json``: what a trained policy is, beside its weights.
+
+description = read_description(Path("runs/quick"))
+description.training.seed, description.layout.nodes, description.model_sha256
+"""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from dess.errors import InputError, shown, validation_line
+from dess.files import parse_json, read_text
+from policies.ddqn.config import Name, TrainingConfig
+
+FORMAT = 1
+MODEL, CONFIG = "model.safetensors", "config.json"
+LIMIT = 2**20  # bytes of the file
+
+Number = Annotated[int, Field(ge=0, lt=2**63)]
+Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class Stored(BaseModel):
+    """A table of a file that a training writes: exactly these keys, with values of these types."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+
+
+Table = TypeVar("Table", bound=Stored)
+
+
+class LayoutTable(Stored):
+    """The grid, zone and nodes of the training, as in a scenario."""
+
+    grid: Number
+    zone: Annotated[list[Number], Field(min_length=4, max_length=4)]
+    nodes: Annotated[
+        list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+        Field(min_length=1, max_length=1024),
+    ]
+
+
+class Run(Stored):
+    """The training so far, for readers; a policy that was only saved has none of it."""
+
+    dess: str = Field("", max_length=100)
+    torch: str = Field("", max_length=100)
+    device: str = Field("", max_length=200)
+    threads: Number = 0
+    ticks: Number | None = None
+    updates: Number = 0
+    uav_slots: Number = 0
+    seconds: Number = 0
+    selection_score: float | None = None
+
+
+class Description(Stored):
+    """The content of ``config.json``."""
+
+    format: Literal[1]
+    name: Name = Field(description="name of the policy")
+    observation_version: Number = Field(description="version of the encoding of observations")
+    layout: LayoutTable = Field(description="grid, zone and nodes of the training")
+    training: TrainingConfig = Field(description="settings of the training")
+    run: Run = Field(description="the training so far")
+    model_sha256: Annotated[list[Sha256], Field(min_length=1, max_length=2)] | None = Field(
+        None,
+        description="checksum of model.safetensors; two while it is replaced, none before dess 0.3",
+    )
+
+
+def read_description(folder: Path) -> Description:
+    """The description of the trained policy in a folder.
+
+    Raises:
+        InputError: If there is none, or it is damaged or of another version.
+    """
+    path = folder / CONFIG
+    try:
+        content = parse_json(read_text(path, LIMIT), str(path))
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file") from None
+    return stored(content, Description, FORMAT, str(path))
+
+
+def stored(content: Any, model: type[Table], version: int, where: str) -> Table:
+    """Validate a table that was read from ``where``, and its version first.
+
+    Raises:
+        InputError: If it is of another version or has not the form of the model.
+    """
+    held = content.get("format", version) if isinstance(content, dict) else version
+    if type(held) is not int or held != version:
+        raise InputError(f"{where}: format {shown(held)} is unknown; allowed: {version}")
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where, model)) from None

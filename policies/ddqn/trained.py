@@ -1,0 +1,186 @@
+"""A trained policy as a folder: ``model.safetensors`` (the weights) and ``config.json``.
+
+``config.json`` describes the weights (``policies.ddqn.description``) and has their checksum.
+"""
+
+import copy
+import hashlib
+import json
+import logging
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+
+from dess.errors import InputError
+from dess.files import read_bytes, replacing
+from dess.scenario import ScenarioSpace
+from policies.ddqn import tensors
+from policies.ddqn.config import TrainingConfig, config_names, learner_of, resume_command
+from policies.ddqn.description import (
+    CONFIG,
+    FORMAT,
+    MODEL,
+    Description,
+    LayoutTable,
+    Run,
+    read_description,
+)
+from policies.ddqn.observations.states import layout_of
+from policies.ddqn.policy import DDQN
+from policies.ddqn.training import OBSERVATIONS, build
+
+# The largest file of weights that is read [bytes]; the largest network of a config is half of it.
+MODEL_LIMIT = 2**30
+
+
+def save_policy(
+    folder: Path,
+    weights: Mapping[str, torch.Tensor],
+    config: TrainingConfig,
+    space: ScenarioSpace,
+    run: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a trained policy into a folder: the weights and their description.
+
+    A process that is killed at any moment leaves a policy that can be loaded: while the weights are
+    replaced, the description has the checksums of both the old and the new ones.
+
+    Args:
+        folder: The folder.
+        weights: The weights of the network.
+        config: The settings of the training.
+        space: The scenario space of the training.
+        run: Information about the training for readers; ``load_policy`` ignores it.
+
+    Raises:
+        InputError: If a file cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    layout = layout_of(space)
+    description = Description(
+        format=FORMAT,
+        name=config.name,
+        observation_version=OBSERVATIONS[config.observation].version,
+        layout=LayoutTable(
+            grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()
+        ),
+        training=config,
+        run=Run(**(run or {})),
+    )
+    values = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
+    content = save(values, {"format": str(FORMAT)})
+    sums = [_sha256(content)]
+    held = _held(folder / MODEL)
+    if held is not None and _sha256(held) not in sums:
+        _write(folder / CONFIG, _text(description, [*sums, _sha256(held)]))
+    _write(folder / MODEL, content)
+    _write(folder / CONFIG, _text(description, sums))
+
+
+def add_checksum(folder: Path) -> None:
+    """Add the checksum of the weights to the description of a policy that has none.
+
+    Raises:
+        InputError: If there is no such policy, or it is damaged.
+    """
+    load_policy(folder)
+    text = _text(read_description(folder), [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))])
+    _write(folder / CONFIG, text)
+
+
+def load_policy(folder: Path) -> DDQN:
+    """Load a policy that ``save_policy`` wrote.
+
+    If the best two values are nearly equal, they are computed in double precision, so that an
+    action does not depend on the number of rows that are decided together.
+
+    Policies of dess 0.2 have no checksum. They are loaded as well if all weights are finite.
+
+    Raises:
+        InputError: If a file is missing, damaged, of another version or of another shape.
+    """
+    path, description = folder / MODEL, read_description(folder)
+    config, where = description.training, folder / CONFIG
+    if (content := _held(path)) is None:
+        raise InputError(f"{path}: no such file; allowed: the folder of a trained policy")
+    sums = description.model_sha256
+    if sums is not None and _sha256(content) not in sums:
+        if read_description(folder) != description:  # a training has just replaced both files
+            return load_policy(folder)
+        raise InputError(f"{path}: damaged: it has not the checksum in {CONFIG}")
+    values = description.layout.model_dump()
+    try:
+        layout = layout_of(ScenarioSpace.of(uavs=1, **values))
+        with torch.device("meta"):  # the forms of the weights, without their memory
+            observation, network = build(config, layout)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    require_version(description.observation_version, observation, where)
+    weights = _weights_in(content, path)
+    tensors.require_forms(weights, network.state_dict(), str(path))
+    network = network.to_empty(device="cpu")
+    network.load_state_dict(weights)
+    policy = DDQN(config.name, observation, network, config.guard, layout)
+    policy.exact = copy.deepcopy(network).double()
+    policy.learner = learner_of(config)
+    policy.weights = tensors.digest([config.observation, config.guard, values], weights)
+    ticks = description.run.ticks
+    if ticks is not None and ticks < config.ticks:
+        name = config.name if config.name in config_names() else "CONFIG"
+        _log_once(
+            f"{folder}: this training is not finished ({ticks:,} of {config.ticks:,} ticks); the "
+            "policy acts with the weights that it has so far; continue with "
+            + resume_command(config, name, folder)
+        )
+    return policy
+
+
+def require_version(version: int, observation: Any, path: Path) -> None:
+    """Refuse weights that were trained on another version of the observation.
+
+    Raises:
+        InputError: If they were.
+    """
+    if version != observation.version:
+        raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
+
+
+def _weights_in(content: bytes, path: Path) -> tensors.Tensors:
+    try:
+        return load(content)
+    except (SafetensorError, ValueError) as error:
+        raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
+
+
+def _held(path: Path) -> bytes | None:
+    """The content of a file of weights, if there is one."""
+    try:
+        return read_bytes(path, MODEL_LIMIT)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+
+
+def _text(description: Description, sums: list[str]) -> str:
+    described = description.model_copy(update={"model_sha256": sums})
+    return json.dumps(described.model_dump(mode="json"), indent=2) + "\n"
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _write(path: Path, content: bytes | str) -> None:
+    data = content if isinstance(content, bytes) else content.encode()
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+
+
+@lru_cache
+def _log_once(line: str) -> None:
+    """Log a line for the user; every process loads a policy many times."""
+    logging.getLogger(__name__).warning(line)
