@@ -88,7 +88,7 @@ def load(name: str | Path) -> Policy:
         return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
     if folder := folder_of(name):
         needs("learning", f"policy {name}")
-        from policies.ddqn.checkpoint import load_policy  # imports torch
+        from policies.ddqn.trained import load_policy  # imports torch
 
         policy = load_policy(folder)
         if name in trained_names():

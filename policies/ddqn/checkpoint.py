@@ -1,134 +1,121 @@
-"""Files of the learner: trained policies, and checkpoints of trainings; none needs unpickling.
+"""Checkpoints: one file, ``checkpoint.safetensors``, from which a training continues exactly.
 
-A policy is a folder with ``model.safetensors`` (the weights) and ``config.json`` (their
-description). A checkpoint is one file, ``checkpoint.safetensors``, with all arrays of a training
-and, in its header as JSON, everything else.
+The file has all arrays of the training and, in its header as JSON, everything else with a checksum
+of both. It may come from anybody: what it holds is compared with what the config allows before it
+is copied into the training, since compiled code uses some of it as indices. Nothing is unpickled.
 """
 
-import copy
-import hashlib
 import json
-import logging
-from collections.abc import Callable, Mapping
-from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from pydantic import Field, create_model
 
 from dess.errors import InputError
-from dess.files import replacing, writable
+from dess.files import parse_json
 from dess.record import MISSION_RECORD
-from dess.scenario import ScenarioSpace
-from policies.ddqn.config import (
-    TrainingConfig,
-    config_names,
-    config_of,
-    learner_of,
-    resume_command,
-)
-from policies.ddqn.observations.states import Layout, layout_of
-from policies.ddqn.policy import DDQN
-from policies.ddqn.training import OBSERVATIONS, Training, build
+from policies.ddqn import tensors
+from policies.ddqn.config import CHECKPOINT, TrainingConfig
+from policies.ddqn.description import Name, Number, Sha256, Stored, stored
+from policies.ddqn.ranges import check_finite, check_replay, check_state
+from policies.ddqn.tensors import Tensors, array_of, bytes_of, part
+from policies.ddqn.trained import require_version
+from policies.ddqn.training import METRICS, Training
 
-FORMAT = 1
-MODEL, CONFIG = "model.safetensors", "config.json"
+FORMAT = 2
+# Room for the header of a checkpoint; safetensors allows 100 MB.
+HEADER_LIMIT = 10**8
 
-Tensors = dict[str, torch.Tensor]
-
-
-def save_policy(
-    folder: Path,
-    weights: Mapping[str, torch.Tensor],
-    config: TrainingConfig,
-    space: ScenarioSpace,
-    run: Mapping[str, Any] | None = None,
-) -> None:
-    """Write a trained policy into a folder: the weights, then their description.
-
-    Args:
-        folder: The folder.
-        weights: The weights of the network.
-        config: The settings of the training.
-        space: The scenario space of the training.
-        run: Information about the training for readers; ``load_policy`` ignores it.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    tensors = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
-    replace(folder / MODEL, lambda path: save_file(tensors, path, {"format": str(FORMAT)}))
-    content = {
-        "format": FORMAT,
-        "name": config.name,
-        "observation_version": OBSERVATIONS[config.observation].version,
-        "layout": _layout_values(layout_of(space)),
-        "training": config.model_dump(mode="json"),
-        "run": dict(run or {}),
-    }
-    text = json.dumps(content, indent=2) + "\n"
-    replace(folder / CONFIG, lambda path: path.write_text(text, "utf-8"))
+Amount = Annotated[float, Field(ge=0.0)]
+Word = Annotated[int, Field(ge=0, lt=2**32)]
+Words = Annotated[int, Field(ge=0, lt=2**128)]
 
 
-def load_policy(folder: Path) -> DDQN:
-    """Load a policy that ``save_policy`` wrote.
+class Progress(Stored):
+    """What ``Training.progress`` returns."""
 
-    If the best two values are nearly equal, they are computed in double precision, so that an
-    action does not depend on the number of rows that are decided together.
+    tick: Number
+    updates: Number
+    uav_slots: Number
+    seconds: Amount
+    phase_index: Number
+    phase_start: Number
+    scores: list[float]
+    best_score: float | None
 
-    Raises:
-        InputError: If a file is missing, damaged, of another version or of another shape.
-    """
-    where = folder / CONFIG
-    try:
-        content = json.loads(where.read_text("utf-8"))
-        version = content["format"]
-        if version == FORMAT:
-            layout, training = _layout(content["layout"]), content["training"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{where}: no readable description of a policy: {error!r}") from None
-    if version != FORMAT:
-        raise InputError(f"{where}: format {version!r} is unknown; allowed: {FORMAT}")
-    config = config_of(training, str(where))
-    observation, network = build(config, layout)
-    _require_version(content.get("observation_version"), observation, where)
-    tensors, _ = _read(folder / MODEL)
-    _require_weights(tensors, network.state_dict(), folder / MODEL)
-    network.load_state_dict(tensors)
-    policy = DDQN(config.name, observation, network, config.guard, layout)
-    policy.exact = copy.deepcopy(network).double()
-    policy.learner = learner_of(config)
-    policy.weights = _digest(tensors, [config.observation, config.guard, content["layout"]])
-    ticks = content.get("run", {}).get("ticks", config.ticks)
-    if ticks < config.ticks:
-        name = config.name if config.name in config_names() else "CONFIG"
-        _log_once(
-            f"{folder}: this training is not finished ({ticks:,} of {config.ticks:,} ticks); the "
-            "policy acts with the weights that it has so far; continue with "
-            + resume_command(config, name, folder)
-        )
-    return policy
+
+class Pcg64(Stored):
+    """The 128-bit integers of the state of numpy's generator."""
+
+    state: Words
+    inc: Words
+
+
+class Generator(Stored):
+    """The state of numpy's generator."""
+
+    bit_generator: Literal["PCG64"]
+    state: Pcg64
+    has_uint32: Annotated[int, Field(ge=0, le=1)]
+    uinteger: Word
+
+
+class _Row(Stored):
+    tick: Number
+    phase: Name
+    uav_slots: Number
+    updates: Number
+    seconds: Amount
+    epsilon: float
+    learning_rate: float
+    moving_average: float
+    is_best: bool
+    loss: float | None = None
+    value: float | None = None
+    gradient_norm: float | None = None
+
+
+# A row of the curve: the metrics of an evaluation and, once missions have ended, of the training.
+Row: Any = create_model(
+    "Row",
+    __base__=_Row,
+    **{f"evaluation_{name}": (float, ...) for name in METRICS},
+    **{f"training_{name}": (float | None, None) for name in METRICS},
+)  # type: ignore[call-overload]
+
+
+class Header(Stored):
+    """The header of a checkpoint, without its checksum."""
+
+    format: Literal[2] = Field(description="version of the file")
+    config: TrainingConfig = Field(description="settings of the training")
+    scenario: dict[str, Any] = Field(description="fields of the scenario")
+    observation_version: Number = Field(description="version of the encoding of observations")
+    progress: Progress = Field(description="progress of the training")
+    random: Generator = Field(description="state of the random generator")
+    stepper: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
+        description="seed and next replication of the missions"
+    )
+    replay: Number | None = Field(description="slots that were added to the replay memory")
+    curve: list[Row] = Field(description="rows of the learning curve")
+    sha256: Sha256 = Field(description="checksum of all else")
 
 
 def save_training(path: Path, training: Training) -> None:
-    """Write a checkpoint from which a training continues as if it had not been interrupted."""
-    learner = training.learner
-    tensors: Tensors = {"random.torch": torch.get_rng_state()}
-    tensors["early"] = torch.from_numpy(training.early)
-    for name, network in _networks(training).items():
-        tensors |= {f"{name}.{key}": value for key, value in network.items()}
-    for index, state in learner.optimizer.state_dict()["state"].items():
-        tensors |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
-    for name, array in training.stepper.state._asdict().items():
-        tensors[f"stepper.{name}"] = _bytes(array)
-    if training.config.checkpoint_replay:
-        for name, array in training.replay.arrays.items():
-            tensors[f"replay.{name}"] = torch.from_numpy(array)
+    """Write a checkpoint from which a training continues as if it had not been interrupted.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    values = _arrays(training)
+    for index, state in training.learner.optimizer.state_dict()["state"].items():
+        values |= {f"optimizer.{index}.{key}": value for key, value in state.items()}
     if training.finished:
-        tensors["finished"] = _bytes(np.concatenate(training.finished))
+        values["finished"] = bytes_of(np.concatenate(training.finished))
     for name in training.losses[0] if training.losses else ():
-        tensors[f"losses.{name}"] = torch.stack([loss[name] for loss in training.losses])
+        values[f"losses.{name}"] = torch.stack([loss[name] for loss in training.losses])
     header = {
         "format": FORMAT,
         "config": training.config.model_dump(mode="json"),
@@ -140,91 +127,152 @@ def save_training(path: Path, training: Training) -> None:
         "replay": training.replay.count if training.config.checkpoint_replay else None,
         "curve": training.curve,
     }
-    tensors = {name: value.detach().cpu().contiguous() for name, value in tensors.items()}
-    replace(path, lambda new: save_file(tensors, new, {"dess": json.dumps(header)}))
+    header["sha256"] = tensors.digest(header, values)
+    tensors.write(path, values, {"dess": json.dumps(header)})
 
 
-def load_training(path: Path, config: TrainingConfig, device: torch.device) -> Training:
+def load_training(
+    path: Path, config: TrainingConfig, device: torch.device, limit: int | None = None
+) -> Training:
     """Load a training from a checkpoint that ``save_training`` wrote.
 
     If the checkpoint has no replay memory, the present policy fills it again.
 
+    Args:
+        path: The checkpoint.
+        config: The settings of the training.
+        device: The device of the training.
+        limit: The largest size of the arrays [bytes].
+
     Raises:
         InputError: If the file is missing, damaged, of another version or of another config.
     """
-    tensors, metadata = _read(path)
-    try:
-        header = json.loads(metadata["dess"])
-        version, saved = header["format"], header.get("config", {})
-    except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: no checkpoint of a training: {error!r}") from None
-    if version != FORMAT:
-        raise InputError(f"{path}: format {version!r} is unknown; allowed: {FORMAT}")
+    values, metadata = tensors.read(path, HEADER_LIMIT + (2**36 if limit is None else limit))
+    if "dess" not in metadata:
+        raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
+    raw = parse_json(metadata["dess"], str(path))
+    header = stored(raw, Header, FORMAT, str(path))
     training = Training(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
-    saved = config_of(saved, str(path)).model_dump(mode="json")
-    saved |= {"scenario": header.get("scenario")}
-    if different := [key for key in settings if settings[key] != saved[key]]:
+    held = header.config.model_dump(mode="json") | {"scenario": header.scenario}
+    if different := [key for key in settings if settings[key] != held[key]]:
         raise InputError(
             f"{path}: of another config ({', '.join(different)} differ); "
             "allowed: the one it began with"
         )
-    _require_version(header.get("observation_version"), training.observation, path)
-    for name, network in _networks(training).items():
-        _require_weights(_part(tensors, name), network, path)
+    require_version(header.observation_version, training.observation, path)
+    _check_progress(header, training, path)
+    training.restore(raw["progress"])
+    finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
+    tensors.require_forms(values, _forms(training, finished), str(path))
+    if tensors.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
+        raise InputError(f"{path}: damaged: its content has not the checksum of its header")
     try:
-        _restore(training, tensors, header)
+        _restore(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged, or of another scenario: {error!r}") from None
+        raise InputError(f"{path}: damaged, or of another scenario: {error}") from None
     return training
 
 
-def _restore(training: Training, tensors: Tensors, header: dict[str, Any]) -> None:
-    """Restore the state of a saved training in a new training."""
-    training.restore(header["progress"])
+def _check_progress(header: Header, training: Training, path: Path) -> None:
+    """Refuse counters that a training of this config never has together."""
+    config, now = training.config, header.progress
+    starts = np.cumsum([0, *(phase.ticks for phase in config.phases)]).tolist()
+    index = min(now.phase_index, len(config.phases) - 1)
+    begun, end = starts[index], starts[index + 1]
+    evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
+    evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
+    slots = now.tick - begun + (config.learning_starts if now.tick > begun else 0)
+    seed, replication = training.stepper.seed, header.stepper[1]
+    right = {
+        "phase_index": now.phase_index == index,
+        "phase_start": now.phase_start == begun,
+        "tick": begun <= now.tick < end or now.tick == end == config.ticks,
+        "updates": now.updates == now.tick * config.updates,
+        "scores": len(now.scores) == min(evaluations, config.window),
+        "best_score": (now.best_score is None) == (evaluations == 0),
+        "curve": all(row.tick <= now.tick for row in header.curve)
+        and len(header.curve) >= evaluations,
+        "replay": header.replay == (slots if config.checkpoint_replay else None),
+        "stepper": header.stepper[0] == seed and replication < 2**32,
+    }
+    for name in (name for name, is_right in right.items() if not is_right):
+        raise InputError(f"{path}: {name} does not fit the config; allowed: an undamaged file")
+
+
+def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> None:
+    """Restore the state of a saved training in a new training that is in the same phase."""
     learner = training.learner
     with torch.no_grad():
         for name, network in _networks(training).items():
-            for key, value in _part(tensors, name).items():
+            for key, value in part(values, name).items():
                 network[key].copy_(value)
     states: dict[int, Tensors] = {}
-    for key, value in _part(tensors, "optimizer").items():
+    for key, value in part(values, "optimizer").items():
         index, _, field = key.partition(".")
         states.setdefault(int(index), {})[field] = value
     groups = learner.optimizer.state_dict()["param_groups"]
     learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
     training.stepper.start_at(*header["stepper"])
-    training.early[...] = tensors["early"].numpy()
-    parts = _part(tensors, "stepper")
+    training.early[...] = values["early"].numpy()
+    stored_state = part(values, "stepper")
     for name, array in training.stepper.state._asdict().items():
-        array[...] = _array(parts[name], array.dtype).reshape(array.shape)
+        array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
+    check_state(training.stepper.state, training.phase_space, training.stepper)
     if header["replay"] is not None:
         training.replay.count = header["replay"]
-        parts = _part(tensors, "replay")
+        stored_replay = part(values, "replay")
         for name, array in training.replay.arrays.items():
-            array[...] = parts[name].numpy()
-    if "finished" in tensors:
-        training.finished = [_array(tensors["finished"], MISSION_RECORD)]
-    losses = {key: value.to(training.device) for key, value in _part(tensors, "losses").items()}
-    for values in zip(*losses.values(), strict=True):
-        training.losses.append(dict(zip(losses, values, strict=True)))
+            array[...] = stored_replay[name].numpy()
+        check_replay(training.replay.arrays, training.layout.grid)
+    if "finished" in values:
+        training.finished = [array_of(values["finished"], MISSION_RECORD)]
+        check_finite(training.finished[0])
+    losses = {key: value.to(training.device) for key, value in part(values, "losses").items()}
+    for row in zip(*losses.values(), strict=True):
+        training.losses.append(dict(zip(losses, row, strict=True)))
     training.curve = header["curve"]
     training.generator.bit_generator.state = header["random"]
-    torch.set_rng_state(tensors["random.torch"])
+    torch.set_rng_state(values["random.torch"])
 
 
-@lru_cache
-def _log_once(line: str) -> None:
-    """Log a line for the user; every process loads a policy many times."""
-    logging.getLogger(__name__).warning(line)
+def _forms(training: Training, finished: int) -> Tensors:
+    """Tensors of the forms that a checkpoint of a training has at its tick.
+
+    Args:
+        training: The training, with its progress restored.
+        finished: The number of missions that ended since the last evaluation.
+    """
+    config, forms = training.config, _arrays(training)
+    if training.tick > training.phase_start:
+        for index, weight in enumerate(training.learner.online.parameters()):
+            forms[f"optimizer.{index}.step"] = torch.empty((), device="meta")
+            for name in ("exp_avg", "exp_avg_sq"):
+                forms[f"optimizer.{index}.{name}"] = torch.empty(weight.shape, device="meta")
+    last = training.tick - training.tick % config.evaluate_every
+    updates = (training.tick - max(last, training.phase_start)) * config.updates
+    if updates and not training.done:
+        for name in ("loss", "value", "gradient_norm"):
+            forms[f"losses.{name}"] = torch.empty(updates, device="meta")
+    if finished:
+        forms["finished"] = torch.empty(
+            finished * MISSION_RECORD.itemsize, dtype=torch.uint8, device="meta"
+        )
+    return forms
 
 
-def _digest(tensors: Tensors, use: list[Any]) -> str:
-    """A hash of the weights and of the settings ``use`` with which they are used."""
-    digest = hashlib.sha256(json.dumps(use).encode())
-    for name in sorted(tensors):
-        digest.update(name.encode() + b"\0" + tensors[name].numpy().tobytes())
-    return digest.hexdigest()
+def _arrays(training: Training) -> Tensors:
+    """The arrays that every checkpoint of a training has, by name."""
+    arrays: Tensors = {"random.torch": torch.get_rng_state()}
+    arrays["early"] = torch.from_numpy(training.early)
+    for name, network in _networks(training).items():
+        arrays |= {f"{name}.{key}": value for key, value in network.items()}
+    for name, array in training.stepper.state._asdict().items():
+        arrays[f"stepper.{name}"] = bytes_of(array)
+    if training.config.checkpoint_replay:
+        for name, array in training.replay.arrays.items():
+            arrays[f"replay.{name}"] = torch.from_numpy(array)
+    return arrays
 
 
 def _networks(training: Training) -> dict[str, Tensors]:
@@ -234,79 +282,3 @@ def _networks(training: Training) -> dict[str, Tensors]:
     if learner.average is not None:
         networks["average"] = learner.average.state_dict()
     return networks | {"best": training.best}
-
-
-def _read(path: Path) -> tuple[Tensors, dict[str, str]]:
-    """The tensors of a file, and its metadata."""
-    try:
-        with safe_open(path, "pt") as file:
-            names = file.keys()
-            return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
-
-
-def _require_weights(tensors: Tensors, wanted: Tensors, path: Path) -> None:
-    """Raise an error if the tensors are not weights of the network."""
-    for name in sorted(tensors.keys() ^ wanted.keys()):
-        problem = "is missing" if name in wanted else "is one too many"
-        raise InputError(f"{path}: {name} {problem}; allowed: the weights of the config's network")
-    for name, value in wanted.items():
-        actual, allowed = _form(tensors[name]), _form(value)
-        if actual != allowed:
-            raise InputError(f"{path}: {name} is {actual}; allowed: {allowed}, as the config says")
-
-
-def _require_version(version: Any, observation: Any, path: Path) -> None:
-    """Raise an error if the weights were trained on another version of the observation."""
-    if version != observation.version:
-        raise InputError(f"{path}: observation version {version!r}; allowed: {observation.version}")
-
-
-def _form(tensor: torch.Tensor) -> str:
-    """The type and shape of a tensor, like ``float32 [5, 16]``."""
-    return f"{str(tensor.dtype).removeprefix('torch.')} {list(tensor.shape)}"
-
-
-def _part(tensors: Tensors, name: str) -> Tensors:
-    """The tensors whose names begin with ``name.``, without that prefix."""
-    prefix = name + "."
-    return {
-        key.removeprefix(prefix): value for key, value in tensors.items() if key.startswith(prefix)
-    }
-
-
-def _bytes(array: np.ndarray) -> torch.Tensor:
-    """The bytes of an array, which may be structured."""
-    return torch.from_numpy(np.frombuffer(array.tobytes(), np.uint8).copy())
-
-
-def _array(content: torch.Tensor, dtype: np.dtype) -> np.ndarray:
-    return np.frombuffer(content.numpy().tobytes(), dtype).copy()
-
-
-def _layout_values(layout: Layout) -> dict[str, Any]:
-    return {
-        "grid": layout.grid,
-        "zone": layout.zone.tolist(),
-        "nodes": layout.nodes.tolist(),
-    }
-
-
-def _layout(values: dict[str, Any]) -> Layout:
-    return layout_of(ScenarioSpace.of(uavs=1, **values))  # validates the values
-
-
-def replace(path: Path, write: Callable[[Path], Any]) -> None:
-    """Write a file of a training atomically.
-
-    Raises:
-        InputError: If it cannot be written.
-    """
-    with replacing(path) as temporary, writable(path):
-        try:
-            write(temporary)
-        except SafetensorError as error:
-            raise OSError(error) from None

@@ -13,7 +13,7 @@ from dess.errors import InputError, shown, validation_line
 from dess.files import parse_json, read_text
 from policies.ddqn.config import Name, TrainingConfig
 
-FORMAT = 1
+FORMAT: Literal[1] = 1
 MODEL, CONFIG = "model.safetensors", "config.json"
 LIMIT = 2**20  # bytes of the file
 
@@ -58,14 +58,16 @@ class Run(Stored):
 class Description(Stored):
     """The content of ``config.json``."""
 
-    format: Literal[1]
+    format: Literal[1] = Field(description="version of the file")
     name: Name = Field(description="name of the policy")
     observation_version: Number = Field(description="version of the encoding of observations")
     layout: LayoutTable = Field(description="grid, zone and nodes of the training")
     training: TrainingConfig = Field(description="settings of the training")
     run: Run = Field(description="the training so far")
-    model_sha256: Annotated[list[Sha256], Field(min_length=1, max_length=2)] | None = Field(
-        None,
+    model_sha256: list[Sha256] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=2,
         description="checksum of model.safetensors; two while it is replaced, none before dess 0.3",
     )
 

@@ -47,6 +47,10 @@ def soft_update(target: nn.Module, online: nn.Module, rate: float) -> None:
     torch._foreach_lerp_(list(target.parameters()), list(online.parameters()), rate)
 
 
+class DivergenceError(ArithmeticError):
+    """The loss or its gradient is no finite number any more: one line that says so."""
+
+
 class Learner:
     """The networks and the optimizer of a training.
 
@@ -84,7 +88,11 @@ class Learner:
         return network(*self._observe(states, missions, uavs))
 
     def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
-        """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm."""
+        """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm.
+
+        Raises:
+            DivergenceError: If one of them is not finite; the weights are then as before.
+        """
         settings = self.settings
         allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
         reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
@@ -101,13 +109,20 @@ class Learner:
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
+        done = {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
+        for name, value in done.items():
+            if not torch.isfinite(value):
+                raise DivergenceError(
+                    f"the training diverged: its {name} is {float(value)}; the best policy so far "
+                    "is kept; allowed: a smaller learning_rate, reward_scale or reward"
+                )
         for group in self.optimizer.param_groups:
             group["lr"] = learning_rate
         self.optimizer.step()
         soft_update(self.target, self.online, settings.target_rate)
         if self.average is not None:
             soft_update(self.average, self.online, settings.average_rate)
-        return {"loss": loss.detach(), "value": chosen.detach().mean(), "gradient_norm": norm}
+        return done
 
     def _observe(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray

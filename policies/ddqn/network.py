@@ -8,6 +8,7 @@ type of the weights.
 """
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
 
 import torch
@@ -138,10 +139,33 @@ class NodeNetwork(nn.Module):
         return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
 
 
-def _hidden_precision(network: nn.Module, precision: torch.dtype, inputs: Tensor) -> torch.autocast:
+def units_of(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:
+    """The numbers that a row is and becomes in all layers of a network on the ``meta`` device.
+
+    Args:
+        network: The network; nothing is computed.
+        shapes: The shapes of a row of each of its inputs.
+    """
+    rows = [torch.empty(1, *shape, device="meta") for shape in shapes]
+    sizes = [row.numel() for row in rows]
+
+    def count(layer: nn.Module, inputs: object, output: Tensor) -> None:
+        sizes.append(output.numel())
+
+    for layer in network.modules():
+        if not [*layer.children()]:
+            layer.register_forward_hook(count)
+    network.eval()(*rows)
+    return sum(sizes)
+
+
+def _hidden_precision(
+    network: nn.Module, precision: torch.dtype, inputs: Tensor
+) -> AbstractContextManager[object]:
     """A context that computes in bfloat16 if that is the precision and the network is training."""
-    enabled = network.training and precision == torch.bfloat16
-    return torch.autocast(inputs.device.type, torch.bfloat16, enabled=enabled)
+    if network.training and precision == torch.bfloat16:
+        return torch.autocast(inputs.device.type, torch.bfloat16)
+    return nullcontext()
 
 
 def _convolutions(channels: int) -> nn.Sequential:

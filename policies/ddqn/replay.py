@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.errors import InputError
 from policies.ddqn.observations.states import CompactStates, empty_states
 
 
@@ -84,7 +85,8 @@ class ReplayMemory:
         here = slice(first, first + self.num_envs)
         for ring, new in zip(self._states, states, strict=True):
             ring[here] = new
-        self._action[here], self._reward[here], self._acted[here] = action, reward, acted
+        with np.errstate(over="ignore"):  # an infinite reward ends the training with a message
+            self._action[here], self._reward[here], self._acted[here] = action, reward, acted
         self._terminated[here], self._truncated[here] = terminated, truncated
         self.count += 1
 
@@ -102,8 +104,8 @@ class ReplayMemory:
             generator: Random generator of the draw.
 
         Raises:
-            ValueError: If fewer than ``n_step + 1`` slots have been added, or none of them holds a
-                transition.
+            ValueError: If fewer than ``n_step + 1`` slots have been added.
+            InputError: If hardly any of them holds a transition.
         """
         newest = self.count - 1
         oldest = max(0, self.count - self.capacity)
@@ -121,7 +123,10 @@ class ReplayMemory:
             good = self._acted[row, uav] & ~self._truncated[row, uav]
             keep = np.nonzero(good)[0][:missing]
             if not len(keep) and len(rows) > 1000:
-                raise ValueError("no transition in memory")
+                raise InputError(
+                    "replay: hardly any slot of the memory has a transition; allowed: a scenario "
+                    "whose missions last more than a slot"
+                )
             rows.append(row[keep])
             uavs.append(uav[keep])
             missing -= len(keep)

@@ -15,23 +15,32 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 import torch
+from filelock import FileLock, Timeout
 
 import dess
-from dess.errors import InputError
-from dess.files import writable
-from policies.ddqn.checkpoint import (
-    MODEL,
-    load_training,
-    replace,
-    save_policy,
-    save_training,
-)
+from dess.batch import BATCH_SIZE
+from dess.code.memory import check_memory
+from dess.errors import InputError, shown
+from dess.files import check_folder, replacing, writable
+from dess.record import MISSION_RECORD
+from dess.state import MISSION, UAV
+from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
+from policies.ddqn.description import MODEL
+from policies.ddqn.network import units_of
+from policies.ddqn.observations.states import layout_of
 from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.training import Training
+from policies.ddqn.trained import save_policy
+from policies.ddqn.training import Training, build
 
-CURVE, EVENTS = "training.parquet", "tensorboard"
+CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
+SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+
+# Bytes of the losses of an update, as tensors.
+_LOSS = 2000
 
 # Columns of the curve, by the tags under which TensorBoard shows them.
 _TAGS = {name: "losses" for name in ("loss", "gradient_norm", "value")}
@@ -56,25 +65,49 @@ def memory_of(config: TrainingConfig) -> int:
     return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
 
 
+def size_of(config: TrainingConfig) -> int:
+    """About the memory that a training takes, most of it for what a checkpoint holds [bytes].
+
+    A checkpoint is written from a copy, so what it holds counts twice.
+    """
+    space = config.space
+    fleet, nodes = space.uavs[1], len(space.nodes)
+    with torch.device("meta"):  # the sizes of the network, without its memory
+        observation, network = build(config, layout_of(space))
+    weights = sum(weight.numel() for weight in network.parameters())
+    rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
+    row = 2 * units_of(network, observation.shapes)
+    state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
+    evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
+    losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
+    held = 6 * 4 * weights + config.num_envs * state
+    held += memory_of(config) if config.checkpoint_replay else 0
+    others = 0 if config.checkpoint_replay else memory_of(config)
+    return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
+
+
 def train(
     config: TrainingConfig,
     out: Path,
     *,
     resume: bool = False,
     device: str = "auto",
+    accept_size: bool = False,
     announce: Callable[[int], None] | None = None,
     progress: Callable[[Training, int], None] | None = None,
 ) -> Training:
     """Train into a folder, or resume the training in it.
 
-    Ctrl-C and SIGTERM end the session after the present tick. The returned training is then not
-    ``done``, and the folder has everything to resume it exactly.
+    Ctrl-C, SIGTERM and SIGHUP end the session after the present tick. The returned training is then
+    not ``done``, and the folder has everything to resume it exactly. The folder is locked until the
+    end of the session.
 
     Args:
         config: The settings.
         out: The folder.
         resume: Whether to resume the training in the folder.
         device: ``auto``, ``cpu`` or ``cuda``.
+        accept_size: Whether to train even if that takes more memory than is available.
         announce: Called before any large allocation with the size of the replay memory [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
@@ -82,30 +115,42 @@ def train(
         The training at the end of the session.
 
     Raises:
-        InputError: If ``resume`` is not set and the folder has a training or a policy; if it is set
-            and the folder has no training, or one of another config; if the folder cannot be
-            written; if the machine's memory is too small.
+        DivergenceError: If the loss is no finite number any more; the best policy so far is kept.
+        InputError: If ``resume`` is not set and the folder has any files; if it is set and the
+            folder has no training, or one of another config; if another process trains into the
+            folder; if the folder cannot be written; if the machine's memory is too small.
     """
     path, place = out / CHECKPOINT, device_of(device)
-    if path.exists() and not resume:
-        raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
-    if not path.exists() and resume:
-        raise InputError(f"{path}: no such file; allowed: the folder of a training")
-    if (out / MODEL).exists() and not resume:
-        raise InputError(f"{out}: holds a policy; allowed: another folder")
-    if announce:
-        announce(memory_of(config))
-    try:
-        training = load_training(path, config, place) if resume else Training(config, place)
-    except MemoryError as error:
-        raise InputError(
-            f"replay: the memory takes {memory_of(config) / 2**30:.1f} GiB, too much for this "
-            "machine; allowed: fewer environments or slots"
-        ) from error
-    if not resume:
-        with writable(out):
-            out.mkdir(parents=True, exist_ok=True)
-        save_training(path, training)
+    _check_folder(out, resume)
+    if not accept_size:
+        allowed = "a smaller network, replay memory or batch, fewer environments, or --yes"
+        check_memory(f"training {config.name}", size_of(config), allowed)
+    with _locked(out):
+        _check_folder(out, resume)  # again, as another training may have ended in the meantime
+        if announce:
+            announce(memory_of(config))
+        try:
+            training = (
+                load_training(path, config, place, size_of(config))
+                if resume
+                else Training(config, place)
+            )
+        except (MemoryError, RuntimeError) as error:
+            if isinstance(error, RuntimeError) and "alloc" not in str(error):
+                raise  # torch has no error of its own for memory
+            raise InputError(
+                f"training {config.name}: about {size_of(config) / 2**30:.1f} GiB of memory are "
+                "too much for this machine; allowed: fewer environments or slots"
+            ) from error
+        if not resume:
+            save_training(path, training)
+        _run(training, out, progress)
+        _save_results(out, training)
+    return training
+
+
+def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:
+    """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
     with _stop_signal() as stopped, _tensorboard(out / EVENTS, training) as show:
         saved = time.monotonic()
         while not training.done and not stopped():
@@ -115,13 +160,52 @@ def train(
                 show(training.curve[-1])
                 _save_results(out, training)
             if time.monotonic() - saved > CHECKPOINT_EVERY:
-                save_training(path, training)
+                save_training(out / CHECKPOINT, training)
                 saved = time.monotonic()
             if progress:
                 progress(training, 1)
-        save_training(path, training)
-    _save_results(out, training)
-    return training
+        save_training(out / CHECKPOINT, training)
+
+
+def _check_folder(out: Path, resume: bool) -> None:
+    """Refuse a folder that has no training to resume, or one that is not empty for a new training.
+
+    Raises:
+        InputError: If it cannot be the folder of the training, or cannot be written.
+    """
+    check_folder(out)
+    with writable(out):
+        names = {path.name for path in out.iterdir()} if out.exists() else set()
+    if resume and CHECKPOINT not in names:
+        raise InputError(f"{out / CHECKPOINT}: no such file; allowed: the folder of a training")
+    if resume:
+        return
+    if CHECKPOINT in names:
+        raise InputError(f"{out}: holds a training; allowed: --resume, or another folder")
+    if MODEL in names:
+        raise InputError(f"{out}: holds a policy; allowed: another folder")
+    # A run that was killed before its first checkpoint may have left its lock and a temporary file.
+    if others := sorted(n for n in names if n != LOCK and not n.endswith(".tmp")):
+        raise InputError(
+            f"{out}: holds other files, such as {shown(others[0])}; allowed: a new or empty folder"
+        )
+
+
+@contextmanager
+def _locked(out: Path) -> Iterator[None]:
+    """Keep all other trainings out of a folder; it is made if there is none."""
+    with writable(out):
+        out.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(out / LOCK)
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            line = "in use by another training; allowed: another --out, or wait for its end"
+            raise InputError(f"{out}: {line}") from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def _save_results(out: Path, training: Training) -> None:
@@ -143,12 +227,16 @@ def _save_results(out: Path, training: Training) -> None:
         return
     names = dict.fromkeys(name for row in training.curve for name in row)
     table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
-    replace(out / CURVE, lambda new: pq.write_table(table, new))
+    with replacing(out / CURVE) as temporary:
+        pq.write_table(table, temporary)
 
 
 @contextmanager
 def _stop_signal() -> Iterator[Callable[[], bool]]:
-    """Let SIGINT and SIGTERM stop the session after the tick; a second signal stops it at once."""
+    """Let a signal stop the session after the tick; a second signal stops it at once.
+
+    A signal that is ignored, as SIGHUP under ``nohup``, stays ignored.
+    """
     received: list[int] = []
 
     def receive(number: int, frame: Any) -> None:
@@ -156,7 +244,7 @@ def _stop_signal() -> Iterator[Callable[[], bool]]:
         if len(received) > 1:
             raise KeyboardInterrupt
 
-    numbers = (signal.SIGINT, signal.SIGTERM)
+    numbers = [n for n in SIGNALS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     handlers = {number: signal.signal(number, receive) for number in numbers}
     try:
         yield lambda: bool(received)
@@ -173,7 +261,7 @@ def _tensorboard(folder: Path, training: Training) -> Iterator[Callable[[dict[st
     except ImportError:
         yield lambda row: None
         return
-    with SummaryWriter(str(folder), purge_step=training.tick + 1) as writer:
+    with writable(folder), SummaryWriter(str(folder), purge_step=training.tick + 1) as writer:
 
         def show(row: dict[str, Any]) -> None:
             for name, value in row.items():

@@ -166,8 +166,9 @@ def _held(path: Path) -> bytes | None:
 
 
 def _text(description: Description, sums: list[str]) -> str:
-    described = description.model_copy(update={"model_sha256": sums})
-    return json.dumps(described.model_dump(mode="json"), indent=2) + "\n"
+    content = description.model_dump(mode="json") | {"model_sha256": sums}
+    content["run"] = description.run.model_dump(exclude_unset=True)
+    return json.dumps(content, indent=2) + "\n"
 
 
 def _sha256(content: bytes) -> str:

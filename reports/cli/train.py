@@ -40,13 +40,17 @@ def train(
         int | None, typer.Option(help="Seed in place of the seed of the config.")
     ] = None,
     settings: SetOption = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Train even if it takes more memory than is available.")
+    ] = False,
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly."""
-    from policies.ddqn.config import load_config, resume_command
+    from policies.ddqn.config import CHECKPOINT, load_config, resume_command
 
     fields = dict(setting(text) for text in settings or [])
     config = load_config(name, fields, **({} if seed is None else {"seed": seed}))
     needs("learning", "dess train")
+    from policies.ddqn.learner import DivergenceError
     from policies.ddqn.session import EVENTS, train
 
     def announce(memory: int) -> None:
@@ -55,12 +59,26 @@ def train(
         console.say(f"replay memory: {memory / 2**20:,.0f} MiB", sys.stderr)
         console.say(view or f"curves: tensorboard --logdir {out / EVENTS}", sys.stderr)
 
-    with console.compile_notice(), _bar(config.ticks) as progress:
-        training = train(
-            config, out, resume=resume, device=device, announce=announce, progress=progress
-        )
+    command = resume_command(config, name, out, device)
+    try:
+        with console.compile_notice(), _bar(config.ticks) as progress:
+            training = train(
+                config,
+                out,
+                resume=resume,
+                device=device,
+                accept_size=yes,
+                announce=announce,
+                progress=progress,
+            )
+    except KeyboardInterrupt:  # a second signal, or one before the first tick
+        if not (out / CHECKPOINT).exists():
+            raise
+        line = f"interrupted: the last checkpoint is kept; continue with {command}"
+        raise console.Interruption(line) from None
+    except DivergenceError as error:
+        raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from None
     if not training.done:
-        command = resume_command(config, name, out, device)
         raise console.Interruption(
             f"interrupted at tick {training.tick:,} of {config.ticks:,}: the policy so far is "
             f"--policy {out}; continue with {command}"

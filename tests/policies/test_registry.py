@@ -16,7 +16,7 @@ from dess.scenario import Scenario, load_scenario, scenario_names
 from policies import registry
 from policies.about import about
 from policies.base import Policy
-from policies.ddqn.checkpoint import save_policy
+from policies.ddqn.trained import save_policy
 from policies.ddqn.config import config_of
 from policies.ddqn.observations.states import layout_of
 from policies.ddqn.training import build

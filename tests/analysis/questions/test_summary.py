@@ -15,7 +15,7 @@ from analysis.questions import summary
 from analysis.stats.intervals import mean_interval
 from dess import simulate
 from policies import load, load_team
-from policies.ddqn.checkpoint import save_policy
+from policies.ddqn.trained import save_policy
 from policies.ddqn.training import Training
 from reports import cli
 from tests.analysis.small import grid, small_study, write_scenario

@@ -15,16 +15,11 @@ from safetensors.torch import load_file, save_file
 from dess import InputError
 from dess.batch import simulate_batch
 from dess.scenario import load_scenario
-from policies.ddqn import checkpoint
-from policies.ddqn.checkpoint import (
-    CONFIG,
-    MODEL,
-    load_policy,
-    load_training,
-    save_policy,
-    save_training,
-)
+from policies.ddqn import tensors as files_of_tensors
+from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.config import CHECKPOINT
+from policies.ddqn.description import CONFIG, MODEL
+from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny

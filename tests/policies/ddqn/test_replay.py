@@ -104,7 +104,7 @@ def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
     cut = np.full((6, 1, 1), True)
     zero = np.zeros((6, 1, 1))
     log = Log(zero.astype(int), zero, cut, ~cut, cut)
-    with pytest.raises(ValueError, match="no transition"):
+    with pytest.raises(ValueError, match="has a transition"):
         _drawn(log.memory(6), 4, 2)
 
 

@@ -17,8 +17,9 @@ import policies
 from dess import InputError
 from dess.scenario import load_scenario
 from policies.ddqn import session
-from policies.ddqn.checkpoint import CONFIG, MODEL, load_training
+from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import CHECKPOINT
+from policies.ddqn.description import CONFIG, MODEL
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.session import CURVE, EVENTS, device_of, memory_of, train
 from policies.ddqn.training import Training
