@@ -89,8 +89,9 @@ def add_checksum(folder: Path) -> None:
         InputError: If there is no such policy, or it is damaged.
     """
     load_policy(folder)
-    text = _text(read_description(folder), [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))])
-    _write(folder / CONFIG, text)
+    content = json.loads((folder / CONFIG).read_text("utf-8"))
+    content["model_sha256"] = [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))]
+    _write(folder / CONFIG, json.dumps(content, indent=2) + "\n")
 
 
 def load_policy(folder: Path) -> DDQN:

@@ -114,7 +114,7 @@ BAD = {
     "train tiny.toml --out out --set batch=2": ["batch is a setting of the training", "config"],
     "train tiny.toml --out out --set uvs=2": ["uvs: unknown key (did you mean uavs?)"],
     "evaluate --policy begun": ["begun is a training that has no weights yet", "--resume"],
-    "evaluate --policy broken": ["broken/config.json: no readable description of a policy"],
+    "evaluate --policy broken": ["broken/config.json: format: is missing"],
     "evaluate --policy empty": ["'empty' is unknown", "the folder of a trained policy"],
 }
 

@@ -1,0 +1,376 @@
+"""Folders of trained policies: what is written comes back, and nothing else is read."""
+
+import copy
+import hashlib
+import json
+import os
+import random
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from dess import InputError
+from dess.batch import simulate_batch
+from dess.scenario import load_scenario
+from policies.ddqn import trained
+from policies.ddqn.description import CONFIG, MODEL
+from policies.ddqn.trained import add_checksum, load_policy, save_policy
+from policies.ddqn.training import Training
+from tests.analysis.small import files_of, write_scenario
+from tests.policies.ddqn.tiny import CPU, PHASES, tiny
+
+
+@pytest.fixture(scope="module")
+def training() -> Training:
+    """A training that has just begun."""
+    training = Training(tiny(learning_starts=5, phases=[PHASES[1] | {"ticks": 3}]), CPU)
+    training.run(2)
+    return training
+
+
+@pytest.fixture
+def folder(training: Training, tmp_path: Path) -> Path:
+    """The folder of its policy."""
+    path = tmp_path / "policy"
+    save_policy(path, training.learner.online.state_dict(), training.config, training.space)
+    return path
+
+
+def _refusal(folder: Path) -> str:
+    """The one line with which a policy is refused."""
+    with pytest.raises(InputError) as error:
+        load_policy(folder)
+    line = str(error.value)
+    assert "\n" not in line
+    assert line.isprintable()
+    assert len(line) < 1000  # the console cuts it
+    return line
+
+
+def _described(folder: Path, **changes: Any) -> None:
+    """Change the description of a policy; None leaves a key out."""
+    content = json.loads((folder / CONFIG).read_text("utf-8")) | changes
+    kept = {key: value for key, value in content.items() if value is not None}
+    (folder / CONFIG).write_text(json.dumps(kept), "utf-8")
+
+
+def _forged(folder: Path, tensors: dict[str, torch.Tensor]) -> None:
+    """Write other weights with their checksum, as somebody does who wants to be believed."""
+    save_file(tensors, folder / MODEL)
+    _described(folder, model_sha256=[hashlib.sha256((folder / MODEL).read_bytes()).hexdigest()])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"guard": False},
+        {"precision": "bfloat16"},
+        {"observation": "nodes"},
+        {"observation": "maps"},
+    ],
+    ids=["vector", "free", "bfloat16", "nodes", "maps"],
+)
+def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) -> None:
+    training = Training(tiny(**changes), CPU)
+    weights = training.learner.online.state_dict()
+    save_policy(tmp_path / "new" / "policy", weights, training.config, training.space)
+    assert sorted(files_of(tmp_path / "new" / "policy")) == [CONFIG, MODEL]
+    loaded, saved = load_policy(tmp_path / "new" / "policy"), training.policy(weights)
+    assert (loaded.name, loaded.guarded) == ("tiny", training.config.guard)
+    for part in loaded.layout._fields:
+        assert np.array_equal(getattr(loaded.layout, part), getattr(saved.layout, part))
+    saved.exact = copy.deepcopy(saved.network).double()  # as the loaded one has it
+    missions = 2 if training.config.observation == "maps" else 10
+    flights = [simulate_batch(training.space, policy, 71, missions) for policy in (loaded, saved)]
+    assert flights[0].missions.tobytes() == flights[1].missions.tobytes()
+    assert flights[0].uavs.tobytes() == flights[1].uavs.tobytes()
+
+
+def test_weights_have_a_hash(training: Training, folder: Path) -> None:
+    weights = {name: value.clone() for name, value in training.learner.online.state_dict().items()}
+    first = load_policy(folder).weights
+    assert len(bytes.fromhex(first)) == 32
+    save_policy(folder, weights, training.config, training.space)
+    assert load_policy(folder).weights == first
+    weights["value.bias"] += 1e-3
+    save_policy(folder, weights, training.config, training.space)
+    assert load_policy(folder).weights != first
+
+
+def test_a_policy_needs_no_scenario_file(tmp_path: Path) -> None:
+    scenario = write_scenario(tmp_path)
+    training = Training(tiny(scenario=str(scenario)), CPU)
+    save_policy(tmp_path / "policy", training.best, training.config, training.space)
+    scenario.unlink()
+    assert load_policy(tmp_path / "policy").layout.grid == 8
+
+
+def _shape(tensors: dict[str, torch.Tensor]) -> None:
+    tensors["value.bias"] = torch.zeros(2)
+
+
+def _precision(tensors: dict[str, torch.Tensor]) -> None:
+    tensors["value.bias"] = tensors["value.bias"].to(torch.bfloat16)
+
+
+def _missing(tensors: dict[str, torch.Tensor]) -> None:
+    del tensors["value.bias"]
+
+
+def _extra(tensors: dict[str, torch.Tensor]) -> None:
+    tensors["value.slope"] = torch.zeros(1)
+
+
+@pytest.mark.parametrize(
+    ("damage", "complaint"),
+    [
+        (_shape, r"value\.bias is float32 \[2\]; allowed: float32 \[1\]"),
+        (_precision, r"value\.bias is bfloat16 \[1\]; allowed: float32 \[1\]"),
+        (_missing, r"'value\.bias' is missing"),
+        (_extra, r"'value\.slope' is one too many"),
+    ],
+)
+def test_other_weights_are_refused(
+    damage: Callable[[dict[str, torch.Tensor]], None], complaint: str, folder: Path
+) -> None:
+    tensors = load_file(folder / MODEL)
+    damage(tensors)
+    _forged(folder, tensors)
+    with pytest.raises(InputError, match=f"^{folder / MODEL}: {complaint}"):
+        load_policy(folder)
+
+
+def test_the_weights_of_another_config_are_refused(training: Training, folder: Path) -> None:
+    other = Training(tiny(hidden=[16, 8]), CPU)
+    weights = folder / MODEL
+    kept = weights.read_bytes()
+    save_policy(folder, other.best, other.config, other.space)
+    weights.write_bytes(kept)
+    _described(folder, model_sha256=[hashlib.sha256(kept).hexdigest()])
+    assert _refusal(folder).startswith(f"{weights}: ")
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"PK\x03\x04" + bytes(100), bytes(100)])
+def test_a_foreign_file_is_refused(content: bytes, folder: Path) -> None:
+    _described(folder, model_sha256=None)
+    (folder / MODEL).write_bytes(content)
+    assert _refusal(folder).startswith(f"{folder / MODEL}: damaged, or no safetensors")
+
+
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.999])
+def test_a_truncated_file_is_refused(share: float, folder: Path) -> None:
+    content = (folder / MODEL).read_bytes()
+    _described(folder, model_sha256=None)
+    (folder / MODEL).write_bytes(content[: int(share * len(content))])
+    assert _refusal(folder).startswith(f"{folder / MODEL}: damaged, or no safetensors")
+
+
+@pytest.mark.parametrize("name", [CONFIG, MODEL])
+def test_a_missing_file_is_named(name: str, folder: Path) -> None:
+    (folder / name).unlink()
+    assert _refusal(folder).startswith(f"{folder / name}: ")
+
+
+CONTENTS: dict[str, str] = {
+    "{": "not valid JSON: ",
+    "[" * 100_000: "not valid JSON: it is nested too deeply",
+    '{"format": ' + "9" * 5000 + "}": "not valid JSON: a number has too many digits",
+    '{"name": "\\ud800"}': "not valid JSON: it is not text in UTF-8",
+    "[]": "Input should be a valid dictionary",
+    "3": "Input should be a valid dictionary",
+    "{}": "format: is missing; allowed: version of the file",
+    '{"format": 1}': "name: is missing; allowed: name of the policy",
+    '{"format": 2}': "format 2 is unknown; allowed: 1",
+    '{"format": "1"}': "format '1' is unknown; allowed: 1",
+    '{"format": true}': "format True is unknown; allowed: 1",
+}
+
+
+@pytest.mark.parametrize("content", CONTENTS, ids=lambda content: content[:20])
+def test_a_damaged_description_is_refused(content: str, folder: Path) -> None:
+    (folder / CONFIG).write_text(content, "utf-8")
+    assert _refusal(folder).startswith(f"{folder / CONFIG}: {CONTENTS[content]}")
+
+
+# Where a value of the description is changed, to what, and what the line says.
+WRONG: list[tuple[list[str], Any, str]] = [
+    (["layout", "grid"], "wide", "layout.grid: "),
+    (["layout", "grid"], 10**9, "grid: 1000000000 is out of range"),
+    (["layout", "grid"], 10**4000, "layout.grid: "),
+    (["layout", "grid"], 16, "zone: [26, 2, 4, 4] does not lie on the 16 x 16 grid"),
+    (["layout", "zone"], [26, 2, 4], "layout.zone"),
+    (["layout", "nodes"], [[1, 2, 3]], "layout.nodes"),
+    (["layout", "nodes"], "none", "layout.nodes"),
+    (["layout", "nodes"], [[1, 1]] * 10_000, "layout.nodes"),
+    (["layout", "nodes"], [[-1, 1]], "layout.nodes"),
+    (["layout", "uavs"], 3, "layout.uavs: unknown key"),
+    (["layout", "nodez"], [], "layout.nodez: unknown key"),
+    (["layout"], [], "layout: "),
+    (["training", "hidden"], "wide", "hidden: "),
+    (
+        ["training", "hidden"],
+        [50_000, 50_000],
+        "training.hidden.0: Input should be less than or equal to 4096",
+    ),
+    (["training", "speed"], 3, "speed: unknown key"),
+    (["training", "observation"], "radar", "observation: "),
+    (["training", "discount"], "0.99", "training.discount: "),
+    (["training", "set"], 3, "training.set: "),
+    (["name"], "a\nb\x1b[2J", "has control characters; allowed: printable characters"),
+    (["training", "name"], "\u202etxt", "has control characters"),
+    (["name"], "x" * 10_000, "name: "),
+    (["observation_version"], 2, "observation version 2; allowed: 1"),
+    (["run", "ticks"], "many", "run.ticks: 'many' is not an integer"),
+    (["run", "ticks"], -5, "run.ticks: "),
+    (["run", "seconds"], float("inf"), "run.seconds: "),
+    (["model_sha256"], "0" * 64, "model_sha256: "),
+    (["model_sha256"], ["0" * 64], "damaged: it has not the checksum in config.json"),
+    (["model_sha512"], ["0" * 64], "model_sha512: unknown key"),
+]
+
+
+@pytest.mark.parametrize(("keys", "value", "complaint"), WRONG, ids=lambda part: str(part)[:40])
+def test_a_wrong_description_is_refused(
+    keys: list[str], value: Any, complaint: str, folder: Path
+) -> None:
+    content = json.loads((folder / CONFIG).read_text("utf-8"))
+    table = content
+    for key in keys[:-1]:
+        table = table[key]
+    table[keys[-1]] = value
+    (folder / CONFIG).write_text(json.dumps(content), "utf-8")
+    line = _refusal(folder)
+    assert line.startswith(f"{folder}/")
+    assert complaint in line
+
+
+# --- damage ---
+
+
+def test_a_flipped_byte_is_refused(folder: Path) -> None:
+    content = (folder / MODEL).read_bytes()
+    generator = random.Random(1)
+    for position in [*range(8), *generator.sample(range(8, len(content)), 60)]:
+        changed = bytearray(content)
+        changed[position] ^= 1 << generator.randrange(8)
+        (folder / MODEL).write_bytes(changed)
+        assert _refusal(folder).startswith(f"{folder / MODEL}: damaged")
+    (folder / MODEL).write_bytes(content)
+    load_policy(folder)
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf])
+def test_weights_that_are_not_finite_are_refused(number: float, folder: Path) -> None:
+    tensors = load_file(folder / MODEL)
+    tensors["hidden.0.weight"][3, 5] = number
+    _forged(folder, tensors)
+    line = f"{folder / MODEL}: hidden.0.weight has impossible values; allowed: finite numbers"
+    assert _refusal(folder) == line
+    _described(folder, model_sha256=None)
+    assert _refusal(folder) == line
+
+
+def test_a_network_takes_no_memory_before_its_weights_are_there(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = json.loads((folder / CONFIG).read_text("utf-8"))
+    content["training"]["hidden"] = [4096, 4096]
+    (folder / CONFIG).write_text(json.dumps(content), "utf-8")
+    monkeypatch.setattr(torch.nn.Module, "to_empty", lambda *_: pytest.fail("memory is taken"))
+    assert "hidden.0.weight is float32 [16, 242]; allowed: float32 [4096, 242]" in _refusal(folder)
+
+
+@pytest.mark.parametrize("name", [CONFIG, MODEL])
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large"])
+def test_only_regular_files_are_read(name: str, kind: str, folder: Path) -> None:
+    path = folder / name
+    path.unlink()
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        with path.open("wb") as file:
+            file.truncate(2**32)
+    assert _refusal(folder).startswith(f"{path}: ")
+
+
+def test_a_policy_without_a_checksum_gets_one(folder: Path) -> None:
+    described = (folder / CONFIG).read_text("utf-8")
+    _described(folder, model_sha256=None)
+    before = load_policy(folder).weights
+    add_checksum(folder)
+    assert (folder / CONFIG).read_text("utf-8") == described
+    assert load_policy(folder).weights == before
+
+
+class _Killed(BaseException):
+    """The process is killed here."""
+
+
+def test_a_kill_while_it_is_replaced_leaves_a_policy(
+    training: Training, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = load_policy(folder).weights
+    before = files_of(folder)
+    weights = {name: value + 1e-3 for name, value in training.best.items()}
+    seen, replace = [], os.replace
+
+    for steps in range(3):
+        for name, content in before.items():
+            (folder / name).write_bytes(content)
+        left = iter(range(steps))
+
+        def dying(*paths: Any, left: Iterator[int] = left) -> None:
+            if next(left, None) is None:
+                raise _Killed
+            replace(*paths)
+
+        monkeypatch.setattr(os, "replace", dying)
+        with pytest.raises(_Killed):
+            save_policy(folder, weights, training.config, training.space)
+        seen.append(load_policy(folder).weights == old)
+    # Not yet begun; the description has both checksums; the weights are new as well.
+    assert seen == [True, True, False]
+    monkeypatch.setattr(os, "replace", replace)
+    save_policy(folder, weights, training.config, training.space)
+    assert json.loads((folder / CONFIG).read_text("utf-8"))["model_sha256"] == [
+        hashlib.sha256((folder / MODEL).read_bytes()).hexdigest()
+    ]
+
+
+def test_a_policy_that_is_replaced_while_it_is_read_is_read_again(
+    training: Training, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    weights = {name: value + 1e-3 for name, value in training.best.items()}
+    reading = trained.read_description
+    waiting = [True]
+
+    def late(path: Path) -> Any:
+        description = reading(path)
+        if waiting:
+            waiting.clear()
+            save_policy(folder, weights, training.config, training.space)
+        return description
+
+    old = load_policy(folder).weights
+    monkeypatch.setattr(trained, "read_description", late)
+    assert load_policy(folder).weights != old
+
+
+def test_the_layout_is_that_of_the_scenario(training: Training, folder: Path) -> None:
+    paper = load_scenario("paper")
+    layout = json.loads((folder / CONFIG).read_text("utf-8"))["layout"]
+    assert layout == {
+        "grid": paper.grid,
+        "zone": list(paper.zone),
+        "nodes": [list(node) for node in paper.nodes],
+    }
