@@ -21,7 +21,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 
 # The largest text file that is read without another limit [bytes].
 TEXT_LIMIT = 64 * 2**20
@@ -40,6 +40,8 @@ _KINDS = {
 # A dotted TOML key with more than 64 parts. The parser takes time with the square of their number.
 _PART = r"""(?:[\w-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')"""
 _DOTTED = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{64}}")
+# More levels of lists and tables than any input has.
+_DEEPEST = 100
 # Escapes that can stand for half a character, which no encoding can write.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 # Temporary files: the number of their process, and a random one.
@@ -80,6 +82,8 @@ class Shipped(NamedTuple):
             InputError: If the file does not exist, cannot be read or is not TOML.
         """
         text = str(name_or_path)
+        if not is_text(text):
+            raise InputError(f"{shown(text)}: is not a name in UTF-8; allowed: another name")
         if text in self.names():
             where = f"{self.kind} {text}"
             file = resources.files(self.package).joinpath(f"{self.folder}/{text}.toml")
@@ -169,11 +173,14 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         InputError: If the text is not TOML, or TOML that no memory or number can hold.
     """
     try:
+        text.encode()
         if _DOTTED.search(text):
             raise RecursionError
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
+        _check_depth(data)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where}: not valid TOML: {_reason(error)}") from None
+    return data
 
 
 def parse_json(text: str | bytes, where: str) -> Any:
@@ -185,11 +192,35 @@ def parse_json(text: str | bytes, where: str) -> Any:
     try:
         decoded = text if isinstance(text, str) else text.decode()
         data = json.loads(decoded)
+        _check_depth(data)
         if _SURROGATE.search(decoded):
             json.dumps(data, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where}: not valid JSON: {_reason(error)}") from None
     return data
+
+
+def is_text(name: str) -> bool:
+    """Whether a name can be written in UTF-8, which no half of a character can.
+
+    Python makes such halves of the bytes of an argument or a file name that are not UTF-8.
+    """
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _check_depth(data: Any) -> None:
+    """Refuse lists and tables so deep that a recursive function could not walk through them."""
+    level = [data]
+    for _ in range(_DEEPEST):
+        inner = [item for item in level if isinstance(item, dict | list)]
+        level = [x for item in inner for x in (item.values() if isinstance(item, dict) else item)]
+        if not level:
+            return
+    raise RecursionError
 
 
 def _reason(error: Exception) -> str:

@@ -31,6 +31,9 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 
+# Largest amount of initial data of a node [data units].
+_MOST_DATA = 10**9
+
 # Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
 _CHANNEL_LIMIT = 2**30
 
@@ -38,6 +41,8 @@ _CHANNEL_LIMIT = 2**30
 Integer = Annotated[int, Field(strict=True)]
 # A finite number, integer or not.
 Number = Annotated[float, Field(allow_inf_nan=False)]
+# A reward per event. Sums of many of them are still finite, and so are their squares.
+Reward = Annotated[float, Field(ge=-(10**9), le=10**9, allow_inf_nan=False)]
 
 
 class _Constants(BaseModel):
@@ -49,8 +54,8 @@ class _Constants(BaseModel):
     grid: Integer = Field(
         32, ge=2, le=256, description="cells along one side of the square grid (M)"
     )
-    cell_size: Number = Field(800.0, gt=0, description="side of a cell [m] (c)")
-    altitude: Number = Field(10.0, gt=0, description="flying altitude [m] (h)")
+    cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
+    altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
     nodes: tuple[Cell, ...] = Field(
         PAPER_NODES,
         min_length=1,
@@ -66,7 +71,9 @@ class _Constants(BaseModel):
     forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
 
     # Time
-    slot_length: Number = Field(1.0, gt=0, description="length of a mission slot (delta_t)")
+    slot_length: Number = Field(
+        1.0, ge=1e-6, le=1_000_000, description="length of a mission slot (delta_t)"
+    )
     communication_slots: Integer = Field(
         4, ge=1, le=64, description="communication slots in a mission slot (m)"
     )
@@ -90,7 +97,9 @@ class _Constants(BaseModel):
     edge_snr: Number = Field(
         -25.0, ge=-300, le=300, description="mean SNR at half the grid's diagonal [dB]"
     )
-    path_loss_exponent: Number = Field(2.27, gt=0, le=10, description="path loss exponent (alpha)")
+    path_loss_exponent: Number = Field(
+        2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
+    )
     shadowing_variance: Number = Field(
         2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
     )
@@ -107,18 +116,18 @@ class _Constants(BaseModel):
     )
 
     # Reward (Table III)
-    reward_data: Number = Field(
+    reward_data: Reward = Field(
         1.3, description="reward per data unit that the team collects (alpha)"
     )
-    reward_overruled: Number = Field(
+    reward_overruled: Reward = Field(
         -1.0, description="reward of an action that the safety controller overrules (beta)"
     )
-    reward_depleted: Number = Field(
+    reward_depleted: Reward = Field(
         -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
     )
-    reward_charging: Number = Field(0.05, description="reward per charging slot (c)")
-    reward_quota: Number = Field(100.0, description="reward of a UAV that fills its quota (omega)")
-    reward_step: Number = Field(-0.1, description="reward per mission slot (zeta)")
+    reward_charging: Reward = Field(0.05, description="reward per charging slot (c)")
+    reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
+    reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
 
     @field_validator("nodes", "zone", mode="before")
     @classmethod
@@ -157,10 +166,10 @@ class _Constants(BaseModel):
                 f"pads: {self.pads} is more than the zone has cells; allowed: 1..{self.zone_cells}"
             )
         low, high = self.initial_data
-        if not 0 <= low <= high:
+        if not 0 <= low <= high <= _MOST_DATA:
             raise ValueError(
-                f"initial_data: {[low, high]} is not a range; allowed: a number >= 0 "
-                "or [low, high] with 0 <= low <= high"
+                f"initial_data: {[low, high]} is not a range; allowed: a number 0..{_MOST_DATA:,} "
+                f"or [low, high] with 0 <= low <= high <= {_MOST_DATA:,}"
             )
         return self
 
@@ -267,7 +276,7 @@ class ScenarioSpace(_Constants):
         """
         bounded: dict[str, tuple[float, float]] = {
             "pads": (1, self.zone_cells),
-            "initial_data": (0, inf),
+            "initial_data": (0, _MOST_DATA),
             **{name: (low, high) for name, (low, high, _) in _sampled(self.zone_cells).items()},
         }
         if field not in self.numeric:

@@ -12,13 +12,13 @@ working manual, U.S. Geological Survey 1987).
 
 import csv
 import io
-import json
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dess.errors import InputError
+from dess.errors import InputError, shown
+from dess.files import parse_json, read_text
 
 Cell = tuple[int, int]
 
@@ -73,17 +73,12 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
 
 def _text(path: Path) -> str:
     """The content of a regular file that is not too large."""
-    if path.exists() and not path.is_file():
-        raise InputError(f"{path}: cannot be read: it is not a regular file; allowed: a file")
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path}: is too large; allowed: {MAX_BYTES:,} bytes at most")
-        return path.read_text("utf-8-sig")
+        return read_text(path, MAX_BYTES, "utf-8-sig")
     except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot be read: {reason}; allowed: a file of nodes") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: cannot be read: it is not text; allowed: UTF-8") from None
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; allowed: a file of nodes"
+        ) from None
 
 
 def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
@@ -109,11 +104,7 @@ def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
 
 def _of_geojson(path: Path, text: str) -> tuple[bool, list[Place]]:
     """True, because the positions in GeoJSON are geographic, and where the nodes are."""
-    try:
-        data = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        line = " ".join(str(error).split())
-        raise InputError(f"{path}: is not JSON: {line}; allowed: GeoJSON") from None
+    data = parse_json(text, str(path))
     features = data.get("features") if isinstance(data, dict) else None
     if not isinstance(features, list):
         raise InputError(f"{path}: has no list of features; allowed: a GeoJSON FeatureCollection")
@@ -139,7 +130,7 @@ def _place(path: Path, name: str, columns: Sequence[str], values: Sequence[Any])
         except (TypeError, ValueError, OverflowError):
             number = math.nan
         if not math.isfinite(number):
-            raise InputError(f"{path}: {name}: {column} is {value!r}; allowed: a number")
+            raise InputError(f"{path}: {name}: {column} is {shown(value)}; allowed: a number")
         numbers.append(number)
     return Place(name, *numbers)
 

@@ -112,14 +112,19 @@ class Cheapest(StrictTable):
     procedure: Literal["cheapest"]
     requirements: dict[Share, Number] = Field(min_length=1, description="metric -> its least mean")
     tolerance: Number = Field(
-        0.005, gt=0, description="half-width of the zone in which either verdict is acceptable"
+        0.005,
+        ge=1e-6,
+        le=0.5,
+        description="half-width of the zone in which either verdict is acceptable",
     )
-    indifference: Number = Field(gt=0, description="the least saving that matters, in the currency")
+    indifference: Number = Field(
+        ge=1e-9, le=10**15, description="the least saving that matters, in the currency"
+    )
     first: Integer = Field(
         20, ge=2, le=MOST, description="missions of every design point in round one"
     )
     confidence: Number = Field(
-        0.95, gt=0.5, lt=1, description="probability that all statements hold"
+        0.95, gt=0.5, le=0.999_999, description="probability that all statements hold"
     )
     budget: Integer = Field(
         100_000, ge=2, le=MOST, description="missions over all design points at most"

@@ -9,13 +9,16 @@ expected total cost.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.study.stopping import StrictTable
+from analysis.study.stopping import MOST, StrictTable
 from dess.scenario import Integer, Number, ScenarioSpace
+
+# A price; the sums of all missions that may be planned are still finite.
+Price = Annotated[float, Field(ge=0, le=10**12, allow_inf_nan=False)]
 
 PARTS = ("purchase", "charging", "hours", "losses")
 
@@ -31,14 +34,17 @@ class Costs(StrictTable):
     """
 
     currency: str = Field("EUR", min_length=1, max_length=16, description="name of the currency")
-    uav: Number = Field(0.0, ge=0, description="price of a UAV")
-    pad: Number = Field(0.0, ge=0, description="price of a charging pad")
-    charge: Number = Field(0.0, ge=0, description="price of charging a battery from 0 to 100 %")
-    hour: Number = Field(0.0, ge=0, description="price of an hour of a mission")
-    lost_uav: Number = Field(0.0, ge=0, description="price of a UAV whose battery is depleted")
-    missions: Integer = Field(1, ge=1, description="missions that the fleet is to fly")
+    uav: Price = Field(0.0, description="price of a UAV")
+    pad: Price = Field(0.0, description="price of a charging pad")
+    charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")
+    hour: Price = Field(0.0, description="price of an hour of a mission")
+    lost_uav: Price = Field(0.0, description="price of a UAV whose battery is depleted")
+    missions: Integer = Field(1, ge=1, le=MOST, description="missions that the fleet is to fly")
     slot_seconds: Number | None = Field(
-        None, gt=0, description="length of a mission slot [s]; needed for the price of an hour"
+        None,
+        ge=0.001,
+        le=1_000_000,
+        description="length of a mission slot [s]; needed for the price of an hour",
     )
 
     @model_validator(mode="after")

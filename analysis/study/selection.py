@@ -99,8 +99,10 @@ class Selection(StrictTable):
     first: Integer = Field(
         20, ge=2, le=MOST, description="missions of every design point in round one"
     )
-    indifference: Number = Field(gt=0, description="the least lead of the best that matters")
-    confidence: Number = Field(0.95, gt=0.5, lt=1, description="probability of finding it")
+    indifference: Number = Field(
+        ge=1e-9, le=10**9, description="the least lead of the best that matters"
+    )
+    confidence: Number = Field(0.95, gt=0.5, le=0.999_999, description="probability of finding it")
     budget: Integer = Field(
         100_000, ge=2, le=MOST, description="missions over all design points at most"
     )

@@ -17,7 +17,7 @@ from scipy.special import ndtri, stdtrit
 
 from analysis.names import BOUNDED
 from analysis.stats.bounded import LEVEL, bounded_ends
-from dess.errors import one_of, validation_line
+from dess.errors import one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
 Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
@@ -48,7 +48,7 @@ def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
             return value
         kind = value.get(key)
         if not isinstance(kind, str) or kind not in kinds:
-            raise ValueError(f"{key}: {kind!r} is unknown{one_of(kind, kinds)}")
+            raise ValueError(f"{key}: {shown(kind)} is unknown{one_of(kind, kinds)}")
         try:
             return kinds[kind].model_validate(value)
         except ValidationError as error:
@@ -60,8 +60,12 @@ def of_its_kind(key: str, *models: type[BaseModel]) -> BeforeValidator:
 class Target(StrictTable):
     """How narrow an interval must be; one of the two half-widths has to be reached."""
 
-    absolute: Number | None = Field(None, gt=0, description="half-width in units of the metric")
-    relative: Number | None = Field(None, gt=0, description="half-width as a share of |mean|")
+    absolute: Number | None = Field(
+        None, ge=1e-9, le=10**9, description="half-width in units of the metric"
+    )
+    relative: Number | None = Field(
+        None, ge=1e-9, le=10**9, description="half-width as a share of |mean|"
+    )
 
     @model_validator(mode="after")
     def _is_given(self) -> Self:

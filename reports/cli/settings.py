@@ -4,13 +4,13 @@ Values are in TOML syntax: ``setting("initial_data=[5, 20]")`` is ``("initial_da
 """
 
 import math
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
+from dess.files import parse_toml
 from reports.cli import completion
 
 if TYPE_CHECKING:
@@ -71,13 +71,13 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
     """
     key, equals, value = text.partition("=")
     try:
-        parsed = tomllib.loads(f"value = {value}")
-    except tomllib.TOMLDecodeError as error:
-        parsed = {"error": error}
+        parsed = parse_toml(f"value = {value}", option)
+    except InputError:
+        parsed = {}
     if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
         if option == SET and value.strip():
             check_words(key.strip(), value.strip())
-        raise InputError(f"{option}: {text!r} is not KEY=VALUE; allowed: {allowed}")
+        raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
 
 
@@ -94,7 +94,7 @@ def check_words(field: str, value: str) -> None:
         raise InputError(f"{SET}: {field}: unknown key{one_of(field, ScenarioSpace.model_fields)}")
     known = ScenarioSpace.model_fields[field]
     problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
-    raise InputError(f"{SET}: {field}: {value!r} {problem}; allowed: {form_of(known)}")
+    raise InputError(f"{SET}: {field}: {shown(value)} {problem}; allowed: {form_of(known)}")
 
 
 def _is_plain(value: Any) -> bool:

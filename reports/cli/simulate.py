@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 
@@ -184,7 +184,7 @@ def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T
         raise InputError(f"--{option}: the study has {len(there):,}; allowed: one of {allowed}")
     if given not in there:
         end = one_of(given, map(str, there)) if isinstance(given, str) else f"; allowed: {allowed}"
-        raise InputError(f"--{option}: {given!r} is not in the study{end}")
+        raise InputError(f"--{option}: {shown(given)} is not in the study{end}")
     return given
 
 

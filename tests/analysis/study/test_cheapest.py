@@ -256,9 +256,9 @@ def test_a_choice_needs_the_missions_of_round_one():
         ({"requirements": {"reward": 0.9}}, "'success', 'collection_ratio'"),
         ({"requirements": {"success": 1.2}}, "1.2 is out of range; allowed: between 0.005"),
         ({"requirements": {"success": 0.0}}, "0 is out of range"),
-        ({"indifference": 0.0}, "greater than 0"),
-        ({"tolerance": 0.0}, "greater than 0"),
-        ({"confidence": 1.0}, "less than 1"),
+        ({"indifference": 0.0}, "greater than or equal to 0.00"),
+        ({"tolerance": 0.0}, "greater than or equal to 0.00"),
+        ({"confidence": 1.0}, "less than or equal to 0.99"),
         ({"metric": "success"}, "metric"),
     ],
 )

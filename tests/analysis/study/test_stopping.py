@@ -269,7 +269,7 @@ def test_intervals_of_skewed_values_cover_the_mean_after_stopping():
         ({"targets": {}}, "targets"),
         ({"targets": {"speed": {"absolute": 1.0}}}, "'success', 'collection_ratio'"),
         ({"targets": {"reward": {}}}, "allowed: absolute, relative, or both"),
-        ({"targets": {"reward": {"absolute": 0.0}}}, "greater than 0"),
+        ({"targets": {"reward": {"absolute": 0.0}}}, "greater than or equal to 0.000000001"),
         ({"targets": {"reward": {"relative": float("inf")}}}, "finite"),
         ({"targets": {"reward": {"absolut": 1.0}}}, "absolut"),
         ({"targets": {"reward": {"absolute": 1.0}}, "first": 1}, "first"),

@@ -127,7 +127,7 @@ BAD = {
     "selection = {procedure = 'kn', indifference = 0.1}\n"
     "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
     "selection = {procedure = 'kn', indifference = -0.1}": [
-        "selection: kn: indifference: -0.1 is out of range; allowed: a number above 0",
+        "selection: kn: indifference: -0.1 is out of range; allowed: a number 1e-09..1,000,000,000",
     ],
     "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
         "selection.budget: 8",
@@ -149,7 +149,7 @@ BAD = {
         "selection: cheapest: requirements.speed",
         "'success', 'collection_ratio' or 'collection_ratio_and_communication'",
     ],
-    "costs.uav = -1": ["costs.uav", "-1 is out of range; allowed: a number from 0"],
+    "costs.uav = -1": ["costs.uav", "-1 is out of range; allowed: a number 0..1,000,000,000,000"],
     "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
     "missions = ": ["not valid TOML"],
     "missions = 1\n[design": ["not valid TOML"],

@@ -52,7 +52,7 @@ def test_a_scenario_is_shown_field_by_field(dess, dess_json):
     assert fields["cell_size"] == {
         "meaning": "side of a cell (c)",
         "unit": "m",
-        "allowed": "a number above 0",
+        "allowed": "a number 0.01..100,000",
         "default": 800.0,
         "value": 800.0,
     }

@@ -105,7 +105,7 @@ BAD = {
     "--set nodes=[[1,1]] --set grid=8,9 --policy ddqn": "policy ddqn: has learned grid 32, not 8",
     "--policy gredy": "'gredy' is unknown",
     "--missions 0": "--missions",
-    "--price uav=-1": "costs.uav: -1 is out of range; allowed: a number from 0",
+    "--price uav=-1": "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000,000",
     "--price uav": "--price: 'uav' is not KEY=VALUE; allowed: a price",
     "--price hour=3": "slot_seconds: is missing",
     "--price uav=1 --price uav=2": "--price: uav is given twice",
