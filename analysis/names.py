@@ -53,12 +53,12 @@ class Parameter(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The name with its unit as a label in a figure, with indices in TeX notation."""
+        """The name with its unit as a label in a figure, with indices in TeX (``parse_math``)."""
         return _tex(f"{self.name} [{self.unit}]".removesuffix(" []"))
 
     @property
     def tick(self) -> str:
-        """The short name in a figure."""
+        """The short name in a figure, with indices in TeX (``parse_math``)."""
         return _tex(self.short)
 
 

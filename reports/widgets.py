@@ -228,4 +228,5 @@ def _plain(value: Any) -> Any:
 def _answer(asked: WhatIf) -> str:
     caption = f"n = {asked.missions:,} pairs per policy, 95 % intervals."
     figure = html.figure(asked.plot(), "Paired differences of the metrics", caption)
-    return f'<div style="max-width: 44rem">{markdown2html(asked.answer())}{figure.data}</div>'
+    answer = markdown2html(html.composed(asked.answer()))
+    return f'<div style="max-width: 44rem">{answer}{figure.data}</div>'

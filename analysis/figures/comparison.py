@@ -60,7 +60,8 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
                         markerfacecolor="white" if row.verdict == INCONCLUSIVE else colour,
                         fmt="o", markersize=6, color=colour, capsize=4, elinewidth=1.8,
                         gid=row.verdict)  # fmt: skip
-        ax.set(title=parameter(field).label, ylabel="mean difference [points]")
+        ax.set_title(parameter(field).label, parse_math=True)
+        ax.set(ylabel="mean difference [points]")
         ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
         ax.set_xticks(rows["position"], rows["value"])
         style.points_axis(ax.yaxis, 6)
@@ -96,7 +97,8 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
         ax.set_yticks(np.arange(len(names)) + 0.5, names)
         ax.invert_yaxis()
         ax.tick_params(length=0)
-        ax.set(xlabel=parameter(second).label, ylabel=parameter(first).label)
+        ax.set_xlabel(parameter(second).label, parse_math=True)
+        ax.set_ylabel(parameter(first).label, parse_math=True)
         ax.set_title("Mean difference [points]")
         sns.despine(ax=ax, left=True, bottom=True)
     return figure

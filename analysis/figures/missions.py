@@ -238,6 +238,7 @@ def _map_legend(ax: Axes) -> None:
 def _margin_note(text: str, level: float, ax: Axes) -> None:
     """A note in the right margin, at a level of the y axis."""
     note = style.note_at_right(text, level, ax, 8.5)
+    note.set_parse_math(True)
     note.set_in_layout(False)  # so that all maps of a gallery have the same size
 
 

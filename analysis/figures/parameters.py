@@ -50,7 +50,8 @@ def effect(
             ylabel="points",
         )
         axes[3].yaxis.set_major_formatter(FuncFormatter(style.signed_points))
-        axes[3].set(xlim=(-0.4, len(values) - 0.6), xlabel=parameter(field).label)
+        axes[3].set(xlim=(-0.4, len(values) - 0.6))
+        axes[3].set_xlabel(parameter(field).label, parse_math=True)
         axes[3].set_xticks(range(len(values)), values)
         for ax in axes:
             style.round_ticks(ax.yaxis, 5)
@@ -79,7 +80,8 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
         ax.axvline(0, color=style.INK, linewidth=0.8, zorder=1)
         for y in rows.index[rows["parameter"] == NOISE]:
             ax.axhline(y - 0.5, color=style.MUTED, linewidth=0.9, linestyle=":")
-        ax.set_yticks(range(len(rows)), [_tick(name) for name in rows["parameter"]])
+        names = [_tick(name) for name in rows["parameter"]]
+        ax.set_yticks(range(len(rows)), names, parse_math=True)
         ax.set(title=title, ylim=(len(rows) - 0.5, -0.5), xlabel="share of the variance")
         ax.xaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         style.legend_below(figure, ax, 2)

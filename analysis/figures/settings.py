@@ -70,10 +70,11 @@ def plot(
             _curves(part, x, looks, settings.varied(results)[x], ax)
             ax.set(title=f"{metric_name(metric)}{': ' * bool(name)}{name}")
             _of_metric(ax.yaxis, metric)
-        axes.flat[-1].set_xlabel(parameter(x).label)
+        axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
         title = parameter(hue).label if hue else None
         handles = axes.flat[0].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
+        legend = figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
+        legend.get_title().set_parse_math(True)
     return figure
 
 
@@ -119,15 +120,16 @@ def heat_map(
             ends = rows["mean"].min(), rows["mean"].max()
             mesh = _cells(part, (len(values[y]), len(values[x])), ends, metric, columns, ax)
             if value is not None:
-                ax.set_title(f"{parameter(str(facet)).tick} {value_text(value)}", fontsize=9)
+                title = f"{parameter(str(facet)).tick} {value_text(value)}"
+                ax.set_title(title, fontsize=9, parse_math=True)
             _name_ticks(ax.xaxis, values[x], MOST_TICKS if columns == 1 else 4, 0.5)
             _name_ticks(ax.yaxis, values[y], MOST_TICKS if columns == 1 else 5, 0.5)
         for ax in axes.flat[len(facets) :]:
             ax.set_visible(False)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
         _of_metric(bar.ax.yaxis, metric)
-        figure.supxlabel(parameter(x).label, fontsize=10)
-        figure.supylabel(parameter(y).tick, fontsize=10)
+        figure.supxlabel(parameter(x).label, fontsize=10, parse_math=True)
+        figure.supylabel(parameter(y).tick, fontsize=10, parse_math=True)
         figure.suptitle(f"{metric_name(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
                         ha="left")  # fmt: skip
     return figure
@@ -152,7 +154,8 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
             ticks = part.drop_duplicates("position").sort_values("position")["value"].tolist()
             style.policy_means(part, "position", looks, 0.02 * len(ticks), ax)
             _name_ticks(ax.xaxis, ticks, 6)
-            ax.set(xlim=(-0.5, len(ticks) - 0.5), xlabel=_label(field))
+            ax.set(xlim=(-0.5, len(ticks) - 0.5))
+            ax.set_xlabel(_label(field), parse_math=True)
             _of_metric(ax.yaxis, metric)
         figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)
@@ -183,7 +186,7 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
                 _name_ticks(ax.xaxis, names, 6)
             elif len(places) <= 6:
                 ax.set_xticks(places)
-            ax.set_xlabel(_label(field))
+            ax.set_xlabel(_label(field), parse_math=True)
             _of_metric(ax.yaxis, metric)
         figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)

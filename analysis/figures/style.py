@@ -48,6 +48,7 @@ _LOOK = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "grid.color": GRID,
+    "text.parse_math": False,  # names are no formulas; a label with an index switches it on
 }
 
 

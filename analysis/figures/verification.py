@@ -40,7 +40,8 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
         figure, (ax, below) = _panels()
         ax.bar(spots, table["expected"], 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
-        ax.set(title=title, ylabel="observations")
+        ax.set_title(title, parse_math=True)
+        ax.set(ylabel="observations")
         if table["expected"].max() > 100 * table["expected"].min():
             ax.set_yscale("log")
             ax.set_ylim(bottom=max(table[["expected", "observed"]].min().min(), 1) / 3)

@@ -42,7 +42,7 @@ missions = head_to_head.duels(study, pair)
 # ## Differences in the same missions
 
 # %%
-html.say(head_to_head.introduction(study, pair, missions))
+html.say("{text}", text=html.composed(head_to_head.introduction(study, pair, missions)))
 
 # %% [markdown]
 # Unless another metric is named, differences are in collection ratio and communication (the product
@@ -188,7 +188,7 @@ caption = (
     "median to the 95 % quantile of the calls; it is not a confidence interval."
 )
 display(
-    html.say(decision_costs.remarks(times, study, pair)),
+    html.say("{remarks}", remarks=decision_costs.remarks(times, study, pair)),
     html.figure(figures.decision_time(costs, study.policies), alt, caption),
     html.table(decision_costs.listed(times, costs), "Times of decisions, and the speed they allow"),
 )

@@ -172,7 +172,9 @@ html.say(
     "From which step on the exponential moving average of collection ratio and communication does "
     "not improve any more. Minutes are elapsed time, and other programs may have slowed the "
     "training down.\n\n{courses}",
-    courses="\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped),
+    courses=html.composed(
+        "\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped)
+    ),
 )
 
 # %% [markdown]
@@ -183,7 +185,7 @@ html.say(
 
 # %%
 curves = "python -m reports.tools.learning_curves --out runs/learning"
-html.say(html.commands([curves, *policies.commands(shipped)]))
+html.say("{lines}", lines=html.commands([curves, *policies.commands(shipped)]))
 
 # %%
 html.table(policies.settings_table(shipped))

@@ -102,7 +102,7 @@ html.say(
 # ## The decision
 
 # %%
-html.say("{answers}", answers="\n".join(f"- {line}" for line in answer.answers()))
+html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer.answers())))
 
 # %% [markdown]
 # The table lists the settings by cost, the cheapest first. The verdict on the

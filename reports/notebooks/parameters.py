@@ -59,7 +59,7 @@ html.say(
     "panel, shows most. This panel has its own axis. Nearly all missions succeed, since both "
     "policies act under the return guard, which allows only actions after which a UAV can still "
     "reach the charging zone in time.",
-    policies=numbers.words([f"**{policy}**" for policy in policies]),
+    policies=html.composed(numbers.words([f"**{policy}**" for policy in policies])),
     n=effects["n"].min(),
 )
 
@@ -104,7 +104,7 @@ html.say(
     "rules of the replication scorecard. A claim is inconclusive if the missions are too few for "
     "either answer. The claims overlap, so the number of verdicts is not a score.\n\n{claims}",
     leading=leading,
-    claims=scorecard.listed(rows),
+    claims=html.composed(scorecard.listed(rows)),
 )
 
 # %% [markdown]
@@ -113,12 +113,13 @@ html.say(
 # %%
 html.say(
     "Of {n:,} settings, the one with the highest mean of {metric} was selected for every policy, "
-    "by `{rule[procedure]}` with an indifference of {margin}. The mean of a selected setting tends "
-    "to be too high, because it was selected for its high mean. So each selected setting was "
-    "simulated in {rule[check]:,} additional missions, and only these are compared with the "
-    "paper's numbers (means of {paper:,} missions, with all parameters at their best).",
+    "by {procedure} with an indifference of {margin}. The mean of a selected setting tends to be "
+    "too high, because it was selected for its high mean. So each selected setting was simulated "
+    "in {rule[check]:,} additional missions, and only these are compared with the paper's numbers "
+    "(means of {paper:,} missions, with all parameters at their best).",
     n=len(sweet.manifest["points"]),
     metric=names.METRICS[rule["metric"]].lower(),
+    procedure=html.code(rule["procedure"]),
     rule=rule,
     margin=numbers.margin(scorecard.margin(studies)),
     paper=paper.SWEET_SPOT_MISSIONS,
@@ -147,13 +148,14 @@ html.table(
 )
 
 # %%
-html.say("The guarantees of the selections:\n\n{known}", known=sweet_spot.guarantees(sweet))
+known = html.composed(sweet_spot.guarantees(sweet))
+html.say("The guarantees of the selections:\n\n{known}", known=known)
 
 # %%
 contrary = sweet_spot.against_main_effects(sweet, effects, changes)
 if contrary:
     intro = "By the main effects above, some selected values are lower than another value:"
-    display(html.say("{intro}\n\n{contrary}", intro=intro, contrary=contrary))
+    display(html.say("{intro}\n\n{contrary}", intro=intro, contrary=html.composed(contrary)))
 
 # %% [markdown]
 # ## Sensitivity: which parameters matter

@@ -65,7 +65,7 @@ html.table(
 )
 
 # %%
-html.say(guard_in_words(overall))
+html.say("{text}", text=html.composed(guard_in_words(overall)))
 
 # %%
 best = best_policy(table4.missions)

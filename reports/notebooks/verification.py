@@ -44,7 +44,7 @@ band = f"the band below, which contains all dots in {level} of such figures."
 # the number of these checks (Holm), is too small.
 
 # %%
-display(Markdown(checks.overall(judged)))
+display(html.say("{text}", text=html.composed(checks.overall(judged))))
 caption = "Every check: the value known from theory, the value observed, and the verdict"
 html.table(checks.as_text(judged), caption, wrap=True)
 
@@ -60,7 +60,7 @@ html.table(checks.as_text(judged), caption, wrap=True)
 # %%
 html.say(
     "{verdicts} There are {n:,} logs; the mean is {rate:g} data units per node and slot.",
-    verdicts=checks.on_topics(judged, checks.ARRIVALS),
+    verdicts=html.composed(checks.on_topics(judged, checks.ARRIVALS)),
     rate=space.arrival_rate,
     n=len(suite.realisations),
 )
@@ -91,7 +91,7 @@ html.gallery(figures)
 # %%
 html.say(
     "{verdicts} The logs have {n:,} communications.",
-    verdicts=checks.on_topics(judged, checks.CHANNEL),
+    verdicts=html.composed(checks.on_topics(judged, checks.CHANNEL)),
     n=sum((log.events["event"] == "communication").sum() for log in suite.logs),
 )
 
@@ -111,8 +111,9 @@ html.figure(
 # random draws in a replication, and that missions simulated again with SimPy give the same records.
 
 # %%
-verdicts = checks.on_topics(judged, *checks.BOOKKEEPING)
-html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=suite.names)
+verdicts = html.composed(checks.on_topics(judged, *checks.BOOKKEEPING))
+names = html.composed(suite.names)
+html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=names)
 
 # %% [markdown]
 # ## The draws of a mission
@@ -121,7 +122,7 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 # distributions.
 
 # %%
-Markdown(checks.on_topics(judged, checks.DRAWS))
+html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS)))
 
 # %%
 figures = [
@@ -153,7 +154,7 @@ html.gallery(figures)
 # successes; the exact coverage is known from the hypergeometric distribution, and is compared here.
 
 # %%
-verdicts = checks.on_topics(judged, checks.COVERAGE)
+verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))
 html.say("{verdicts} The blocks have missions of {best}.", verdicts=verdicts, best=suite.best)
 
 # %%

@@ -52,7 +52,7 @@ html.table(asked.fields(), f"Scenario {asked.scenario}, {asked.missions:,} missi
 # ## The answer
 
 # %%
-html.say("{answer}", answer=asked.answer())
+html.say("{answer}", answer=html.composed(asked.answer()))
 
 # %% [markdown]
 # These are paired differences with their 95 % confidence intervals. A difference is
@@ -126,7 +126,8 @@ html.table(asked.pairing(), f"Differences of n = {asked.missions:,} pairs")
 
 # %%
 typical = asked.typical()
-html.say("{effect}\n\n{lines}", effect=typical.effect(), lines=html.commands(typical.commands()))
+lines = html.commands(typical.commands())
+html.say("{effect}\n\n{lines}", effect=html.composed(typical.effect()), lines=lines)
 
 # %%
 html.gallery(typical.drawings())
@@ -139,7 +140,8 @@ html.gallery(typical.drawings())
 
 # %%
 worst = asked.worst()
-html.say("{effect}\n\n{lines}", effect=worst.effect(), lines=html.commands(worst.commands()))
+lines = html.commands(worst.commands())
+html.say("{effect}\n\n{lines}", effect=html.composed(worst.effect()), lines=lines)
 
 # %%
 html.gallery(worst.drawings())
@@ -166,7 +168,8 @@ html.gallery(worst.drawings())
 
 # %%
 command = html.commands([asked.command()])
-html.say("{command}\n\n```toml\n{study}```", command=command, study=asked.as_toml())
+study = html.block("toml", asked.as_toml().rstrip("\n"))
+html.say("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
 # ## Where the figures come from

@@ -1,6 +1,9 @@
 """Parts of a page as HTML or Markdown: sentences, tables, figures, and the origin of results.
 
-html.say("{n:,} missions per policy.", n=300)
+Results may come from anybody, so no name in them is ever markup: whatever is inserted into HTML or
+Markdown is escaped here.
+
+html.say("{n:,} missions of {policy}.", n=300, policy="greedy")
 html.table(frame, "Means with 95 % intervals")
 html.gallery([(drawing, "Success of every policy", "n = 300 missions")])
 """
@@ -11,7 +14,10 @@ import re
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Sequence
 from html import escape
+from numbers import Number
 from pathlib import Path
+from string import Formatter
+from typing import Any
 
 import matplotlib as mpl
 import pandas as pd
@@ -22,6 +28,7 @@ from analysis.numbers import span
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import Results
 from analysis.study.study import budget_of
+from dess.errors import printable
 
 SHORT = 12  # characters of a hash that are shown
 STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contain evidence
@@ -34,17 +41,68 @@ DIGITS = "%.6g"  # format of numbers in files with data
 _IN_LATEX = str.maketrans(
     {"−": "$-$", "–": "--", "▲": r"$\triangle$", "▼": r"$\nabla$", "≈": r"$\approx$", "±": r"$\pm$"}
 )
+# What may harm in Markdown (HTML, links, formulas), and all that Markdown may take as markup.
+_HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
+_MARKUP = re.compile(
+    rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<!\w)_|_(?!\w)|^[-+=#]|^\d+(?=[.)])"  # the last: in a line
+)
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
-def say(text: str, **values: object) -> Markdown:
-    """Markdown with values in it, as ``say("{n:,} missions", n=300)``."""
-    return Markdown(text.format(**values))
+class Marked(str):
+    """Markdown in which every name is escaped."""
 
 
-def commands(lines: Iterable[str]) -> str:
+class _Escaping(Formatter):
+    """Fills a text in Markdown with values, and escapes all that are neither numbers nor marked."""
+
+    def format_field(self, value: Any, form: str) -> str:
+        shown = super().format_field(value, form)
+        return shown if isinstance(value, Marked | Number) else text(shown)
+
+
+def say(template: str, **values: object) -> Markdown:
+    """Markdown with values in it, as ``say("{n:,} missions of {policy}", n=300, policy=name)``."""
+    return Markdown(marked(template, **values))
+
+
+def marked(template: str, **values: object) -> Marked:
+    """The text of ``say``, which is a value for another ``say``."""
+    return Marked(_Escaping().vformat(template, (), values))
+
+
+def text(name: object) -> Marked:
+    """Any text, such as a name, in Markdown: on the page it is the same text, and nothing else."""
+    line = printable(re.sub(r"\s+", " ", str(name)))
+    return Marked(_MARKUP.sub(_entity, line))
+
+
+def code(name: object) -> Marked:
+    """Any text in Markdown, set as code."""
+    return Marked(f"<code>{text(name)}</code>")
+
+
+def composed(sentences: str) -> Marked:
+    """Markdown that ``analysis`` made of its own words and of names.
+
+    Emphasis, code and lists stay; HTML, links, images and formulas become plain text.
+    """
+    return Marked(_HARMFUL.sub(_entity, sentences))
+
+
+def _entity(found: re.Match[str]) -> str:
+    return f"&#{ord(found[0][0])};{found[0][1:]}"
+
+
+def block(kind: str, content: str) -> Marked:
+    """A block of code in Markdown; the content cannot end it."""
+    fence = "`" * max(3, 1 + max(map(len, re.findall("`+", content)), default=0))
+    return Marked(f"{fence}{kind}\n{content}\n{fence}")
+
+
+def commands(lines: Iterable[str]) -> Marked:
     """A block of shell commands in Markdown, to be copied at once."""
-    return "\n".join(["```sh", *lines, "```"])
+    return block("sh", "\n".join(lines))
 
 
 def provenance(studies: Iterable[Results]) -> HTML:

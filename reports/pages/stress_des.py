@@ -17,11 +17,13 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from analysis.numbers import level, words
+from analysis import numbers
+from analysis.numbers import level
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from policies.registry import descriptions
+from reports.pages.html import Marked, code, marked, text
 from reports.pages.template import template
 
 Manifest = Mapping[str, Any]
@@ -63,19 +65,30 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
         "pads": space.charging_pads,
         "zone_x": (x, x + width - 1),
         "zone_y": (y, y + height - 1),
-        "drawn": [f"`{f}` {_span(ends)}" for f, ends in ranges.items() if ends[0] < ends[1]],
-        "swept": [f"`{field}`" for field in _swept([manifest, *others])],
+        "drawn": [
+            marked("{field} {span}", field=code(field), span=_span(ends))
+            for field, ends in ranges.items()
+            if ends[0] < ends[1]
+        ],
+        "swept": [code(field) for field in _swept([manifest, *others])],
         "policies": _policies([manifest, *others]),
-        "events": [f"`{name}`" for name in EVENT_NAMES],
+        "events": [code(name) for name in EVENT_NAMES],
         "level": level(LEVEL),
         "python": libraries.pop("python"),
         "libraries": [f"{library} {version}" for library, version in libraries.items()],
         "licence": about["License-Expression"] or about["License"],
     }
-    page = template("stress_des.md", words=words, number=_number, span=_span, counted=_counted)
-    text: Any = page.make_module(values)
-    sections = {part[4]: part.strip() for part in _HEADING.split(str(text)) if part.strip()}
-    return Description(sections, (text.steps, text.repeated, text.end), _parameters(space))
+    page = template(
+        "stress_des.md", words=_words, code=code, number=_number, span=_span, counted=_counted
+    )
+    module: Any = page.make_module(values)
+    sections = {part[4]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
+    return Description(sections, (module.steps, module.repeated, module.end), _parameters(space))
+
+
+def _words(names: Iterable[str]) -> Marked:
+    """A list of names as ``a, b and c`` in Markdown."""
+    return Marked(numbers.words([n if isinstance(n, Marked) else text(n) for n in names]))
 
 
 def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:

@@ -8,11 +8,12 @@ from markupsafe import Markup
 from pygments.formatters import HtmlFormatter
 
 import dess
+from reports.pages.html import Marked, text
 from reports.pages.verify import sealed
 
 
 def template(name: str, **filters: Callable[..., str]) -> Template:
-    """Load a template, which escapes values if it is HTML and raises an error if one is undefined.
+    """Load a template, which escapes values and raises an error if one is undefined.
 
     Args:
         name: File name in ``reports/templates``.
@@ -23,9 +24,14 @@ def template(name: str, **filters: Callable[..., str]) -> Template:
         autoescape=select_autoescape(),
         undefined=StrictUndefined,
         trim_blocks=True,
+        finalize=_in_markdown if name.endswith(".md") else None,
     )
     environment.filters |= filters
     return environment.get_template(name)
+
+
+def _in_markdown(value: object) -> object:
+    return value if isinstance(value, int | float | Marked) else text(value)
 
 
 def fill(name: str, **values: Any) -> str:

@@ -83,13 +83,13 @@ def parts_table(results: Results) -> HTML:
     return html.table(shown, caption, data=rows)
 
 
-def cheapest(results: Results) -> str:
+def cheapest(results: Results) -> html.Marked:
     """The cheapest settings that meet the requirements, with reasons and guarantee, as a list."""
     table = questions.judged(results)
     lines = [f"- {text}" for text in questions.answers(results, table)]
     said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
-    return "\n".join(lines) + f"\n\n{sure}"
+    return html.composed("\n".join(lines) + f"\n\n{sure}")
 
 
 def judged_table(results: Results) -> HTML:

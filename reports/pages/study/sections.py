@@ -7,6 +7,7 @@ where the study has what the tag names, with all its tags; ``TAGS`` says what th
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,7 +18,7 @@ from analysis.questions.settings import varied
 from analysis.results.tables import Results, load_results
 from analysis.study.cheapest import Cheapest
 from analysis.study.selection import Selection
-from reports.pages import notebook
+from reports.pages import html, notebook
 from reports.pages.notebook import SHIPPED, Report, tags_of
 from reports.pages.study import words
 
@@ -49,8 +50,10 @@ def report_of(
     points = len(results.store.manifest.points)
     where = f"{points:,} design points" if points > 1 else f"the scenario {study['scenario']}"
     description = study["description"] or f"{numbers.words(results.policies)} at {where}."
-    original.cells[0].source = f"# Study {study['name']}\n\n{description}"
-    return notebook.report_of(f"{PREFIX}{study['name']}", original)
+    title = f"Study {study['name']}"
+    original.cells[0].source = f"# {html.text(title)}\n\n{html.text(description)}"
+    report = notebook.report_of(f"{PREFIX}{study['name']}", original)
+    return replace(report, title=title, description=" ".join(description.split()))
 
 
 def _kind(results: Results) -> str:

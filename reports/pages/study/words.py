@@ -52,23 +52,28 @@ def written(metric: str) -> Callable[[float, float, float], str]:
     return numbers.interval if metric in METRICS else numbers.quantities
 
 
-def simulated(results: Results) -> str:
+def simulated(results: Results) -> html.Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
     study, points = manifest.study, len(manifest.points)
     fixed = [f"{parameter(field).within} {_set(value)}" for field, value in study["set"].items()]
+    policies = numbers.words([html.code(policy) for policy in results.policies])
     missions = numbers.span(n for of_policy in manifest.missions for n in of_policy)
     each = f" per policy{' and design point' * (points > 1)}"
     lines = [
-        f"- **Scenario:** `{study['scenario']}`{', with ' * bool(fixed)}{numbers.words(fixed)}.",
-        f"- **Policies:** {numbers.words([f'`{policy}`' for policy in results.policies])}.",
+        html.marked(
+            "- **Scenario:** {scenario}{fixed}.",
+            scenario=html.code(study["scenario"]),
+            fixed=", with " * bool(fixed) + numbers.words(fixed),
+        ),
+        f"- **Policies:** {policies}.",
         *_design(results),
         f"- **Missions:** {missions}{each}, {len(results.missions):,} in all.",
     ]
-    return "\n".join(lines)
+    return html.Marked("\n".join(lines))
 
 
-def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
+def answer(results: Results, ranked: pd.DataFrame, metric: str) -> html.Marked:
     """The best setting, and how many settings may be as good.
 
     Args:
@@ -80,7 +85,7 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
     value = written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     where = settings.in_words(results)[best["point"]]
     what = "setting" if settings.varied(results) else "policy"
-    name = f"`{best['policy']}`" + f" with {where}" * (where != settings.AS_IT_IS)
+    setting = html.marked(" with {where}", where=where) if where != settings.AS_IT_IS else ""
     if others == 1:
         rest = f" The other {what} {'may be as good' if tied else 'is significantly worse'}."
     elif not tied:
@@ -89,37 +94,50 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
         rest = (
             f" Of the {others:,} others, {tied:,} may be as good; the rest are significantly worse."
         )
-    return f"**The best {what} is {name}: {metric_name(metric).lower()} {value}.**{rest}"
+    return html.marked(
+        "**The best {what} is {policy}{setting}: {metric} {value}.**{rest}",
+        what=what,
+        policy=html.code(best["policy"]),
+        setting=setting,
+        metric=metric_name(metric).lower(),
+        value=value,
+        rest=rest,
+    )
 
 
-def guarantees(results: Results) -> str:
+def guarantees(results: Results) -> html.Marked:
     """What is guaranteed about the selections, as a list."""
     rows = summary.selections(results).itertuples()
-    return "\n".join(f"- {row.policy}: {row.guarantee}" for row in rows)
+    lines = [html.marked("- {name}: {known}", name=row.policy, known=row.guarantee) for row in rows]
+    return html.Marked("\n".join(lines))
 
 
-def commands(results: Results, missions: pd.DataFrame) -> str:
+def commands(results: Results, missions: pd.DataFrame) -> html.Marked:
     """The commands that simulate missions again, and the folder that they name.
 
     Args:
         results: The study.
         missions: Rows of ``summary.worst``.
     """
-    return (
-        f"These commands simulate them again. `{results.usual_folder}` stands for the results "
-        f"folder of the study, wherever it is:\n\n{html.commands(missions['command'])}"
+    return html.marked(
+        "These commands simulate them again. {folder} stands for the results folder of the study, "
+        "wherever it is:\n\n{lines}",
+        folder=html.code(results.usual_folder),
+        lines=html.commands(missions["command"]),
     )
 
 
-def _design(results: Results) -> Iterator[str]:
+def _design(results: Results) -> Iterator[html.Marked]:
     """The fields that the design varies, as items of the list."""
     points = len(results.store.manifest.points)
     kind = (results.manifest["study"]["design"] or {}).get("kind", "grid")
     if fields := settings.varied(results):
-        yield f"- **Design:** `{kind}`, {points:,} design points. It varies:"
+        line = "- **Design:** {kind}, {points:,} design points. It varies:"
+        yield html.marked(line, kind=html.code(kind), points=points)
     for field, values in fields.items():
-        unit = parameter(field).unit
-        yield f"    - {parameter(field).within}{f' [{unit}]' * bool(unit)}: {_values(values)}"
+        unit = f" [{parameter(field).unit}]".removesuffix(" []")
+        line = "    - {field}{unit}: {values}"
+        yield html.marked(line, field=parameter(field).within, unit=unit, values=_values(values))
 
 
 def _values(values: Sequence[Any]) -> str:
