@@ -1,4 +1,7 @@
-"""The index of a folder of pages: a card per page, the scorecard, and the origin of the results."""
+"""The index of a folder of pages: a card per page, the scorecard, and the origin of the results.
+
+Anybody may have made a page in the folder. So of older pages, the index takes only what cannot run.
+"""
 
 import logging
 import re
@@ -11,6 +14,7 @@ from markupsafe import Markup
 
 from analysis.results.evidence import Evidence
 from dess import InputError
+from dess.files import read_bytes
 from reports.pages import html
 from reports.pages.notebook import NAMES, SCORECARD, Report
 from reports.pages.study.sections import PREFIX
@@ -20,10 +24,23 @@ from reports.pages.verify import is_sealed
 log = logging.getLogger(__name__)
 
 INDEX = "index.html"
-_IMAGE = re.compile(r"<img [^>]+>")
-_TITLE, _LEAD = re.compile("<h1>(.*?)</h1>", re.S), re.compile('<p class="lead">(.*?)</p>', re.S)
+LARGEST = 512 * 2**20  # bytes of a page
+_IMAGE = re.compile(
+    """<img alt=("[^"<>]*"|'[^'<>]*')( class="tall")? """
+    r'src="data:image/svg\+xml;base64,[\w+/=]+"/?>',
+    re.ASCII,
+)
+_TITLE, _LEAD = re.compile("<h1>([^<]*)</h1>"), re.compile('<p class="lead">([^<]*)</p>')
 _OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
 _SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
+# What a scorecard consists of: text, and tags with a few attributes.
+_TAG = (
+    "</?(section|style|p|strong|span|small|sub|ul|li|a|details|summary|table|thead|tbody|tr|th|td)"
+    r'( (id|class|scope|colspan|data-label)="[^"<>]*"| href="[\w-]+\.html(#[\w-]*)?")*>'
+)
+_PLAIN = re.compile(rf"([^<]++|{_TAG})*+", re.ASCII)
+_STYLE = re.compile("<style>(.*?)</style>", re.S)
+_REQUESTS = re.compile(r"@import|url|image|src|\\", re.I)
 
 
 @dataclass(frozen=True)
@@ -77,8 +94,8 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
     names = (*(f"{name}.html" for name in NAMES), *studies)
     for path in (out / name for name in names if name not in but):
         try:
-            content = path.read_bytes().decode()
-            if not is_sealed(content):
+            content = read_bytes(path, LARGEST).decode()
+            if not is_sealed(content) or not _is_plain("".join(_SCORECARD.findall(content))):
                 raise InputError("altered")
             _evidence([content])
         except FileNotFoundError:
@@ -88,6 +105,12 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
         else:
             pages[path.name] = content
     return pages
+
+
+def _is_plain(html: str) -> bool:
+    """Whether HTML has only what scorecards consist of, such as no script and no image."""
+    styles = "".join(_STYLE.findall(html))
+    return bool(_PLAIN.fullmatch(html)) and not _REQUESTS.search(styles)
 
 
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
@@ -107,5 +130,5 @@ def _card_of_study(name: str, content: str) -> Card:
 
 def _thumbnail(content: str, number: int) -> Markup:
     """An image of a page (of a report the last one, which shows most), or nothing without one."""
-    images = _IMAGE.findall(content)
+    images = [image[0] for image in _IMAGE.finditer(content)]
     return Markup(images[number] if images else "")

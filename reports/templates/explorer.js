@@ -90,7 +90,7 @@ function drawCurve(positions, policies) {
 }
 
 function options(positions) {
-    const quoted = (setting) => /[^\w.=-]/.test(setting) ? `'${setting}'` : setting;
+    const quoted = (setting) => /[^\w.=-]/.test(setting) ? `'${setting.replaceAll("'", `'\\''`)}'` : setting;
     return sliders.map((slider, n) => `--set ${quoted(slider.settings[positions[n]])}`).join(" ");
 }
 
