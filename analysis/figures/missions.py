@@ -5,6 +5,7 @@ Each function takes the event log of the mission (a data frame, or the columns, 
 them together. Nothing touches pyplot's state.
 """
 
+import matplotlib as mpl
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -210,6 +211,7 @@ def _ends(slots: pd.DataFrame, uav: int, colour: str, ax: Axes) -> None:
                     fontweight="bold", zorder=9)  # fmt: skip
 
 
+@mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX
 def _map_legend(ax: Axes) -> None:
     """The symbols of the map (Table I)."""
 

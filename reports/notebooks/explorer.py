@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [explorer]
+#     scripts: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [fig1, fig4]
+#     scripts: true
 #   jupytext:
 #     text_representation:
 #       extension: .py

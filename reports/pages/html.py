@@ -41,11 +41,10 @@ DIGITS = "%.6g"  # format of numbers in files with data
 _IN_LATEX = str.maketrans(
     {"−": "$-$", "–": "--", "▲": r"$\triangle$", "▼": r"$\nabla$", "≈": r"$\approx$", "±": r"$\pm$"}
 )
-# What may harm in Markdown (HTML, links, formulas), and all that Markdown may take as markup.
+# What may harm in Markdown (HTML, links, formulas), and all that Markdown may take as markup,
+# partly at the beginning of a line only.
 _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
-_MARKUP = re.compile(
-    rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<!\w)_|_(?!\w)|^[-+=#]|^\d+(?=[.)])"  # the last: in a line
-)
+_MARKUP = re.compile(rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#]|^\d+(?=[.)])")
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
@@ -64,7 +63,8 @@ class _Escaping(Formatter):
 
 def say(template: str, **values: object) -> Markdown:
     """Markdown with values in it, as ``say("{n:,} missions of {policy}", n=300, policy=name)``."""
-    return Markdown(marked(template, **values))
+    shown = marked(template, **values)
+    return Markdown(f"\n{shown}" if shown.startswith("http") else shown)  # it would be requested
 
 
 def marked(template: str, **values: object) -> Marked:

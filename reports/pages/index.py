@@ -78,8 +78,8 @@ def index_of(
     files = dict.fromkeys(text for page in contents for text in html.embedded(html.FILES, page))
     origins = html.carrying(_evidence(contents), files)
     scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
-    values = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
-    return fill(INDEX, cards=cards, left_out=left_out, **values)
+    parts = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
+    return fill(INDEX, scripts=False, cards=cards, left_out=left_out, **parts)
 
 
 def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:

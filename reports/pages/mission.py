@@ -20,4 +20,4 @@ def mission_page(events: Events, scenario: Scenario, title: str, outcome: str) -
     """
     played = player(events, scenario, "mission", caption=READING)
     parts = {"library": library().data, "player": played.data}
-    return fill("mission.html", title=title, outcome=outcome, **parts)
+    return fill("mission.html", scripts=True, title=title, outcome=outcome, **parts)

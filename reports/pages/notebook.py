@@ -1,9 +1,9 @@
 """The notebooks of reports: read from their files, with values for their parameters.
 
 A notebook is a Python file in jupytext's percent format. Its heading and first paragraph are the
-title and the description of the page. Its metadata name the studies that it reads. One of its cells
-is tagged ``parameters``. Cells tagged ``jupyter`` are only for the notebook that opens in Jupyter;
-they are neither run for the page nor shown on it:
+title and the description of the page. Its metadata name the studies that it reads, and tell whether
+its page has scripts. One of its cells is tagged ``parameters``. Cells tagged ``jupyter`` are only
+for the notebook that opens in Jupyter; they are neither run for the page nor shown on it:
 
     report = read("what-if")
     report.set({"missions": 500})
@@ -53,6 +53,7 @@ class Report:
         title: Its heading.
         description: The paragraph below the heading.
         studies: Names of the results folders that it reads.
+        scripts: Whether the page has scripts, such as those of sliders.
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
         begun: Id of the cell that was begun last.
@@ -65,6 +66,7 @@ class Report:
     title: str
     description: str
     studies: list[str]
+    scripts: bool
     original: NotebookNode
     notebook: NotebookNode
     begun: str = ""
@@ -142,8 +144,10 @@ def report_of(name: str, original: NotebookNode) -> Report:
     notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
     drop(notebook, IN_JUPYTER)
-    studies = original.metadata["dess"]["studies"]
-    return Report(name, title, " ".join(description.split()), studies, original, notebook)
+    about = original.metadata["dess"]
+    studies, scripts = about["studies"], about.get("scripts", False)
+    description = " ".join(description.split())
+    return Report(name, title, description, studies, scripts, original, notebook)
 
 
 def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:

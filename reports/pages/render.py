@@ -210,7 +210,7 @@ def _page(report: Report) -> str:
     """The page of a report that has been run."""
     code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
     body = html_of(report.notebook)
-    return fill("report.html", report=report, body=body, code=Markup(code))
+    return fill("report.html", scripts=report.scripts, report=report, body=body, code=Markup(code))
 
 
 def html_of(notebook: NotebookNode) -> str:

@@ -34,7 +34,12 @@ def _in_markdown(value: object) -> object:
     return value if isinstance(value, int | float | Marked) else text(value)
 
 
-def fill(name: str, **values: Any) -> str:
-    """Fill a template with values, and seal the page."""
+def fill(name: str, scripts: bool = False, **values: Any) -> str:
+    """Fill a template with values, and seal the page.
+
+    A browser makes no request for the page, and runs a script only if ``scripts`` is set.
+    """
     style = Markup(HtmlFormatter().get_style_defs(".highlight"))
-    return sealed(template(name).render(code_style=style, version=dess.__version__, **values))
+    return sealed(
+        template(name).render(scripts=scripts, code_style=style, version=dess.__version__, **values)
+    )

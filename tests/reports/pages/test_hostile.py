@@ -1,0 +1,143 @@
+"""Pages of results that somebody made to harm their reader: no name in them is ever markup."""
+
+import re
+import shutil
+from collections.abc import Callable
+from html import unescape
+from pathlib import Path
+
+import matplotlib as mpl
+import pandas as pd
+import pytest
+from nbconvert.filters import markdown2html
+
+from analysis import run_study
+from analysis.figures import style
+from reports.pages import html
+from reports.pages.index import index_of, pages_in
+from reports.pages.parameters import values_of, with_values
+from reports.pages.render import render_study
+from reports.pages.verify import sealed
+from tests.analysis.hostile import hostile_folder
+from tests.analysis.small import small_study
+from tests.reports.browser import Visit
+from tests.reports.small import Links
+
+ATTACK = (
+    "<script>window.hit=1</script><img src=x onerror=window.hit=1>\"'[x](javascript:window.hit=1)"
+    "![y](http://example.org/y.png) `*__a__|$\\foo$ {x} </h1>-->]]>"
+)
+# One of these in a name is enough to change how Markdown reads the rest.
+NAMES = [
+    *(ATTACK, "<b>", "&lt;b&gt;", "`a` b", "**a** _b_ ~~c~~", "[a](b)", "[a]: b", "![a](b)"),
+    *("<https://example.org>", "https://example.org", "$a$ $$b$$", "\\[a\\]", "{x.__class__}"),
+    *("# a", "- a", "1. a", "> a", "=== a", "a\n\n# b", "a\n---", "```\na", "a | b"),
+]
+HARMLESS = r"</?(p|strong|em|del|code|pre|ul|ol|li|h[1-6]|blockquote|hr|br)( /)?>"
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of a study all of whose free strings are an attack."""
+    folder = tmp_path_factory.mktemp("hostile")
+    run_study(small_study(folder), folder / "sound")
+    return render_study(hostile_folder(folder / "sound", folder / "made", ATTACK), folder / "out")
+
+
+def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page: Path) -> None:
+    for name in (page.name, "index.html"):
+        found = Links((page.parent / name).read_text("utf-8"))
+        assert unescape(found.outside_scripts).count(ATTACK) >= 2
+        assert not found.tags & {"iframe", "object", "form", "base", "link"}
+        assert all(re.match(r"data:|[\w-]+\.(html|ipynb)$|$", link) for link in found.found)
+        images = re.findall("<img[^>]*>", found.outside_scripts)
+        assert images and all(re.fullmatch('<img alt="[^"<>]*" src=""/?>', i) for i in images)
+
+
+def test_a_hostile_page_runs_nothing(page: Path, visit: Callable[[Path, int], Visit]) -> None:
+    for name in (page.name, "index.html"):
+        opened = visit(page.parent / name, 1000)
+        assert opened.page.evaluate("window.hit") is None
+        assert opened.requests == [(page.parent / name).as_uri()]
+        assert opened.complaints == []
+        widths = opened.page.evaluate("[...document.images].map((image) => image.naturalWidth)")
+        assert widths and all(widths)
+
+
+def test_a_script_in_a_page_without_scripts_does_not_run(
+    page: Path, tmp_path: Path, visit: Callable[[Path, int], Visit]
+) -> None:
+    """The second wall: even markup that was not escaped."""
+    markup = "<script>window.hit=1</script><img src='http://example.org/' onerror='window.hit=1'>"
+    path = tmp_path / "page.html"
+    path.write_text(page.read_text("utf-8").replace("</main>", f"{markup}</main>"), "utf-8")
+    opened = visit(path, 1000)
+    assert opened.page.evaluate("window.hit") is None
+    assert len(opened.complaints) == 2  # about the script and the image
+    assert all("Content Security Policy" in complaint for complaint in opened.complaints)
+
+
+def test_the_index_takes_no_markup_from_a_forged_page(page: Path, tmp_path: Path) -> None:
+    """Not even if its seal is right."""
+    out = tmp_path / "out"
+    shutil.copytree(page.parent, out)
+    forged = page.read_text("utf-8").replace("<h1>", "<h1><script>window.hit=1</script>", 1)
+    forged = forged.replace('class="lead">', 'class="lead"><b onclick="window.hit=1">', 1)
+    forged = forged.replace("<img ", '<img onload="window.hit=1" ')
+    (out / "study-forged.html").write_bytes(sealed(forged).encode())
+    claim = '<section id="scorecard"><p onclick="window.hit=1">a claim</p></section>'
+    (out / "scorecard.html").write_bytes(
+        sealed(forged.replace("</main>", f"{claim}</main>")).encode()
+    )
+    assert {*pages_in(out)} == {page.name, "study-forged.html"}
+    index = index_of(pages_in(out), [])
+    assert "study-forged.html" in index
+    assert "<script>" not in index and "onclick=" not in index and "onload=" not in index
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_in_markdown_is_text(name: str) -> None:
+    line = " ".join(name.split())
+    shown = markdown2html(html.say("A {name} and {code}.", name=name, code=html.code(name)).data)
+    assert {*re.findall("<[^>]*>", shown)} == {"<p>", "</p>", "<code>", "</code>"}
+    assert unescape(re.sub("<[^>]*>", "", shown)).strip() == f"A {line} and {line}."
+    assert unescape(markdown2html(html.say("{name}", name=name).data)).strip() == f"<p>{line}</p>"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_composed_markdown_has_neither_html_nor_links(name: str) -> None:
+    line = " ".join(name.split())
+    shown = markdown2html(html.say("{text}", text=html.composed(f"- **{line}**: `{line}`")).data)
+    assert "<" not in re.sub(HARMLESS, "", shown)
+
+
+def test_a_block_of_commands_cannot_be_left() -> None:
+    lines = ["a", "```", "<b>", "`````"]
+    shown = markdown2html(html.say("{lines}", lines=html.commands(lines)).data)
+    assert shown.count("<pre>") == 1
+    assert unescape(re.sub("<[^>]*>", "", shown)).split() == lines
+
+
+@pytest.mark.parametrize("name", ["$\\foo$", "$", "a$b$c", "\\$x"])
+def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
+    with style.look():
+        drawing, axes = style.panels(3)
+        axes.plot([1, 2], label=name)
+        axes.set_title(name)
+        style.legend_below(drawing, axes)
+    assert html.svg(drawing)
+    assert mpl.rcParams["text.parse_math"]
+
+
+def test_a_name_is_no_formula_in_a_spreadsheet() -> None:
+    names = ["=1+1", "+1", "-1", "@x", "\t=1", "a=1", "a"]
+    rows = html.csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
+    assert [row.startswith("'") for row in rows] == [True] * 5 + [False] * 2
+    assert all(row.endswith(",-1.5") for row in rows)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "'''\nimport os\n'''", '"\\', "\ud800", "a\0b"])
+def test_a_parameter_cannot_become_code(name: str) -> None:
+    source = with_values("policy = 'greedy'  # the policy\nseed = 0", {"policy": name})
+    assert values_of(source) == {"policy": name, "seed": 0}
+    assert source.count("\n") == 1
