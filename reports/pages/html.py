@@ -44,7 +44,9 @@ _IN_LATEX = str.maketrans(
 # What may harm in Markdown (HTML, links, formulas), and all that Markdown may take as markup,
 # partly at the beginning of a line only.
 _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
-_MARKUP = re.compile(rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#]|^\d+(?=[.)])")
+_MARKUP = re.compile(
+    rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#](?!\d)|^\d+(?=[.)](\s|$))"
+)
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 

@@ -73,7 +73,7 @@ def test_a_script_in_a_page_without_scripts_does_not_run(
     path.write_text(page.read_text("utf-8").replace("</main>", f"{markup}</main>"), "utf-8")
     opened = visit(path, 1000)
     assert opened.page.evaluate("window.hit") is None
-    assert len(opened.complaints) == 2  # about the script and the image
+    assert len(opened.complaints) == 3  # about the script, the image and its handler
     assert all("Content Security Policy" in complaint for complaint in opened.complaints)
 
 

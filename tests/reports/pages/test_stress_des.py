@@ -63,7 +63,12 @@ def words(data: dict[str, Any], *others: dict[str, Any]) -> str:
     description = stress_des.describe(data, others)
     steps, *rest = description.overview
     texts = [*description.sections.values(), *rest, *(word for step in steps for word in step)]
-    return "\n".join([*texts, *description.parameters["Value"]])
+    return in_backticks("\n".join([*texts, *description.parameters["Value"]]))
+
+
+def in_backticks(text: str) -> str:
+    """Code in backticks, as it stands in the template."""
+    return re.sub("</?code>", "`", text)
 
 
 def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
@@ -71,7 +76,7 @@ def items(data: dict[str, Any], *others: dict[str, Any]) -> dict[str, str]:
     sections = "\n".join(stress_des.describe(data, others).sections.values())
     parts = re.split(r"^(?:\*\*([\d.]+) [^*]+\.\*\*|### .*)", sections, flags=re.M)[1:]
     pairs = zip(parts[::2], parts[1::2], strict=True)
-    return {number: " ".join(text.split()) for number, text in pairs if number}
+    return {number: " ".join(in_backticks(text).split()) for number, text in pairs if number}
 
 
 def test_every_item_of_the_checklist_is_on_the_page() -> None:
