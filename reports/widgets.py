@@ -190,7 +190,9 @@ def _slider(sides: Sequence[ScenarioSpace], side: int, field: str) -> widgets.Wi
         slider = (widgets.IntRangeSlider if is_range else widgets.IntSlider)(**options)
     else:
         digits = max(-math.floor(math.log10((high - low) / STEPS)), 0)
-        options |= {"step": 10.0**-digits, "readout_format": f".{digits}f"}
+        steps = 10.0**digits  # the slider counts its steps from its lower end
+        options |= {"min": math.floor(low * steps) / steps, "step": 1 / steps}
+        options |= {"readout_format": f".{digits}f"}
         slider = (widgets.FloatRangeSlider if is_range else widgets.FloatSlider)(**options)
     slider.layout.width = "auto"
     return slider.add_class(f"dess-{SIDES[side]}-{field}")

@@ -6,9 +6,12 @@ import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, TextIO
 
-from dess.errors import cut, printable
+from dess.errors import InputError, cut, printable
+from dess.files import replacing_all
 
 MESSAGE = 300  # the longest line that says why a command fails
 _STREAMS = {"stdout": "standard output", "stderr": "standard error"}
@@ -83,6 +86,34 @@ def say(text: object, stream: TextIO | None = None) -> None:
     """Print text on stdout or another stream, with escapes for all control characters."""
     lines = str(text).expandtabs().split("\n")
     print("\n".join(map(printable, lines)), file=stream or sys.stdout, flush=True)
+
+
+@contextmanager
+def outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Yield a temporary path for each file that a command writes; they are replaced together.
+
+    ``-`` and ``/dev/stdout`` mean standard output, where the content is written at the end.
+
+    Raises:
+        InputError: If a file cannot be written, or if standard output is a terminal.
+    """
+    files = [path for path in paths if not is_stdout(path)]
+    if len(files) < len(paths) and sys.stdout.isatty():
+        raise InputError("-: standard output is a terminal; allowed: a file, or a pipe")
+    with replacing_all(files) as temporaries:
+        if len(files) == len(paths):
+            yield temporaries
+            return
+        with TemporaryDirectory() as folder:
+            buffer, rest = Path(folder, "stdout"), iter(temporaries)
+            yield [buffer if is_stdout(path) else next(rest) for path in paths]
+            sys.stdout.buffer.write(buffer.read_bytes())
+            sys.stdout.flush()
+
+
+def is_stdout(path: Path) -> bool:
+    """Whether the name of an output means standard output."""
+    return str(path) in ("-", "/dev/stdout")
 
 
 def print_list(entries: Iterable[tuple[str, str]]) -> None:

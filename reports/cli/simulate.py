@@ -3,7 +3,6 @@
 import json
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -73,7 +72,8 @@ def simulate(
     events: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE.parquet", help="Write the event log of the mission into this file."
+            metavar="FILE.parquet",
+            help="Write the event log of the mission into this file; - for standard output.",
         ),
     ] = None,
     figure: Annotated[
@@ -91,7 +91,7 @@ def simulate(
 ) -> None:
     """Simulate one mission with the SimPy model."""
     from dess import simulate
-    from dess.files import replacing
+    from dess.files import writable
     from dess.state import check_seed, sample_scenario
     from policies import load_team
 
@@ -112,18 +112,24 @@ def simulate(
 
         check_ffmpeg()
     writers = {events: _write_log, figure: _draw, animation: _animate}
-    with ExitStack() as files:
-        written = {path: files.enter_context(replacing(path)) for path in writers if path}
+    paths = [path for path in (events, figure, animation) if path]
+    if len({path.absolute() for path in paths}) < len(paths):
+        raise InputError("--events, --figure: the same file; allowed: a file for each")
+    is_binary = events is not None and console.is_stdout(events)
+    if is_binary and as_json:
+        raise InputError("--json: standard output has the event log; allowed: --events FILE")
+    with console.outputs(paths) as temporaries:
         with console.compile_notice():
             which = asked.seed, asked.replication
-            record = simulate(asked.space, team, *which, events=bool(written))
+            record = simulate(asked.space, team, *which, events=bool(paths))
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
-        for path, temporary in written.items():
-            writers[path](mission, temporary, path.suffix[1:])
+        for path, temporary in zip(paths, temporaries, strict=True):
+            with writable(path):
+                writers[path](mission, temporary, path.suffix[1:])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
         print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()}, indent=2))
-    else:
+    elif not is_binary:
         _print_mission(record)
 
 

@@ -4,6 +4,7 @@ write_animation(log, scenario, "mission.gif", GIF)
 """
 
 from pathlib import Path
+from subprocess import CalledProcessError
 from typing import Any
 
 import numpy as np
@@ -38,18 +39,22 @@ def write_animation(
     Raises:
         InputError: If the log is not that of a whole mission of this scenario, or if ffmpeg is
             missing for a video.
+        OSError: If the file cannot be written.
     """
     if kind == MP4:
         check_ffmpeg()
     writer = _GifWriter(SLOTS_PER_SECOND) if kind == GIF else _video_writer()
     with style.look():
         film = Film(events, scenario, title)
-        with writer.saving(film.figure, str(file), film.figure.dpi):
-            for slot in range(film.end + 1):
-                film.show(slot)
-                writer.grab_frame()
-            for _ in range(LAST_SECONDS * SLOTS_PER_SECOND):
-                writer.grab_frame()
+        try:
+            with writer.saving(film.figure, str(file), film.figure.dpi):
+                for slot in range(film.end + 1):
+                    film.show(slot)
+                    writer.grab_frame()
+                for _ in range(LAST_SECONDS * SLOTS_PER_SECOND):
+                    writer.grab_frame()
+        except CalledProcessError as error:
+            raise OSError(f"ffmpeg failed with exit code {error.returncode}") from error
 
 
 def check_ffmpeg() -> None:

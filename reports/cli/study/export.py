@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from dess.files import replacing
 from reports.cli import console
 from reports.cli.report import rendering
 
 
 def export(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A results folder.")],
-    crate: Annotated[Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write.")],
+    crate: Annotated[
+        Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write; - for standard output.")
+    ],
     page: Annotated[
         Path | None,
         typer.Option(
@@ -36,10 +37,11 @@ def export(
     results, licence = load_results(folder), licence_of(licence)
     if page:
         check_page(page, results)
-    with replacing(crate) as temporary, TemporaryDirectory() as pages:
+    with console.outputs([crate]) as (temporary,), TemporaryDirectory() as pages:
         if page is None:
             with rendering() as progress:
                 page = render_study(folder, pages, progress)
         write_crate(results, page, temporary, date.today(), licence)
-    missions = f"{len(results.missions):,} missions"
-    console.say(f"{crate}: {missions} with {page.name}, licence {licence}")
+    if not console.is_stdout(crate):
+        missions = f"{len(results.missions):,} missions"
+        console.say(f"{crate}: {missions} with {page.name}, licence {licence}")

@@ -175,9 +175,7 @@ REFUSED = {
     "policies: Tuple should have at least 1": {"policies": []},
     "missions: 0 is out of range; allowed: an integer 1..": {"missions": 0},
     "name: String should match": {"name": "../mine"},
-    "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000,000": {
-        "prices": {"uav": -1}
-    },
+    "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000": {"prices": {"uav": -1}},
     "prices: 'uaf' is unknown; allowed: currency, uav": {"prices": {"uaf": 1}},
     "requirements: need prices": {"requirements": {"success": 0.9}},
     "requirements: 'speed' is unknown; allowed: success": {

@@ -1,6 +1,13 @@
 """``dess simulate``: its JSON, the event log, the figure."""
 
+import io
+import os
+import resource
 import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -157,4 +164,87 @@ def test_a_failed_simulation_keeps_the_old_log(dess, tmp_path, monkeypatch):
     before = files_of(tmp_path)
     line = "interrupted: run the same command again to complete it\n"
     assert dess("simulate", "--events", "log.parquet") == (130, "", line)
+    assert files_of(tmp_path) == before
+
+
+OUTPUTS = {
+    "events": "log.parquet",
+    "figure": "mission.png",
+    "animation": "mission.gif",
+}
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """Files cannot grow beyond a size, as on a disk that is full."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+@pytest.mark.parametrize("option", OUTPUTS)
+def test_a_full_disk_is_a_line_and_leaves_nothing(dess, tmp_path, option):
+    command = ("simulate", "--scenario", "small.toml", f"--{option}", OUTPUTS[option])
+    assert dess(*command)[0] == 0  # compiled
+    (tmp_path / OUTPUTS[option]).write_bytes(b"old")
+    before = files_of(tmp_path)
+    with full_disk(1000):
+        code, out, err = dess(*command)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"{OUTPUTS[option]}: cannot be written: " in err
+    assert files_of(tmp_path) == before
+
+
+def test_an_error_leaves_none_of_the_files_of_a_command(dess, tmp_path):
+    os.mkfifo(tmp_path / "mission.gif")
+    before = files_of(tmp_path)
+    options = [word for name, file in OUTPUTS.items() for word in (f"--{name}", file)]
+    code, out, err = dess("simulate", "--scenario", "small.toml", *options)
+    assert (code, out) == (2, "")
+    assert "mission.gif: is a pipe; allowed: a file" in err
+    (tmp_path / "mission.gif").unlink()
+    assert dess("simulate", "--scenario", "small.toml", *options)[0] == 0
+    for file in OUTPUTS.values():
+        (tmp_path / file).unlink()
+    with full_disk(7000):  # the log fits, which is written first
+        assert dess("simulate", "--scenario", "small.toml", *options)[0] == 2
+    assert files_of(tmp_path) == before
+
+
+@pytest.mark.parametrize("option", OUTPUTS)
+def test_no_device_is_replaced(dess, tmp_path, option):
+    path = tmp_path / OUTPUTS[option]
+    path.symlink_to("/dev/full")
+    code, out, err = dess("simulate", "--scenario", "small.toml", f"--{option}", path.name)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"{path.name}: is a device; allowed: a file" in err
+    assert path.is_symlink()
+    assert Path("/dev/full").is_char_device()
+
+
+@pytest.mark.parametrize("name", ["-", "/dev/stdout"])
+def test_the_event_log_can_be_standard_output(dess, tmp_path, monkeypatch, name):
+    command = ("simulate", "--scenario", "small.toml", "--events")
+    assert dess(*command, "log.parquet")[0] == 0
+    stream = io.TextIOWrapper(binary := io.BytesIO())
+    with monkeypatch.context() as patches:
+        patches.setattr(sys, "stdout", stream)
+        assert dess(*command, name)[0] == 0
+    assert binary.getvalue() == (tmp_path / "log.parquet").read_bytes()
+    code, out, err = dess(*command, name, "--json")
+    assert (code, out) == (2, "")
+    assert "--json: standard output has the event log" in err
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    code, out, err = dess(*command, name)
+    assert (code, out) == (2, "")
+    assert "-: standard output is a terminal; allowed: a file, or a pipe" in err
+
+
+def test_two_outputs_are_two_files(dess, tmp_path):
+    before = files_of(tmp_path)
+    code, out, err = dess("simulate", "--events", "a.png", "--figure", "./a.png")
+    assert (code, out, err.count("\n")) == (2, "", 1)
     assert files_of(tmp_path) == before
