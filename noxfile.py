@@ -1,4 +1,4 @@
-"""The sessions: tests, lint, docs, reports, bench, verify. ``nox -l`` lists them."""
+"""The sessions: tests, lint, docs, reports, bench, verify, fuzz. ``nox -l`` lists them."""
 
 from pathlib import Path
 
@@ -46,6 +46,13 @@ def verify(session: nox.Session) -> None:
     install(session, "[test,docs]")
     slow = ("-m", "slow", "--hypothesis-profile=verify")
     session.run("pytest", "-q", *slow, *SIDE_BY_SIDE, *session.posargs)
+
+
+@nox.session
+def fuzz(session: nox.Session) -> None:
+    """Try bad inputs, signals and forged files; ``-- --minutes 10 --seed N`` are its parameters."""
+    install(session, "[test]")
+    session.run("python", "-m", "tests.fuzz", *session.posargs)
 
 
 @nox.session

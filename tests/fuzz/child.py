@@ -1,0 +1,58 @@
+"""The process of a case: it limits itself, and runs the command."""
+
+import atexit
+import os
+import resource
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
+
+STDOUT, STDERR, STARTED = "stdout", "stderr", "started"  # files in the folder ``log`` of the case
+DATA = 1536 * 2**20  # bytes that a process may allocate, besides those of the loaded libraries
+
+
+def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
+    """Run the command of a case, in a session of its own, and exit with its code."""
+    os.setsid()
+    os.chdir(box / CWD)
+    os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
+    tempfile.tempdir = None
+    sys.argv = ["dess", *case.arguments]
+    _redirect(case, box / LOG)
+    _limit(resource.RLIMIT_DATA, _data_now() + DATA)
+    _limit(resource.RLIMIT_CPU, int(case.seconds) + 1)
+    _limit(resource.RLIMIT_CORE, 0)
+    (box / LOG / STARTED).touch()
+    if case.file_size is not None:
+        _limit(resource.RLIMIT_FSIZE, case.file_size)
+    code = command(case.arguments)
+    atexit._run_exitfuncs()  # a process of multiprocessing does not call them
+    sys.exit(code)
+
+
+def _redirect(case: Case, log: Path) -> None:
+    """Read nothing, and write into files, or into what takes nothing."""
+    write = os.O_WRONLY | os.O_CREAT
+    if case.stdout == "closed":
+        reader, out = os.pipe()
+        os.close(reader)
+    else:
+        out = os.open("/dev/full" if case.stdout == "full" else log / STDOUT, write)
+    streams = (os.open(os.devnull, os.O_RDONLY), out, os.open(log / STDERR, write))
+    for number, stream in enumerate(streams):
+        os.dup2(stream, number)
+        os.close(stream)
+
+
+def _limit(what: int, value: int) -> None:
+    hard = resource.getrlimit(what)[1]
+    resource.setrlimit(what, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def _data_now() -> int:
+    """The bytes of data that this process has, by the count that RLIMIT_DATA is about."""
+    lines = Path("/proc/self/status").read_text().splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData"))

@@ -1,0 +1,177 @@
+"""Runs cases: each in a process that is forked from one that has everything loaded.
+
+The parent of all cases is the fork server of ``multiprocessing``.
+"""
+
+import multiprocessing
+import os
+import shutil
+import signal
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from multiprocessing.connection import wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import psutil
+import pyarrow as pa
+
+from reports.cli import main
+from tests.fuzz import child
+from tests.fuzz.case import FOLDERS, HOME, LOG, Case
+from tests.fuzz.snapshot import Snapshot, taken
+
+AT_ONCE = 2
+_GRACE = 5  # seconds in which the helpers of a command, such as its workers, have to end after it
+# Errors of a step that does not fit what an earlier step has left; it does nothing then.
+_UNFIT = (OSError, ValueError, LookupError, ZeroDivisionError, RecursionError, pa.ArrowException)
+
+Command = Callable[[Sequence[str]], int]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a case has done.
+
+    Attributes:
+        case: The case.
+        box: Its folder.
+        before: What was in it before.
+        after: What was in it afterwards.
+        code: The exit code; that of the second run, if the case has one.
+        seconds: How long it took.
+        late: Whether the command had to be killed because it did not end in its time.
+        left: The processes that it left behind.
+    """
+
+    case: Case
+    box: Path
+    before: Snapshot
+    after: Snapshot
+    code: int
+    seconds: float
+    late: bool
+    left: list[str]
+
+    def text(self, name: str) -> str:
+        """What it printed on ``stdout`` or ``stderr``."""
+        file = self.box / LOG / name
+        return file.read_bytes().decode("utf-8", "surrogateescape") if file.exists() else ""
+
+
+class Forks:
+    """Runs cases, a few at a time, below a folder."""
+
+    def __init__(self, folder: Path, ready: Path, command: Command = main) -> None:
+        """Load everything that commands need, once.
+
+        Args:
+            folder: The folder of all cases.
+            ready: The folder of the ready inputs.
+            command: What is called with the arguments of a case.
+        """
+        self.folder, self.ready, self._command = folder, ready, command
+        # Threads of a case would be in the way of the other; the font list is made once.
+        os.environ |= {"OMP_NUM_THREADS": "1", "MPLCONFIGDIR": str(folder / "matplotlib")}
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(["tests.fuzz.preload", "tests.fuzz.child"])
+
+    def outcomes(self, cases: Iterable[tuple[int, Case]]) -> Iterator[tuple[int, Outcome]]:
+        """Run numbered cases, ``AT_ONCE`` at a time; they come in the order in which they end."""
+        waiting, running = iter(cases), list[_Running]()
+        while True:
+            while len(running) < AT_ONCE and (entry := next(waiting, None)) is not None:
+                running.append(self._start(*entry))
+            if not running:
+                return
+            wait([entry.process.sentinel for entry in running], timeout=0.02)
+            for entry in [entry for entry in running if entry.has_ended()]:
+                running.remove(entry)
+                yield entry.number, entry.outcome()
+
+    def _process(self, case: Case, box: Path) -> BaseProcess:
+        return self._context.Process(target=child.run, args=(case, box, self._command))
+
+    def _start(self, number: int, case: Case) -> "_Running":
+        box = self.folder / str(number)
+        shutil.rmtree(box, ignore_errors=True)
+        for name in FOLDERS:
+            (box / name).mkdir(parents=True)
+        for step in case.steps:
+            with suppress(*_UNFIT):
+                step.do(box, self.ready)
+        return _Running(number, case, box, self._process)
+
+
+class _Running:
+    """A case whose command runs."""
+
+    def __init__(
+        self, number: int, case: Case, box: Path, process_of: Callable[[Case, Path], BaseProcess]
+    ) -> None:
+        self.number, self.case, self.box, self._process_of = number, case, box, process_of
+        self.before, self.began, self.late = taken(box), time.monotonic(), False
+        self._repeated = False
+        self._run(case)
+
+    def _run(self, case: Case) -> None:
+        lasting = [(case.lasting, signal.SIGTERM)] if case.lasting else []
+        self._signals = sorted([*case.signals, *lasting])
+        self.process = self._process_of(replace(case, steps=()), self.box)
+        self.process.start()
+        self._started, self._begins = 0.0, time.monotonic()
+
+    def has_ended(self) -> bool:
+        """Send the signals that are due; the result says whether the case has ended."""
+        if self.process.exitcode is None:
+            self._send()
+            return False
+        if self.case.again and not self._repeated:
+            self._repeated = True
+            shutil.rmtree(self.box / LOG)
+            (self.box / LOG).mkdir()
+            self._run(replace(self.case, signals=(), lasting=0))
+            return False
+        return True
+
+    def _send(self) -> None:
+        now = time.monotonic()
+        if not self._started and (self.box / LOG / child.STARTED).exists():
+            self._started = now
+        while self._signals and self._started and now - self._started > self._signals[0][0]:
+            with suppress(ProcessLookupError):
+                os.kill(self.process.pid, self._signals.pop(0)[1])
+        if now - self._begins > self.case.seconds:
+            self.late = True
+            for process in [psutil.Process(self.process.pid), *self._left()]:
+                with suppress(psutil.NoSuchProcess):
+                    process.kill()
+            self.process.join()
+
+    def outcome(self) -> Outcome:
+        """What the case has done; processes that it left behind are killed."""
+        seconds = time.monotonic() - self.began
+        while (left := self._left()) and time.monotonic() - self.began < seconds + _GRACE:
+            time.sleep(0.05)
+        names = [" ".join(process.info["cmdline"] or ["?"])[:200] for process in left]
+        for process in left:
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+        code, after = self.process.exitcode, taken(self.box)
+        assert code is not None
+        self.process.close()
+        return Outcome(self.case, self.box, self.before, after, code, seconds, self.late, names)
+
+    def _left(self) -> list[psutil.Process]:
+        """The processes in the session of the case, and all others with its home."""
+        home = str(self.box / HOME)
+        left = []
+        for process in psutil.process_iter(["pid", "cmdline", "environ", "status"]):
+            with suppress(ProcessLookupError, psutil.NoSuchProcess):
+                is_of_case = os.getsid(process.pid) == self.process.pid
+                is_of_case |= (process.info["environ"] or {}).get("HOME") == home
+                if is_of_case and process.info["status"] != psutil.STATUS_ZOMBIE:
+                    left.append(process)
+        return [process for process in left if process.pid != self.process.pid]

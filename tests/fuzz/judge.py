@@ -1,0 +1,133 @@
+"""The contract of every command, as a judge of what a case has done."""
+
+import json
+import re
+import stat
+import unicodedata
+import zipfile
+from collections.abc import Callable, Iterator
+from io import BytesIO
+from pathlib import Path
+
+import pyarrow.parquet as pq
+from PIL import Image
+
+from tests.fuzz.child import STDERR, STDOUT
+from tests.fuzz.forks import Outcome
+
+CODES = {0: "done", 1: "failed", 2: "bad input", 130: "interrupted"}
+LINE = 300  # characters
+_BIDI = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}
+_RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach a terminal
+# Lines on standard error that say what a command does, and no error.
+_NEWS = re.compile(
+    r"compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|.*\d(s/|it/|/s).*"
+    r"|replay memory: .*|curves: tensorboard .*"
+)
+# Folders that libraries make and use again, and that have the name of the user.
+_CACHES = ("tmp/torchinductor_",)
+_WARNING = re.compile(r"\.py:\d+: \w*Warning")
+
+
+def findings(outcome: Outcome) -> list[str]:
+    """How an outcome breaks the contract; none if it keeps it."""
+    rules = (_ending, _output, _errors, _files, _nodes)
+    return [finding for rule in rules for finding in rule(outcome)]
+
+
+def _ending(outcome: Outcome) -> Iterator[str]:
+    killed = [-number for _, number in outcome.case.signals if number == 9]
+    if outcome.late:
+        yield f"it did not end within {outcome.case.seconds:g} seconds"
+    elif outcome.code not in (CODES if outcome.case.again else {*CODES, *killed}):
+        yield f"exit code {outcome.code}"
+    for name in outcome.left:
+        yield f"left a process: {name}"
+
+
+def _output(outcome: Outcome) -> Iterator[str]:
+    for stream in (STDOUT, STDERR):
+        text = outcome.text(stream)
+        if "Traceback (most recent call last)" in text or "Exception ignored in" in text:
+            yield f"a traceback on {stream}: {text.strip().splitlines()[-1][:LINE]}"
+        elif _WARNING.search(text):
+            yield f"a warning of Python on {stream}"
+        if raw := sorted({c for c in text if _is_raw(c)} - {"\n", "\r", "\t"}):
+            yield f"raw characters on {stream}: {ascii(raw)[:LINE]}"
+
+
+def _is_raw(character: str) -> bool:
+    return unicodedata.category(character) in _RAW or character in _BIDI
+
+
+def _errors(outcome: Outcome) -> Iterator[str]:
+    lines = [line for line in re.split(r"[\n\r]+", outcome.text(STDERR)) if line.strip()]
+    for line in lines:
+        if "not enough memory" in line:
+            yield "the memory did not suffice; a refusal has to come first"
+        if len(line) > LINE:
+            yield f"a line of {len(line)} characters on stderr: {line[:60]}"
+    errors = [line for line in lines if not _NEWS.fullmatch(line.strip())]
+    if outcome.code in (2, 130) and len(errors) != 1:
+        yield f"{len(errors)} lines in place of one error: {' | '.join(errors)[:LINE]}"
+    if outcome.code == 1 and not errors:
+        yield "exit code 1 without a line that says why"
+
+
+def _files(outcome: Outcome) -> Iterator[str]:
+    for path in sorted(outcome.before.keys() | outcome.after.keys()):
+        before, after = outcome.before.get(path), outcome.after.get(path)
+        is_allowed = any(_is_in(path, folder) for folder in outcome.case.allowed)
+        if before == after or path.startswith(_CACHES):
+            continue
+        if not is_allowed:
+            yield f"{path}: was {before or 'not there'}, is {after or 'not there'}"
+        elif after is not None and _is_temporary(path):
+            yield f"{path}: was left behind"
+        elif after is not None and after.startswith("file") and not _is_whole(outcome.box / path):
+            yield f"{path}: is only a part of a file"
+        elif before is not None and before.startswith("node") and after != before:
+            yield f"{path}: was {before}, is {after}"
+
+
+def _is_in(path: str, folder: str) -> bool:
+    """Whether it is below a folder, or one of the folders above it, which may be made."""
+    return path.startswith(f"{folder}/") or folder.startswith(f"{path}/") or path == folder
+
+
+def _is_temporary(path: str) -> bool:
+    return any(p.endswith(".tmp") or p.startswith(".rendering-") for p in path.split("/"))
+
+
+def _zip(content: bytes) -> None:
+    with zipfile.ZipFile(BytesIO(content)) as archive:
+        assert archive.testzip() is None
+
+
+def _html(content: bytes) -> None:
+    assert content.decode().rstrip().endswith("</html>")
+
+
+_READERS: dict[str, Callable[[bytes], object]] = {
+    ".parquet": lambda content: pq.read_table(BytesIO(content)),
+    ".json": json.loads,
+    ".png": lambda content: Image.open(BytesIO(content)).load(),
+    ".gif": lambda content: Image.open(BytesIO(content)).load(),
+    ".html": _html,
+    ".zip": _zip,
+}
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file that a command has written can be read."""
+    try:
+        _READERS.get(path.suffix, lambda content: None)(path.read_bytes())
+    except Exception:  # whatever the reader raises
+        return False
+    return True
+
+
+def _nodes(outcome: Outcome) -> Iterator[str]:
+    for name in ("null", "zero", "full"):
+        if not stat.S_ISCHR(Path("/dev", name).stat().st_mode):
+            yield f"/dev/{name} is no device any more"

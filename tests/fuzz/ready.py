@@ -1,0 +1,129 @@
+"""The ready inputs of the cases, made once by the project itself: results, a page, a training."""
+
+import shutil
+from importlib import resources
+from pathlib import Path
+
+from tests.fuzz.case import OUT, Case
+from tests.fuzz.child import STDERR
+from tests.fuzz.forks import Forks
+from tests.fuzz.steps import Copy
+
+# The names of the ready inputs.
+SCENARIO, STUDY, SELECTION, TRAINING = "sea.toml", "study.toml", "selection.toml", "training.toml"
+RESULTS, SELECTED, PAGE, POLICY = "results", "selected", "page.html", "policy"
+SHIPPED = ("paper.toml", "bay.toml", "sweet-spot.toml", "sensitivity.toml", "ddqn-paper.toml")
+
+_SEA = """
+description = "a small sea"
+grid = 8
+nodes = [[1, 1], [2, 6], [5, 4]]
+zone = [5, 0, 3, 2]
+uavs = [1, 3]
+flying_time = [20, 30]
+charge_start = [10, 15]
+charge_complete = [40, 60]
+quota = 60
+"""
+_STUDY = """
+description = "a small study"
+scenario = "sea.toml"
+policies = ["greedy", "random"]
+missions = 6
+seed = 7
+logged = 2
+
+[set]
+arrival_rate = 0.02
+
+[design]
+kind = "grid"
+values.uavs = [1, 2]
+"""
+_SELECTION = """
+description = "the cheapest of a few settings"
+scenario = "sea.toml"
+policies = ["greedy"]
+seed = 7
+
+[design]
+kind = "grid"
+values.uavs = [1, 2]
+
+[costs]
+uav = 1000
+hour = 5
+slot_seconds = 60
+currency = "EUR"
+
+[selection]
+procedure = "cheapest"
+first = 20
+budget = 2000
+confidence = 0.9
+indifference = 1
+check = 10
+requirements.success = 0.1
+"""
+_TRAINING = """
+name = "tiny"
+scenario = "../in/sea.toml"
+hidden = [16, 16]
+num_envs = 8
+learning_starts = 60
+replay = 80
+batch = 32
+n_step = 3
+average_rate = 0.01
+evaluate_every = 25
+evaluation_missions = 4
+window = 2
+
+[[phases]]
+name = "harvest"
+ticks = 60
+battery = false
+
+[[phases]]
+name = "battery"
+ticks = 60
+epsilon = [0.5, 0.01]
+epsilon_decay = 0.5
+"""
+
+
+def make(forks: Forks) -> None:
+    """Make the ready inputs in the folder ``forks.ready``.
+
+    Raises:
+        RuntimeError: If a command that makes them fails.
+    """
+    ready = forks.ready
+    write_texts(ready)
+    _run(forks, RESULTS, "study", "run", f"../in/{STUDY}")
+    _run(forks, SELECTED, "study", "run", f"../in/{SELECTION}")
+    _run(forks, POLICY, "train", f"../in/{TRAINING}")
+    _run(forks, "pages", "report", f"../in/{RESULTS}")
+    shutil.copyfile(ready / "pages" / f"study-{Path(STUDY).stem}.html", ready / PAGE)
+
+
+def write_texts(ready: Path) -> None:
+    """Write the scenarios, studies and configs into a new folder: small ones, and the shipped."""
+    ready.mkdir(parents=True)
+    texts = {SCENARIO: _SEA, STUDY: _STUDY, SELECTION: _SELECTION, TRAINING: _TRAINING}
+    for name, text in texts.items():
+        (ready / name).write_text(text, "utf-8")
+    folders = {"dess": "scenarios", "analysis": "study/shipped", "policies": "ddqn/configs"}
+    for package, folder in folders.items():
+        for file in resources.files(package).joinpath(folder).iterdir():
+            (ready / file.name).write_bytes(file.read_bytes())
+
+
+def _run(forks: Forks, name: str, *arguments: str) -> None:
+    steps = [Copy(path.name, f"in/{path.name}") for path in forks.ready.iterdir()]
+    out = ("--out", f"../out/{name}")
+    case = Case("ready", (*arguments, *out), tuple(steps), seconds=600)
+    for _, outcome in forks.outcomes([(0, case)]):
+        if outcome.code != 0:
+            raise RuntimeError(f"dess {' '.join(arguments)} fails: {outcome.text(STDERR)}")
+        shutil.copytree(outcome.box / OUT / name, forks.ready / name)

@@ -1,0 +1,336 @@
+"""Steps: what is done to the files of a case before its command runs.
+
+Paths are relative to the folder of the case. Positions are numbers that are taken modulo the number
+of places there are, so that a step fits any file.
+"""
+
+import json
+import os
+import re
+import shutil
+import stat
+from contextlib import suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from analysis.results.chunks import name_of, short_hash
+from policies.ddqn import tensors
+from policies.ddqn.session import CHECKPOINT
+from reports.pages.verify import sealed
+
+# A place in a document that is replaced by text which need not be JSON.
+_HOLE = "the text of this value is replaced"
+_BLOCK = re.compile(r'<script class="[^"]*" type="application/json">(.*?)</script>')
+# Code that leaves a trace if anything imports or runs it.
+PLANTED = "import pathlib; pathlib.Path(__file__).with_name('{name}.ran').touch()\n"
+
+Edit = tuple[int, Literal["replace", "remove", "rename", "insert"], str]
+
+
+@dataclass(frozen=True)
+class Copy:
+    """Copy a ready input, a file or a folder."""
+
+    name: str
+    path: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        source = ready / self.name
+        if source.is_dir():
+            shutil.copytree(source, box / self.path, dirs_exist_ok=True)
+        else:
+            shutil.copyfile(source, box / self.path)
+
+
+@dataclass(frozen=True)
+class Write:
+    """Write a file."""
+
+    path: str
+    content: bytes
+
+    def do(self, box: Path, ready: Path) -> None:
+        path = box / self.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(self.content)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Change lines of a text, such as TOML: replace a value or a line, remove or repeat a line."""
+
+    path: str
+    edits: tuple[tuple[int, Literal["value", "line", "remove", "repeat"], str], ...]
+
+    def do(self, box: Path, ready: Path) -> None:
+        lines = (box / self.path).read_text("utf-8").splitlines()
+        for position, action, text in self.edits:
+            at = position % max(len(lines), 1)
+            key = lines[at].partition("=")[0] if lines else "key "
+            new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
+            lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
+        text = "\n".join(lines) + "\n"
+        (box / self.path).write_bytes(text.encode("utf-8", "surrogateescape"))
+
+
+@dataclass(frozen=True)
+class Bytes:
+    """Change bytes of a file: each edit writes some at a place, or cuts the file there."""
+
+    path: str
+    edits: tuple[tuple[int, bytes | None], ...]
+
+    def do(self, box: Path, ready: Path) -> None:
+        content = (box / self.path).read_bytes()
+        for position, new in self.edits:
+            at = position % max(len(content), 1)
+            content = content[:at] + (b"" if new is None else new + content[at + len(new) :])
+        (box / self.path).write_bytes(content)
+
+
+@dataclass(frozen=True)
+class Json:
+    """Change a document by edits: places are counted in its text from the outside inwards."""
+
+    path: str
+    edits: tuple[Edit, ...]
+
+    def do(self, box: Path, ready: Path) -> None:
+        text = edited((box / self.path).read_text("utf-8"), self.edits)
+        (box / self.path).write_bytes(text.encode("utf-8", "surrogateescape"))
+
+
+@dataclass(frozen=True)
+class Page:
+    """Change the evidence in a page, and its checksum with it."""
+
+    path: str
+    block: int
+    edits: tuple[Edit, ...]
+    is_sealed: bool = True
+
+    def do(self, box: Path, ready: Path) -> None:
+        html = (box / self.path).read_text("utf-8")
+        blocks = [
+            *re.finditer(r'<script class="[^"]*" type="application/json">(.*?)</script>', html)
+        ]
+        begin, end = blocks[self.block % len(blocks)].span(1)
+        html = html[:begin] + edited(html[begin:end], self.edits) + html[end:]
+        html = html.encode("utf-8", "replace").decode()
+        (box / self.path).write_text(sealed(html) if self.is_sealed else html, "utf-8")
+
+
+@dataclass(frozen=True)
+class Header:
+    """Change the header of a safetensors file: the JSON in it, or that of its metadata."""
+
+    path: str
+    edits: tuple[Edit, ...]
+    is_inner: bool
+
+    def do(self, box: Path, ready: Path) -> None:
+        header, content = _split(box / self.path)
+        if self.is_inner and "dess" in header.get("__metadata__", {}):
+            header["__metadata__"]["dess"] = edited(header["__metadata__"]["dess"], self.edits)
+            text = json.dumps(header)
+        else:
+            text = edited(json.dumps(header), self.edits)
+        _join(box / self.path, text, content)
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """Write the checksums that fit into the files of a training, as a forger would."""
+
+    folder: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        description, path = box / self.folder / "config.json", box / self.folder / CHECKPOINT
+        model = (box / self.folder / "model.safetensors").read_bytes()
+        content = json.loads(description.read_bytes())
+        content["model_sha256"] = [sha256(model).hexdigest()]
+        description.write_text(json.dumps(content), "utf-8")
+        header, data = _split(path)
+        inner = json.loads(header["__metadata__"]["dess"])
+        inner.pop("sha256", None)
+        values, _ = tensors.read(path, len(data) + 2**20)
+        inner["sha256"] = tensors.digest(inner, values)
+        header["__metadata__"]["dess"] = json.dumps(inner)
+        _join(path, json.dumps(header), data)
+
+
+@dataclass(frozen=True)
+class Forged:
+    """Change a parquet file below a folder and give it the name that fits: rows, cells, parts."""
+
+    folder: str
+    position: int
+    change: Literal["bytes", "parts", "rows", "values", "columns", "schema"]
+    text: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        files = sorted((box / self.folder).rglob("*.parquet"))
+        path = files[self.position % len(files)]
+        name = path.stem.rpartition("-")[0]
+        if self.change == "bytes":
+            content = bytearray(path.read_bytes())
+            content[self.position % len(content)] ^= 1 + self.position % 255
+        else:
+            table = pq.read_table(path, partitioning=None)
+            table, name = self._changed(table, name)
+            sink = pa.BufferOutputStream()
+            pq.write_table(table, sink)
+            content = sink.getvalue().to_pybytes()
+        path.unlink()
+        (path.parent / f"{name}-{short_hash(bytes(content))}.parquet").write_bytes(content)
+
+    def _changed(self, table: pa.Table, name: str) -> tuple[pa.Table, str]:
+        if self.change == "parts":
+            with suppress(ValueError, TypeError, RecursionError):
+                name = name_of(json.loads(self.text))
+            parts = self.text.encode("utf-8", "surrogateescape")
+            return table.replace_schema_metadata({b"dess.parts": parts}), name
+        if self.change == "rows":
+            return pa.concat_tables([table] * (self.position % 3)) if self.position % 3 else table[
+                :0
+            ], name
+        if self.change == "schema":
+            return table.cast(pa.schema([(n, pa.string()) for n in table.schema.names])), name
+        at = self.position % table.num_columns
+        if self.change == "columns":
+            return table.remove_column(at), name
+        field = table.schema.field(at)
+        bad = {"f": float("nan"), "i": -(self.position % 2**31), "u": 2**31 - 1}
+        kind = "f" if pa.types.is_floating(field.type) else "i"
+        try:
+            column = pa.array([bad[kind]] * len(table), field.type)
+        except (pa.ArrowException, OverflowError):
+            return table.remove_column(at), name
+        return table.set_column(at, field, column), name
+
+
+@dataclass(frozen=True)
+class Node:
+    """Put something that is no regular file in the place of a path, or beside it."""
+
+    path: str
+    kind: Literal["fifo", "zero", "full", "null", "folder", "loop", "dangling", "socket", "locked"]
+
+    def do(self, box: Path, ready: Path) -> None:
+        path = box / self.path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if self.kind == "locked":  # a folder that cannot be written, nor read
+            path.mkdir(exist_ok=True)
+            path.chmod(0o500)
+            return
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        path.unlink(missing_ok=True)
+        links = {"loop": path.name, "dangling": "nowhere"}
+        if self.kind == "fifo":
+            os.mkfifo(path)
+        elif self.kind == "folder":
+            path.mkdir()
+        elif self.kind in links:
+            path.symlink_to(links[self.kind])
+        else:
+            _device(path, self.kind)
+
+
+@dataclass(frozen=True)
+class Rename:
+    """Rename a file or folder, one of those below a folder."""
+
+    folder: str
+    position: int
+    name: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        paths = sorted((box / self.folder).rglob("*"))
+        path = paths[self.position % len(paths)]
+        try:
+            path.rename(path.parent / self.name)
+        except (OSError, ValueError):  # no such name is possible
+            path.unlink() if path.is_file() else shutil.rmtree(path)
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Put Python files into a folder; if one of them is run, it leaves a file."""
+
+    folder: str
+    names: tuple[str, ...]
+
+    def do(self, box: Path, ready: Path) -> None:
+        for name in self.names:
+            path = box / self.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(PLANTED.format(name=path.name))
+
+
+def _device(path: Path, kind: str) -> None:
+    """A device node of our own, as the machine's must survive; a link to it if that is refused."""
+    if kind == "socket":
+        os.mknod(path, stat.S_IFSOCK | 0o600)
+        return
+    device = Path("/dev", kind)
+    try:
+        os.mknod(path, stat.S_IFCHR | 0o666, device.stat().st_rdev)
+    except PermissionError:
+        path.symlink_to(device)
+
+
+def edited(text: str, edits: tuple[Edit, ...]) -> str:
+    """A JSON text in which values are replaced, removed, renamed or added by any text."""
+    document = json.loads(text)
+    holes = []
+    for position, action, new in edits:
+        places = _places(document)
+        if not places:
+            return new
+        holder, key = places[position % len(places)]
+        hole = f"{_HOLE} {len(holes)}"
+        if action == "remove":
+            del holder[key]
+            continue
+        holes.append(new)
+        if action == "replace":
+            holder[key] = hole
+        elif isinstance(holder, dict):
+            holder[hole] = holder.pop(key) if action == "rename" else None
+        else:
+            holder.insert(key, hole)
+    written = json.dumps(document)
+    for number, new in enumerate(holes):
+        written = written.replace(f'"{_HOLE} {number}"', new)
+    return written
+
+
+def _places(document: Any) -> list[tuple[Any, Any]]:
+    """All values in a document, as their holder and key, the outer ones first."""
+    places, level = [], [document]
+    while level:
+        holders = [value for value in level if isinstance(value, dict | list)]
+        level = []
+        for holder in holders:
+            keys = range(len(holder)) if isinstance(holder, list) else list(holder)
+            places += [(holder, key) for key in keys]
+            level += [holder[key] for key in keys]
+    return places
+
+
+def _split(path: Path) -> tuple[dict[str, Any], bytes]:
+    """The header of a safetensors file, and the bytes after it."""
+    content = path.read_bytes()
+    end = 8 + int.from_bytes(content[:8], "little")
+    return json.loads(content[8:end]), content[end:]
+
+
+def _join(path: Path, header: str, content: bytes) -> None:
+    new = header.encode("utf-8", "replace")
+    path.write_bytes(len(new).to_bytes(8, "little") + new + content)

@@ -1,0 +1,83 @@
+"""Outputs that cannot be written: devices, fifos, links, folders, full disks, names, rights."""
+
+from hypothesis import strategies as st
+
+from tests.fuzz import ready
+from tests.fuzz.case import Case, Step
+from tests.fuzz.steps import Copy, Node, Write
+from tests.fuzz.strategies.folders import NODES
+
+_FLY = ("simulate", "--scenario", f"../in/{ready.SCENARIO}")
+# Commands and the file or folder that they write, ``{}``.
+_FILES = (
+    ((*_FLY, "--events", "{}"), ".parquet"),
+    ((*_FLY, "--events", "{}"), ".parquet"),
+    ((*_FLY, "--figure", "{}"), ".png"),
+    ((*_FLY, "--animation", "{}"), ".gif"),
+    ((*_FLY, "--animation", "{}"), ".html"),
+    (
+        ("study", "export", f"../in/{ready.RESULTS}", "--crate", "{}", "--page", "../in/page.html"),
+        ".zip",
+    ),
+)
+_FOLDERS = (
+    ("study", "run", f"../in/{ready.STUDY}", "--out", "{}"),
+    ("train", f"../in/{ready.TRAINING}", "--out", "{}"),
+    ("timing", "--policy", "greedy", "--missions", "1", "--out", "{}"),
+)
+_PRINTING = (
+    ("studies",),
+    ("scenarios", "show", "paper", "--json"),
+    ("study", "show", f"../in/{ready.RESULTS}"),
+    ("evaluate", "--policy", "greedy", "--missions", "2", "--json"),
+    ("--help",),
+)
+_NAMES = (
+    "a" * 244,
+    "a" * 256,
+    "é" * 130,
+    "a\x00b",
+    "a\nb",
+    "-",
+    "a\udc80b",
+    "a\x1bb",
+    " ",
+    "a/b/c",
+)
+
+_INSIDE = ("manifest.json", ".lock", "missions", "checkpoint.safetensors", "decisions.json")
+
+
+@st.composite
+def outputs(draw: st.DrawFn) -> Case:
+    """A command whose output meets something in its place."""
+    inputs = (ready.SCENARIO, ready.STUDY, ready.TRAINING, ready.RESULTS, ready.PAGE)
+    steps: list[Step] = [Copy(name, f"in/{name}") for name in inputs]
+    if draw(st.integers(0, 4)) == 0:
+        stdout = draw(st.sampled_from(["full", "closed"]))
+        return Case("output", draw(st.sampled_from(_PRINTING)), tuple(steps), stdout=stdout)
+    is_folder = draw(st.booleans())
+    if is_folder:
+        words, ending = draw(st.sampled_from(_FOLDERS)), ""
+    else:
+        words, ending = draw(st.sampled_from(_FILES))
+    trouble = draw(st.sampled_from(["node", "node", "disk", "name", "inside", "above", "old"]))
+    name, file_size = f"a{ending}", None
+    if trouble == "node":
+        steps.append(Node(f"out/{name}", draw(st.sampled_from(NODES))))
+    elif trouble == "disk":
+        file_size = draw(st.sampled_from([512, 4096, 20_000]))
+    elif trouble == "name":
+        name = draw(st.sampled_from(_NAMES)) + ending
+    elif trouble == "inside":
+        inside = ("manifest.json", ".lock", "missions", "checkpoint.safetensors", "decisions.json")
+        steps.append(
+            Node(f"out/{name}/{draw(st.sampled_from(inside))}", draw(st.sampled_from(NODES)))
+        )
+    elif trouble == "above":
+        steps.append(Node("out/above", draw(st.sampled_from((*NODES, "locked")))))
+        name = f"above/{name}"
+    else:
+        steps.append(Write(f"out/{name}", b"an old file"))
+    arguments = tuple(word.replace("{}", f"../out/{name}") for word in words)
+    return Case("output", arguments, tuple(steps), file_size=file_size, lasting=10)

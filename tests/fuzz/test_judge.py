@@ -1,0 +1,50 @@
+"""The judge finds planted faults, and finds nothing in commands that keep the contract."""
+
+import pytest
+
+from tests.fuzz import drawing, ready
+from tests.fuzz.case import Case
+from tests.fuzz.forks import Forks
+from tests.fuzz.judge import findings
+from tests.fuzz.planted import FAULTS
+from tests.fuzz.planted import main as planted
+from tests.fuzz.steps import Node, Write
+
+SEED = 16
+KINDS = ("document", "command line", "output")  # of which many need no ready results
+
+
+@pytest.fixture(scope="module")
+def ready_texts(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ready") / "ready"
+    ready.write_texts(folder)
+    return folder
+
+
+def test_planted_faults_are_found(tmp_path, ready_texts):
+    forks = Forks(tmp_path, ready_texts, planted)
+    steps = (Write("in/a.toml", b""), Node("out/device", "null"))
+    cases = [Case("planted", (fault.__name__,), steps, seconds=2) for fault in FAULTS]
+    found = {number: findings(outcome) for number, outcome in forks.outcomes(enumerate(cases))}
+    for number, (fault, words) in enumerate(FAULTS.items()):
+        assert any(words in line for line in found[number]), (fault.__name__, found[number])
+    only = {number for number, lines in found.items() if len(lines) == 1}
+    assert len(only) >= len(FAULTS) - 1, found  # a fault breaks one rule, or little more
+
+
+def test_fixed_cases_keep_the_contract(tmp_path, ready_texts):
+    drawn = [case for kind, _ in drawing.ROUND for case in drawing.draw(kind, SEED, 20)]
+    cases = [case for case in drawn if case.kind in KINDS][:50]
+    assert len(cases) == 50
+    outcomes = [outcome for _, outcome in Forks(tmp_path, ready_texts).outcomes(enumerate(cases))]
+    assert {outcome.code for outcome in outcomes} >= {0, 2}
+    assert [(o.case.arguments, found) for o in outcomes if (found := findings(o))] == []
+
+
+def test_cases_depend_on_their_seed_and_number_only():
+    kind, most = drawing.ROUND[0][0], 20
+    assert drawing.draw(kind, 1, most) == drawing.draw(kind, 1, most)
+    assert drawing.draw(kind, 1, most) != drawing.draw(kind, 2, most)
+    some = [next(drawing.cases(1, number)) for number in (0, 3)]
+    assert [number for number, _ in some] == [0, 3]
+    assert next(drawing.cases(1, 3)) == some[1] != some[0]
