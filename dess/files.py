@@ -16,8 +16,9 @@ import stat
 import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from importlib import resources
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -27,7 +28,8 @@ from dess.errors import InputError, one_of, shown
 TEXT_LIMIT = 64 * 2**20
 # The largest TOML file that is read [bytes].
 TOML_LIMIT = 4 * 2**20
-
+# What is read at a time [bytes].
+_PIECE = 2**20
 # The longest name of a file or a folder in the usual file systems [bytes].
 _LONGEST = 255
 _KINDS = {
@@ -116,7 +118,8 @@ def read_text(path: Path, limit: int = TEXT_LIMIT, encoding: str = "utf-8") -> s
 def read_bytes(path: Path, limit: int = TEXT_LIMIT) -> bytes:
     """The content of a regular file; arguments and errors are those of ``read_text``."""
     with _opened(path, limit) as file:
-        content = file.read(limit + 1)
+        pieces = islice(iter(partial(file.read, _PIECE), b""), limit // _PIECE + 1)
+        content = b"".join(pieces)  # reading up to the limit at once would allocate as much
     if len(content) > limit:  # it has grown, or it is a file of the system, whose size is unknown
         raise _too_large(path, limit)
     return content

@@ -67,6 +67,14 @@ def test_regular_files_are_read_up_to_a_limit(tmp_path):
         read_text(path)
 
 
+def test_a_high_limit_takes_no_memory(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"abc" * 10**6)
+    assert read_bytes(path, 2**60) == path.read_bytes()
+    with pytest.raises(InputError, match="is too large"):
+        read_bytes(path, 3 * 10**6 - 1)
+
+
 def test_a_file_of_the_system_has_no_size_but_a_limit():
     assert os.stat("/proc/cpuinfo").st_size == 0
     with pytest.raises(InputError, match="is too large; allowed: 10 bytes at most"):
