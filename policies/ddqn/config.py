@@ -51,6 +51,16 @@ def _in_one_line(text: str) -> str:
     return text
 
 
+def _in_lists_of_lists(value: Any, levels: int = 3) -> Any:
+    """Refuse what is nested more deeply than any field of a scenario, and so cannot be copied."""
+    parts = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    for part in parts:
+        if not levels:
+            raise ValueError("is nested too deeply; allowed: fields of the scenario")
+        _in_lists_of_lists(part, levels - 1)
+    return value
+
+
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_in_one_line)]
 
 
@@ -94,7 +104,9 @@ class TrainingConfig(_Settings):
     scenario: str = Field(
         "paper", max_length=4096, description="scenario that missions are drawn from"
     )
-    set: dict[str, Any] = Field({}, description="fields of the scenario, in all missions")
+    set: Annotated[dict[str, Any], AfterValidator(_in_lists_of_lists)] = Field(
+        {}, description="fields of the scenario, in all missions"
+    )
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = Field(
         1, description="of the training: weights, exploration, missions"
     )

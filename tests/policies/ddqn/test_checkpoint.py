@@ -1,22 +1,27 @@
 """Checkpoints: what is written comes back, and nothing else is read."""
 
 import json
+import os
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from dess import InputError
+from dess.errors import printable
+from dess.state import MISSION, UAV
 from policies.ddqn import tensors as files
 from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.config import CHECKPOINT
 from policies.ddqn.description import MODEL
 from policies.ddqn.trained import load_policy, save_policy
-from policies.ddqn.training import Training
+from policies.ddqn.training import METRICS, Training
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny
 
@@ -166,6 +171,203 @@ def test_a_damaged_header_is_refused(
 ) -> None:
     _forged(file, **header)
     assert _refusal(load_training, file, training.config, CPU).startswith(f"{file}: ")
+
+
+def _progress(**changes: Any) -> Callable[[Path], None]:
+    """Changes the progress of a checkpoint."""
+    return lambda file: _forged(file, progress=_header_of(file)["progress"] | changes)
+
+
+ROW = {
+    **{"tick": 1, "phase": "battery", "uav_slots": 9, "updates": 1, "seconds": 0.1},
+    **{"epsilon": 0.5, "learning_rate": 1e-3, "moving_average": 0.5, "is_best": True},
+    **{f"evaluation_{name}": 0.5 for name in METRICS},
+}
+
+
+def _row(**changes: Any) -> Callable[[Path], None]:
+    """Adds a row to the curve; None leaves a column out."""
+    row = {key: value for key, value in (ROW | changes).items() if value is not None}
+    return lambda file: _forged(file, curve=[row])
+
+
+def _header(**changes: Any) -> Callable[[Path], None]:
+    return lambda file: _forged(file, **changes)
+
+
+def _random(**changes: Any) -> Callable[[Path], None]:
+    return lambda file: _forged(file, random=_header_of(file)["random"] | changes)
+
+
+def _value(name: str, value: Any, index: Any = 0) -> Callable[[Path], None]:
+    """Changes a number of a tensor."""
+
+    def change(file: Path) -> None:
+        tensor = load_file(file)[name]
+        tensor[index] = value
+        _forged(file, {name: tensor})
+
+    return change
+
+
+def _record(name: str, field: str, value: Any, dtype: np.dtype) -> Callable[[Path], None]:
+    """Changes a field of the first record of a tensor that holds records."""
+
+    def change(file: Path) -> None:
+        records = load_file(file)[name].numpy().view(dtype)
+        records[:1][field] = value
+        _forged(file, {name: files.bytes_of(records)})
+
+    return change
+
+
+def _truth(name: str) -> Callable[[Path], None]:
+    """Makes a truth value neither 0 nor 1."""
+
+    def change(file: Path) -> None:
+        tensor = load_file(file)[name]
+        tensor.view(torch.uint8)[0] = 7
+        _forged(file, {name: tensor})
+
+    return change
+
+
+def _extra(name: str) -> Callable[[Path], None]:
+    return lambda file: _forged(file, {name: torch.zeros(1)})
+
+
+FORGED: dict[str, Callable[[Path], None]] = {
+    "tick -5": _progress(tick=-5, updates=-5),
+    "tick 10^18": _progress(tick=10**18),
+    "tick of no integer": _progress(tick=2.0),
+    "updates": _progress(updates=3),
+    "uav_slots": _progress(uav_slots=-1),
+    "seconds": _progress(seconds=-1.0),
+    "infinite seconds": _progress(seconds=float("inf")),
+    "phase_index": _progress(phase_index=7),
+    "phase_index -1": _progress(phase_index=-1),
+    "phase_start": _progress(phase_start=1),
+    "scores": _progress(scores=[0.5] * 1000),
+    "best_score": _progress(best_score=0.5),
+    "nan score": _progress(best_score=float("nan")),
+    "replay -1": _header(replay=-1),
+    "replay above the capacity": _header(replay=10**12),
+    "no replay": _header(replay=None),
+    "seed": _header(stepper=[3, 8]),
+    "replication": _header(stepper=[500_000_001, 2**40]),
+    "generator": _random(bit_generator="MT19937"),
+    "state of the generator": _random(state={"state": 2**200, "inc": 1}),
+    "uinteger": _random(uinteger=2**40),
+    "scenario": _header(scenario={"grid": 5}),
+    "curve": _header(curve=[{"tick": 1}]),
+    "curve of text": _row(loss="small"),
+    "curve without a metric": _row(evaluation_success=None),
+    "curve with nan": _row(evaluation_reward=float("nan")),
+    "curve from the future": _row(tick=10**6),
+    "curve with another column": _row(evaluation_beauty=1.0),
+    "name of a phase": _row(phase="a\nb"),
+    "unknown key": _header(pickle="gASV"),
+    "weight": _value("online.hidden.0.weight", np.nan, (0, 0)),
+    "best weight": _value("best.value.bias", np.inf),
+    "moment": _value("optimizer.0.exp_avg", np.nan, (0, 0)),
+    "loss": _value("losses.loss", np.nan),
+    "reward": _value("replay.reward", np.inf, (0, 0)),
+    "cell in the replay memory": _value("replay.uavs", 30_000, (0, 0, 0)),
+    "negative cell in the replay memory": _value("replay.uavs", -1, (0, 0, 1)),
+    "mask in the replay memory": _value("replay.uavs", 64, (0, 0, 9)),
+    "action in the replay memory": _value("replay.action", 9, (0, 0)),
+    "charge_start in the replay memory": _value("replay.missions", 30_000, (0, 0)),
+    "truth value in the replay memory": _truth("replay.acted"),
+    "truth value": _truth("early"),
+    "optimizer of a weight that is not there": _extra("optimizer.99999999.exp_avg"),
+    "optimizer of no weight": _extra("optimizer.x.step"),
+    "tensor of an odd name": _extra("\U0001f4a3\n"),
+    "x": _record("stepper.uavs", "x", 10**6, UAV),
+    "y": _record("stepper.uavs", "y", -1, UAV),
+    "from_x": _record("stepper.uavs", "from_x", 32, UAV),
+    "battery": _record("stepper.uavs", "battery", 10**12, UAV),
+    "executed": _record("stepper.uavs", "executed", 77, UAV),
+    "end": _record("stepper.uavs", "end", 4, UAV),
+    "served": _record("stepper.uavs", "served", 25, UAV),
+    "pad_request": _record("stepper.uavs", "pad_request", 10**6, UAV),
+    "active UAV": _record("stepper.uavs", "active", False, UAV),
+    "collected": _record("stepper.uavs", "collected", np.nan, UAV),
+    "grid of a mission": _record("stepper.missions", "grid", 10**9, MISSION),
+    "nodes of a mission": _record("stepper.missions", "nodes", 10**6, MISSION),
+    "UAVs of a mission": _record("stepper.missions", "uavs", 64, MISSION),
+    "active UAVs of a mission": _record("stepper.missions", "active", 9, MISSION),
+    "slot of a mission": _record("stepper.missions", "slot", -1, MISSION),
+    "replication of a mission": _record("stepper.missions", "replication", 8, MISSION),
+    "data of a mission": _record("stepper.missions", "arrived", np.inf, MISSION),
+    "residual data": _record("stepper.residual", "data", -1.0, np.dtype([("data", float)])),
+}
+
+
+@pytest.mark.parametrize("kind", FORGED)
+def test_a_forged_checkpoint_is_refused(kind: str, training: Training, file: Path) -> None:
+    FORGED[kind](file)
+    line = _refusal(load_training, file, training.config, CPU)
+    assert line.startswith(f"{file}: ")
+    assert "checksum" not in line  # somebody who wants to be believed has a right one
+    assert printable(line) == line
+
+
+def test_what_is_not_changed_is_not_refused(training: Training, file: Path) -> None:
+    _row()(file)
+    assert load_training(file, training.config, CPU).curve == [ROW]
+    _progress(uav_slots=5)(file)
+    assert load_training(file, training.config, CPU).uav_slots == 5
+
+
+def test_truth_values_of_missions_are_checked(training: Training, file: Path) -> None:
+    records = load_file(file)["stepper.uavs"].numpy()
+    records[UAV.fields["latch"][1]] = 7  # type: ignore[index]
+    _forged(file, {"stepper.uavs": torch.from_numpy(records)})
+    line = _refusal(load_training, file, training.config, CPU)
+    assert line.endswith("latch is out of range; allowed: 0..1")
+
+
+def test_a_flipped_byte_changes_nothing_that_is_used(training: Training, file: Path) -> None:
+    content = file.read_bytes()
+    header = 8 + int.from_bytes(content[:8], "little")
+    generator = random.Random(2)
+    positions = [
+        *range(8),
+        *generator.sample(range(8, header), 60),
+        *generator.sample(range(header, len(content)), 60),
+    ]
+    refused = 0
+    for position in positions:
+        changed = bytearray(content)
+        changed[position] ^= 1 << generator.randrange(8)
+        file.write_bytes(changed)
+        try:
+            loaded = load_training(file, training.config, CPU)
+        except InputError as error:
+            refused += 1
+            assert str(error).startswith(f"{file}: ")
+        else:  # a blank that fills up the header, for example
+            assert_same(loaded, training)
+            assert position < header
+    assert refused >= 120
+    file.write_bytes(content)
+    assert_same(load_training(file, training.config, CPU), training)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "folder", "large"])
+def test_only_a_regular_file_is_read(kind: str, training: Training, tmp_path: Path) -> None:
+    path = tmp_path / CHECKPOINT
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "folder":
+        path.mkdir()
+    else:
+        with path.open("wb") as file:
+            file.truncate(2**40)
+    line = _refusal(load_training, path, training.config, CPU)
+    assert line.startswith(f"{path}: ")
 
 
 def test_the_checkpoint_of_a_scenario_that_has_changed_is_refused(tmp_path: Path) -> None:

@@ -3,8 +3,9 @@
 import json
 import os
 import signal
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,19 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
+from filelock import FileLock
 
 import policies
 from dess import InputError
+from dess.code import memory
 from dess.scenario import load_scenario
 from policies.ddqn import session
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import CHECKPOINT
 from policies.ddqn.description import CONFIG, MODEL
+from policies.ddqn.learner import DivergenceError
 from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.session import CURVE, EVENTS, device_of, memory_of, train
+from policies.ddqn.session import CURVE, EVENTS, LOCK, SIGNALS, device_of, memory_of, size_of, train
 from policies.ddqn.training import Training
 from tests.analysis.small import files_of
 from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, story_of, tiny
@@ -93,17 +97,17 @@ def test_the_curve_has_the_columns_of_all_its_rows(tmp_path: Path) -> None:
     assert table["tick"].to_pylist()[-1] == last["tick"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("tick", [5, 20, 33])
 def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(
     number: signal.Signals, tick: int, whole: Training, tmp_path: Path
 ) -> None:
-    handlers = [signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)]
+    handlers = [signal.getsignal(kind) for kind in SIGNALS]
     stop = _at(tick, lambda: signal.raise_signal(number))
     training = train(SHORT, tmp_path, progress=stop)
     assert (training.tick, training.done) == (tick, False)
-    assert [signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)] == handlers
-    assert not [name for name in files_of(tmp_path) if name.endswith(".new")]
+    assert [signal.getsignal(kind) for kind in SIGNALS] == handlers
+    assert not [name for name in os.listdir(tmp_path) if name.endswith(".tmp")]
     resumed = train(SHORT, tmp_path, resume=True)
     assert_same(resumed, whole)
     assert pq.read_table(tmp_path / CURVE)["tick"].to_pylist() == [
@@ -172,6 +176,16 @@ def test_what_is_done_stays_as_it_is(tmp_path: Path) -> None:
     assert files_of(tmp_path) == before
 
 
+def test_a_signal_that_is_ignored_stays_ignored(tmp_path: Path) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
+    try:
+        stop = _at(3, lambda: signal.raise_signal(signal.SIGHUP))
+        assert train(SHORT, tmp_path, progress=stop).done
+        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def _refusal(out: Path, **arguments: Any) -> str:
     """The line with which a folder is refused; it stays as it is."""
     before = files_of(out.parent)
@@ -193,6 +207,156 @@ def test_folders_are_not_overwritten(tmp_path: Path) -> None:
     line = f"{out / CHECKPOINT}: no such file; allowed: the folder of a training"
     assert _refusal(out, resume=True) == line
     assert "no such file" in _refusal(tmp_path / "nothing", resume=True)
+
+
+@pytest.mark.parametrize("name", ["manifest.json", ".bashrc", "missions/a.parquet"])
+def test_a_folder_of_something_else_is_refused(name: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / name).parent.mkdir(parents=True)
+    (out / name).touch()
+    top = name.partition("/")[0]
+    line = f"{out}: holds other files, such as '{top}'; allowed: a new or empty folder"
+    assert _refusal(out) == line
+
+
+def test_what_a_killed_run_leaves_is_no_obstacle_and_is_removed(
+    whole: Training, tmp_path: Path
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
+        left = tmp_path / f".dess-{ended.pid}-0a1b2c3d.tmp"
+    left.touch()
+    (tmp_path / ".lock").touch()
+    assert_same(train(SHORT, tmp_path), whole)
+    assert not left.exists()
+
+
+def test_one_folder_has_one_training_at_a_time(tmp_path: Path) -> None:
+    lines = []
+    line = f"{tmp_path}: in use by another training; allowed: another --out, or wait for its end"
+
+    def intrude() -> None:
+        before = files_of(tmp_path)
+        with pytest.raises(InputError) as error:
+            train(SHORT, tmp_path, resume=True)
+        lines.append(str(error.value))
+        assert files_of(tmp_path) == before
+
+    train(SHORT, tmp_path, progress=_at(9, intrude))
+    assert lines == [line]
+    train(SHORT, tmp_path, resume=True)  # the first one has released the folder
+
+
+def test_the_folder_is_released_at_every_end(tmp_path: Path) -> None:
+    def fail() -> None:
+        raise RuntimeError("the power failed")
+
+    with pytest.raises(RuntimeError):
+        train(SHORT, tmp_path / "failed", progress=_at(3, fail))
+    stop = _at(3, lambda: signal.raise_signal(signal.SIGTERM))
+    train(SHORT, tmp_path / "stopped", progress=stop)
+    (tmp_path / "damaged").mkdir()
+    (tmp_path / "damaged" / CHECKPOINT).touch()
+    with pytest.raises(InputError, match="damaged, or no safetensors file"):
+        train(SHORT, tmp_path / "damaged", resume=True)
+    for name in ("failed", "stopped", "damaged"):
+        with FileLock(tmp_path / name / LOCK, timeout=0):
+            pass
+
+
+class _Killed(BaseException):
+    """The process is killed here."""
+
+
+def _recorded(out: Path) -> dict[str, Any]:
+    """All that a training has written but for wall times."""
+    description = json.loads((out / CONFIG).read_text("utf-8"))
+    del description["run"]["seconds"]
+    return {
+        CONFIG: description,
+        CURVE: pq.read_table(out / CURVE).drop_columns(["seconds"]).to_pydict(),
+        MODEL: (out / MODEL).read_bytes(),
+        "files": sorted(name for name in os.listdir(out) if name != LOCK),
+    }
+
+
+@pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 9])
+def test_a_kill_before_any_file_is_written_loses_nothing(
+    every: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The process is killed before the first file, the second, and so on, or some of them."""
+    config = tiny(
+        phases=[phase | {"ticks": 3} for phase in PHASES], learning_starts=10, evaluate_every=4
+    )
+    monkeypatch.setattr(session, "CHECKPOINT_EVERY", -1.0)  # at every tick
+    whole = train(config, tmp_path / "whole")
+    expected, replace = _recorded(tmp_path / "whole"), os.replace
+    for steps in range(0, 1000, every):
+        out, left = tmp_path / str(steps), iter(range(steps))
+
+        def dying(*paths: Any, left: Iterator[int] = left) -> None:
+            if next(left, None) is None:
+                raise _Killed
+            replace(*paths)
+
+        monkeypatch.setattr(os, "replace", dying)
+        try:
+            train(config, out)
+        except _Killed:
+            monkeypatch.setattr(os, "replace", replace)
+        else:
+            break
+        if (out / CONFIG).exists() and (out / MODEL).exists():
+            policies.load(out)  # at any time
+        assert_same(train(config, out, resume=(out / CHECKPOINT).exists()), whole)
+        assert _recorded(out) == expected
+    assert steps > 20
+
+
+def test_a_training_that_diverges_ends_and_keeps_the_best_policy(tmp_path: Path) -> None:
+    before = {}
+
+    def spoil(training: Training, _: int) -> None:
+        if training.tick == 13:
+            before.update(files_of(tmp_path))
+            with torch.no_grad():
+                next(training.learner.online.parameters()).fill_(torch.nan)
+
+    with pytest.raises(DivergenceError, match="^the training diverged: its loss is nan; the best"):
+        train(SHORT, tmp_path, progress=spoil)
+    assert files_of(tmp_path) == before
+    assert MODEL in before
+    policies.load(tmp_path)
+    train(SHORT, tmp_path, resume=True)
+
+
+def test_what_takes_more_memory_than_is_available_has_to_be_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    monkeypatch.setattr(memory, "available_memory", lambda: 10**6)
+    line = _refusal(out)
+    assert line.startswith("training tiny: about 0.0 GiB of memory, of which 0.0 are available; ")
+    assert line.endswith(", or --yes")
+    assert not out.exists()
+    train(SHORT, out, accept_size=True)
+
+
+def test_the_estimate_of_the_memory_grows_with_what_takes_it() -> None:
+    least = size_of(tiny())
+    assert least > memory_of(tiny())
+    large = {
+        "hidden": [4096, 4096],
+        "num_envs": 1000,
+        "replay": 10**5,
+        "batch": 10**5,
+        "evaluation_missions": 10**5,
+        "updates": 100,
+        "observation": "maps",
+    }
+    for name, value in large.items():
+        assert size_of(tiny(**{name: value})) > 2 * least, name
+    # Six copies of the weights in a checkpoint, twice while it is written, and the gradient.
+    assert size_of(tiny(hidden=[4096] * 8)) > 13 * 4 * 7 * 4096**2
 
 
 def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:

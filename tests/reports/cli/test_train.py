@@ -13,7 +13,7 @@ import pytest
 import torch
 
 import policies
-from dess.code import libraries
+from dess.code import libraries, memory
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import load_config
 from reports import cli
@@ -150,6 +150,25 @@ def test_a_bad_config_is_named_with_its_key(dess, tmp_path):
     assert err.count("\n") == 1
 
 
+def test_a_training_that_diverges_ends_with_one_line(dess, tmp_path):
+    code, out, err = dess("train", "tiny.toml", "--out", "out", "--set", "reward_data=1e300")
+    assert (code, out) == (1, "")
+    line = err.splitlines()[-1]
+    assert line.startswith("dess: error: the training diverged: its loss is ")
+    assert "Traceback" not in err
+    assert "Warning" not in err
+
+
+def test_a_large_training_has_to_be_confirmed(dess, monkeypatch):
+    monkeypatch.setattr(memory, "available_memory", lambda: 10**6)
+    code, out, err = dess("train", "tiny.toml", "--out", "out")
+    assert (code, out) == (2, "")
+    assert err.startswith("dess: error: training tiny: about 0.0 GiB of memory, ")
+    assert err.endswith(" or --yes\n")
+    assert not Path("out").exists()
+    assert dess("train", "tiny.toml", "--out", "out", "--yes")[0] == 0
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_path):
     # Long enough to be caught in the middle.
@@ -176,7 +195,7 @@ def test_ctrl_c_leaves_a_training_that_resumes_to_the_same_weights(dess, tmp_pat
     hint += "continue with dess train tiny.toml --out out --device cpu --resume"
     assert err.splitlines()[-1] == hint
     assert "Traceback" not in err
-    assert not [name for name in files_of(tmp_path) if name.endswith(".new")]
+    assert not [name for name in files_of(tmp_path) if name.endswith(".tmp")]
 
     assert dess(*arguments, "out", "--resume")[0] == 0
     assert dess(*arguments, "undisturbed")[0] == 0
