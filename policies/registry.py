@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from dess.code.libraries import needs
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from policies.base import Policy
 
 GROUP = "dess.policies"
@@ -106,24 +106,6 @@ def load(name: str | Path) -> Policy:
     return _made(name, outside[name].value, outside[name].load)
 
 
-def runs_code(team: str) -> bool:
-    """Whether ``load_team`` would run code for a team that is not part of dess.
-
-    Such code is a class of a Python file or a policy of another package. Nothing is imported to
-    find out. A user may name code on the command line; a name that was read from data, such as a
-    results folder that somebody has sent, must not be loaded if this is true.
-
-    Args:
-        team: ``"P"`` or ``"P,P,..."``, as ``load_team`` takes it.
-    """
-    others = {name.strip() for name in team.split(",")} - SHIPPED.keys()
-    outside = _outside() if others else {}
-    return any(
-        not folder_of(name) and (FILE.fullmatch(name) is not None or name in outside)
-        for name in others
-    )
-
-
 def folder_of(name: str) -> Path | None:
     """The folder of a trained policy, if the name is that of one."""
     folder = TRAINED / name if name in trained_names() else Path(name)
@@ -205,8 +187,12 @@ def load_team(text: str, uavs: int | None = None) -> list[Policy]:
 
 
 def files_of(team: str) -> list[str]:
-    """Those policies of a team that are classes of Python files, which loading them would run."""
-    return [name for name in map(str.strip, team.split(",")) if FILE.fullmatch(name)]
+    """Those policies of a team that are classes of Python files, which ``load_team`` would run.
+
+    Nothing is imported to find out.
+    """
+    names = map(str.strip, team.split(","))
+    return [name for name in names if FILE.fullmatch(name) and not folder_of(name)]
 
 
 def check_no_files(teams: Iterable[str], where: object, named: Collection[str] = ()) -> None:
@@ -225,7 +211,7 @@ def check_no_files(teams: Iterable[str], where: object, named: Collection[str] =
     known = {file for team in named for file in files_of(team)}
     for file in (file for team in teams for file in files_of(team) if file not in known):
         raise InputError(
-            f"{where}: names policy {file!r}, a Python file, which is run only if you name "
+            f"{where}: names policy {shown(file)}, a Python file, which is run only if you name "
             "it; allowed: --policy FILE.py:CLASS, if you trust the file"
         )
 

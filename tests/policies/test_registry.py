@@ -262,18 +262,20 @@ def test_the_package_of_a_policy_is_named() -> None:
     assert about("still").origin == "the package outside-policies 1"
 
 
-@pytest.mark.usefixtures("outside")
-def test_what_would_run_code_is_known_without_running_it(
+def test_which_policies_are_python_files_is_known_without_running_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "trap.py").write_text("raise SystemExit('this code ran')")
-    for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X", "still"):
-        assert registry.runs_code(team), team
     _trained(tmp_path / "data.py:Trap")  # a folder, whatever its name: it holds only data
+    for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X"):
+        assert registry.files_of(team) == [team.rpartition(" ")[2]]
+        with pytest.raises(InputError, match=r"page: names policy .* allowed: --policy"):
+            registry.check_no_files([team], "page", ["another.py:X", "greedy"])
+        registry.check_no_files([team], "page", [f"greedy, {team}"])
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
-        assert not registry.runs_code(team), team
-    assert not {"trap", "outside_policies"} & sys.modules.keys()
+        assert registry.files_of(team) == []
+    assert "trap" not in sys.modules
 
 
 @pytest.mark.parametrize("name", ["x" * 5000 + ".py:X", "a\0b.py:X", "\udcff.py:X", "a\0b"])
