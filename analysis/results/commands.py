@@ -9,7 +9,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from analysis.results.manifest import Cell, Manifest, Origin
+from analysis.results.manifest import Cell, Manifest
+from analysis.results.provenance import Origin
 from dess.scenario import load_scenario, scenario_names
 
 

@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.results.documents import Document
-from analysis.results.manifest import Origin
+from analysis.results.documents import Count, Document, Finite, Key, Replication
+from analysis.results.provenance import Origin
 from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
+from analysis.study.stopping import Text
 from dess.record import MISSION_RECORD
 from policies.registry import TRAINED
 
@@ -27,10 +28,10 @@ SAMPLE = 32  # missions of a study that a page contains
 class Mission(Document):
     """A mission of a study: its team, what its design point sets, and its record by field."""
 
-    policy: str
+    policy: Text
     values: dict[str, Any]
-    replication: int
-    record: dict[str, int | float | str]
+    replication: Replication
+    record: dict[Text, int | Finite | Text]
 
 
 class Evidence(Origin):
@@ -43,9 +44,9 @@ class Evidence(Origin):
         sample: The sample of missions with their records.
     """
 
-    key: str
-    points: int
-    missions: tuple[int, int]
+    key: Key
+    points: Count
+    missions: tuple[Count, Count]
     sample: list[Mission] = Field(min_length=1)
 
     @model_validator(mode="after")

@@ -1,46 +1,34 @@
 """The manifest of a results folder: the study, what it was run with, and the keys of its cells."""
 
 import json
-from collections.abc import Collection
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path, PurePath
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
-from pydantic import TypeAdapter, ValidationError, field_validator, model_validator
+from pydantic import Field, model_validator
 
 import dess
-from analysis.results.documents import Document
 from analysis.results.provenance import (
     Acceptance,
-    Team,
+    Origin,
     code_behind,
     commit_of_source,
     differing,
     engine_code,
     library_versions,
+    study_of,
     team_of,
 )
-from analysis.study.cheapest import AnySelection, Setting
+from analysis.study.cheapest import AnySelection, Cheapest, Setting
 from analysis.study.costs import Costs
-from analysis.study.design import Design, DesignPoint
-from analysis.study.stopping import Precision
-from analysis.study.study import CHECK, Study
+from analysis.study.design import DesignPoint
+from analysis.study.study import CHECK, Point, Study, StudyData
 from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
-from policies.registry import files_of
+from dess.streams import MAX_REPLICATION
 
 SCHEMA_VERSION = 3
-
-# The parts of a study that are read back from its data.
-_PARTS: dict[str, TypeAdapter] = {
-    "set": TypeAdapter(dict[str, Any]),
-    "design": TypeAdapter(Design | None),
-    "costs": TypeAdapter(Costs | None),
-    "precision": TypeAdapter(Precision | None),
-    "selection": TypeAdapter(AnySelection | None),
-}
-
 
 # What is selected for a team: a design point, or one for each question; None without a selection.
 Selected = int | list[int] | None
@@ -59,87 +47,6 @@ class Cell(NamedTuple):
     first: int
 
 
-class Origin(Document):
-    """What results were made with; manifests and the evidence in pages have these fields.
-
-    Attributes:
-        version: Version of dess.
-        code: For every module that the records depend on, a hash of its code at the last run.
-        engine_code: A hash of the code of the engines at the first run. Like the code of the
-            policies, it is part of the keys of the cells.
-        accepted: The changes of code between the runs, in their order.
-        commit: The git commit of the source tree, if there is one.
-        libraries: The versions of the libraries, by name.
-        seed: Seed of the missions.
-        scenario: The complete scenario, before the design points change it.
-        policies: The teams, with the hashes of code and weights that are part of the cells' keys.
-        study: The study as data.
-    """
-
-    version: str
-    code: dict[str, str]
-    engine_code: str
-    accepted: list[Acceptance]
-    commit: str | None
-    libraries: dict[str, str]
-    seed: int
-    scenario: dict[str, Any]
-    policies: list[Team]
-    study: dict[str, Any]
-
-    @field_validator("study")
-    @classmethod
-    def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
-        study = {"costs": None} | study  # results of earlier versions have no costs
-        numbers = (study.get("missions"), study.get("logged"))
-        if study.keys() != Study.model_fields.keys() or not all(type(n) is int for n in numbers):
-            raise ValueError("is not the data of a study")
-        for field, part in _PARTS.items():
-            try:
-                part.validate_json(json.dumps(study[field]))
-            except ValidationError:
-                raise ValueError(f"has an invalid {field}") from None
-        return study
-
-    def space(self, values: dict[str, Any]) -> ScenarioSpace:
-        """The scenario with the values of a design point.
-
-        Raises:
-            InputError: If it is not valid.
-        """
-        return ScenarioSpace.of(**self.scenario | values)
-
-    def changes_here(self, named: Collection[str] = ()) -> list[str]:
-        """How the code and libraries of this process differ from those that made the results.
-
-        Args:
-            named: The teams that the user has named. Policies of other Python files are not loaded,
-                so they are not compared.
-
-        Raises:
-            InputError: If a policy cannot be loaded.
-        """
-        known = {file for team in named for file in files_of(team)}
-        closed = [t for t in self.policies if not known.issuperset(files_of(t.policy))]
-        teams = [team for team in self.policies if team not in closed]
-        here, changes = code_behind(team.policy for team in teams), []
-        code = {name: code for name, code in self.code.items() if name in here or not closed}
-        if self.version != dess.__version__:
-            changes.append(f"made by dess {self.version}, not {dess.__version__}")
-        elif modules := differing(code, here):
-            changes.append(f"made by other code of {', '.join(modules)}")
-        if weights := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
-            changes.append(f"made by other weights of {', '.join(weights)}")
-        if closed:
-            files = ", ".join(team.policy for team in closed)
-            changes.append(f"made by a Python file that was not read, of policy {files}")
-        versions = library_versions()
-        made = self.libraries  # torch may be absent, here or where the results were made
-        if others := [n for n in versions if n in made and made[n] != versions[n]]:
-            changes.append(f"made with other versions of {', '.join(others)}")
-        return changes
-
-
 class Manifest(Origin):
     """The manifest of a results folder.
 
@@ -154,25 +61,45 @@ class Manifest(Origin):
     """
 
     schema_version: int
-    points: list[DesignPoint]
-    missions: list[list[int]]
+    points: list[DesignPoint] = Field(min_length=1)
+    missions: list[list[Annotated[int, Field(ge=1, le=CHECK)]]]
     selected: list[Selected]
     complete: bool
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
-        names = {team.policy for team in self.policies}
-        if not self.points or not names or len(names) < len(self.policies):
-            raise ValueError("policies, points: are empty, or one is listed twice")
-        shape = [len(self.points)] * len(self.policies)
-        if [*map(len, self.missions)] != shape or len(self.selected) != len(self.policies):
+        names, study = [team.policy for team in self.policies], study_of(self.study)
+        if len({*names}) < len(names):
+            raise ValueError("policies: one is listed twice")
+        shape = [len(self.points)] * len(names)
+        if [*map(len, self.missions)] != shape or len(self.selected) != len(names):
             raise ValueError("missions, selected: not one for every policy and design point")
-        if not all(1 <= n <= CHECK for of_team in self.missions for n in of_team):
-            raise ValueError(f"missions: out of range; allowed: 1..{CHECK}")
-        teams = range(len(self.policies))
+        if min(map(min, self.missions)) < study.first:
+            raise ValueError("missions: are fewer than those of the study")
+        teams = range(len(names))
         if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
             raise ValueError("selected: is not a design point")
+        if any(not _suits(of_team, study, self.complete) for of_team in self.selected):
+            raise ValueError("selected: does not belong to the selection of the study")
+        self._check_points(study)
         return self
+
+    def _check_points(self, study: StudyData) -> None:
+        """Check that the design points have valid scenarios, and are those of the design.
+
+        The values of a sample are not drawn again, since other libraries may draw other ones.
+        """
+        ranges = getattr(study.design, "ranges", None)
+        if study.size != len(self.points):
+            is_design = False
+        elif ranges:
+            is_design = all(point.values.keys() == ranges.keys() for point in self.points)
+        else:
+            rows = study.design.points if study.design else [DesignPoint({})]
+            is_design = [_as_json(row) for row in rows] == self.points
+        if not is_design or not all(0 <= p.replication <= MAX_REPLICATION for p in self.points):
+            raise ValueError("points: are not those of the design")
+        self.scenarios  # noqa: B018 - they are checked when they are made
 
     def selected_points(self, team: int) -> list[int]:
         """The design points that were selected for a team; none, if the study selects nothing."""
@@ -185,10 +112,7 @@ class Manifest(Origin):
         # The path of a scenario file does not matter, since its content is stored.
         data = study.model_dump(mode="json") | {"scenario": PurePath(study.scenario).name}
         base = load_scenario(study.scenario, **study.set)
-        points = [
-            DesignPoint(values=json.loads(json.dumps(p.values)), replication=p.replication)
-            for p in study.points
-        ]
+        points = [*map(_as_json, study.points)]
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
@@ -281,13 +205,12 @@ class Manifest(Origin):
     @cached_property
     def costs(self) -> Costs | None:
         """The prices of the study, if it has any."""
-        prices = self.study["costs"]
-        return None if prices is None else Costs.model_validate(prices)
+        return study_of(self.study).costs
 
     @cached_property
     def selection(self) -> AnySelection | None:
         """The rule by which the study selects design points; None if it selects none."""
-        return _PARTS["selection"].validate_json(json.dumps(self.study["selection"]))
+        return study_of(self.study).selection
 
     @cached_property
     def settings(self) -> list[Setting]:
@@ -338,6 +261,18 @@ class Manifest(Origin):
         """The manifest as JSON, with a line for each of its parts."""
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in self.data.items())
         return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _as_json(point: Point | DesignPoint) -> DesignPoint:
+    """A design point with its values as a JSON document has them."""
+    return DesignPoint(json.loads(json.dumps(point.values)), point.replication)
+
+
+def _suits(selected: Selected, study: StudyData, complete: bool) -> bool:
+    """Whether what is selected for a team is what the rule of the study selects, if anything."""
+    if selected is None or study.selection is None:
+        return selected is None and not (study.selection and complete)
+    return isinstance(selected, list) == isinstance(study.selection, Cheapest)
 
 
 _ALLOWED = "allowed: another --out, or remove the folder"

@@ -6,21 +6,38 @@ figures does not count, nor do comments and docstrings.
 """
 
 import inspect
+import json
 import subprocess
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from functools import lru_cache
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 import dess
-from analysis.results.documents import Document
+from analysis.results.documents import (
+    Class,
+    Commit,
+    Count,
+    Document,
+    Hash,
+    Library,
+    Module,
+    Seed,
+    Version,
+)
+from analysis.study.stopping import Text
+from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
+from dess.errors import InputError, validation_line
+from dess.scenario import ScenarioSpace
 from policies import load_team
 from policies.base import Policy
+from policies.registry import files_of
 
 ENGINES = ("dess.batch", "dess.mission")
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
@@ -32,18 +49,18 @@ class Member(Document):
     ``learner`` is the same for trained policies that differ only in the seed of their training.
     """
 
-    name: str
-    class_: str = Field(alias="class")
-    code: str
-    weights: str = ""
-    learner: str = ""
+    name: Text
+    class_: Class = Field(alias="class")
+    code: Hash
+    weights: Text = ""
+    learner: Text = ""
 
 
 class Team(Document):
     """A team of a study, by the name that it has in the study."""
 
-    policy: str
-    members: list[Member]
+    policy: Text
+    members: list[Member] = Field(min_length=1)
 
     @property
     def weights(self) -> list[tuple[str, str, str]]:
@@ -59,13 +76,117 @@ class Acceptance(Document):
         missions: The number of missions that were simulated before, with the old code.
     """
 
-    modules: dict[str, tuple[str, str]]
-    missions: int
+    modules: dict[Module, tuple[Hash, Hash | Literal[""]]]
+    missions: Count
 
     @property
     def text(self) -> str:
         """The change of code in words."""
         return f"other code of {', '.join(self.modules)} after {self.missions:,} missions"
+
+
+class Origin(Document):
+    """What results were made with; manifests and the evidence in pages have these fields.
+
+    Attributes:
+        version: Version of dess.
+        code: For every module that the records depend on, a hash of its code at the last run.
+        engine_code: A hash of the code of the engines at the first run. Like the code of the
+            policies, it is part of the keys of the cells.
+        accepted: The changes of code between the runs, in their order.
+        commit: The git commit of the source tree, if there is one.
+        libraries: The versions of the libraries, by name.
+        seed: Seed of the missions.
+        scenario: The complete scenario, before the design points change it.
+        policies: The teams, with the hashes of code and weights that are part of the cells' keys.
+        study: The study as data.
+    """
+
+    version: Version
+    code: dict[Module, Hash]
+    engine_code: Hash
+    accepted: list[Acceptance]
+    commit: Commit | None
+    libraries: dict[Library, Version]
+    seed: Seed
+    scenario: dict[str, Any]
+    policies: list[Team] = Field(min_length=1)
+    study: dict[str, Any]
+
+    @field_validator("study")
+    @classmethod
+    def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
+        study = {"costs": None} | study  # results of earlier versions have no costs
+        if missing := StudyData.model_fields.keys() - study.keys():
+            raise ValueError(f"has no {min(missing)}")
+        study_of(study)
+        return study
+
+    @model_validator(mode="after")
+    def _is_of_the_study(self) -> Self:
+        space, study = self.space({}), self.study
+        if space.model_dump(mode="json").keys() != self.scenario.keys():
+            raise ValueError("scenario: is not complete")
+        if study["set"].keys() - self.scenario.keys() or "/" in study["scenario"]:
+            raise ValueError("study.scenario, study.set: are not a scenario and its fields")
+        if [team.policy for team in self.policies] != [*study["policies"]]:
+            raise ValueError("policies: are not those of the study")
+        if study["seed"] != self.seed:
+            raise ValueError("seed: is not that of the study")
+        return self
+
+    def space(self, values: dict[str, Any]) -> ScenarioSpace:
+        """The scenario with the values of a design point.
+
+        Raises:
+            InputError: If it is not valid.
+        """
+        try:
+            return ScenarioSpace.model_validate(self.scenario | values)
+        except ValidationError as error:
+            raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
+
+    def changes_here(self, named: Collection[str] = ()) -> list[str]:
+        """How the code and libraries of this process differ from those that made the results.
+
+        Args:
+            named: The teams that the user has named. Policies of other Python files are not loaded,
+                so they are not compared.
+
+        Raises:
+            InputError: If a policy cannot be loaded.
+        """
+        known = {file for team in named for file in files_of(team)}
+        closed = [t for t in self.policies if not known.issuperset(files_of(t.policy))]
+        teams = [team for team in self.policies if team not in closed]
+        here, changes = code_behind(team.policy for team in teams), []
+        code = {name: code for name, code in self.code.items() if name in here or not closed}
+        if self.version != dess.__version__:
+            changes.append(f"made by dess {self.version}, not {dess.__version__}")
+        elif modules := differing(code, here):
+            changes.append(f"made by other code of {', '.join(modules)}")
+        if weights := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
+            changes.append(f"made by other weights of {', '.join(weights)}")
+        if closed:
+            files = ", ".join(team.policy for team in closed)
+            changes.append(f"made by a Python file that was not read, of policy {files}")
+        versions = library_versions()
+        made = self.libraries  # torch may be absent, here or where the results were made
+        if others := [n for n in versions if n in made and made[n] != versions[n]]:
+            changes.append(f"made with other versions of {', '.join(others)}")
+        return changes
+
+
+def study_of(data: Mapping[str, Any]) -> StudyData:
+    """The data of a study as a model; no policy is loaded.
+
+    Raises:
+        ValueError: If they are not valid.
+    """
+    try:
+        return StudyData.model_validate_json(json.dumps(data))
+    except ValidationError as error:
+        raise ValueError(validation_line(error, "study", StudyData)) from None
 
 
 def team_of(policy: str) -> Team:
@@ -75,18 +196,21 @@ def team_of(policy: str) -> Team:
 
 def members_of(team: str) -> list[Member]:
     """The identities of a team's policies, as this process has them."""
-    return [
-        Member.model_validate(
-            {
-                "name": policy.name,
-                "class": f"{type(policy).__module__}:{type(policy).__qualname__}",
-                "code": combined(_code(_modules_of(policy))),
-                "weights": getattr(policy, "weights", ""),
-                "learner": getattr(policy, "learner", ""),
-            }
-        )
-        for policy in load_team(team)
-    ]
+    return [_member(policy) for policy in load_team(team)]
+
+
+def _member(policy: Policy) -> Member:
+    fields = {
+        "name": policy.name,
+        "class": f"{type(policy).__module__}:{type(policy).__qualname__}",
+        "code": combined(_code(_modules_of(policy))),
+        "weights": getattr(policy, "weights", ""),
+        "learner": getattr(policy, "learner", ""),
+    }
+    try:
+        return Member.model_validate(fields)
+    except ValidationError as error:  # the class may be anybody's
+        raise InputError(validation_line(error, "policy", Member)) from None
 
 
 def engine_code() -> str:

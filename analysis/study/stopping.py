@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Any, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -26,6 +27,16 @@ Metric = Literal["success", "collection_ratio", "collection_ratio_and_communicat
 MOST = 1_000_000_000
 # No round multiplies the number of missions of a cell by more than this.
 _GROWTH = 2.0
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():  # also half a character, which no encoding can write
+        raise ValueError(f"{shown(text)} has characters that cannot be printed; allowed: a line")
+    return text
+
+
+# A name, or another line of text.
+Text = Annotated[str, Field(max_length=4000), AfterValidator(_printable)]
 
 
 class StrictTable(BaseModel):

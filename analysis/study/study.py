@@ -19,7 +19,7 @@ from pydantic import (
 from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
-from analysis.study.stopping import MOST, Precision, StrictTable
+from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.scenario import Integer, ScenarioSpace, load_scenario, scenario_names
@@ -28,6 +28,9 @@ from policies import load_team
 from policies.registry import check_no_files
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
+
+# The longest name of a study, which is part of the names of files.
+MOST_CHARACTERS = 100
 
 # A study with more design points checks each point when it is used, not when the study is made.
 MANY_POINTS = 100_000
@@ -45,27 +48,27 @@ class Point(NamedTuple):
     replication: int = 0
 
 
-class Study(StrictTable):
-    """A study: every policy at every design point, in a number of replications.
+class StudyData(StrictTable):
+    """The fields of a study and their limits, as study files and results have them.
 
-    All policies and all design points use the same replications (common random numbers). The number
-    of replications of a design point is ``missions``, or is decided during the run by ``precision``
-    or ``selection``. ``load_study`` reads a study from a file and reports errors in one line.
+    No policy and no scenario is loaded, so that the data may come from anybody.
 
     Raises:
-        pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
+        pydantic.ValidationError: If a field is not valid.
     """
 
     name: str = Field(
-        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$", description="names the folder of results"
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$",
+        max_length=MOST_CHARACTERS,
+        description="names the folder of results",
     )
-    description: str = Field("", description="what the study is about, in a line")
-    scenario: str = Field("paper", description="a shipped scenario or a TOML file")
+    description: Text = Field("", description="what the study is about, in a line")
+    scenario: Text = Field("paper", description="a shipped scenario or a TOML file")
     set: dict[str, Any] = Field({}, description="fields of the scenario, the same everywhere")
     design: Design | None = Field(
         None, description="the design points; without one, the scenario is the only point"
     )
-    policies: Annotated[tuple[str, ...], BeforeValidator(as_tuples)] = Field(
+    policies: Annotated[tuple[Text, ...], BeforeValidator(as_tuples)] = Field(
         min_length=1, description='teams: "P" or "P,P,..."'
     )
     missions: Integer = Field(
@@ -81,8 +84,35 @@ class Study(StrictTable):
     seed: Integer = Field(0, ge=0, le=MAX_SEED)
     engine: Literal["batch", "events"] = "batch"
     logged: Integer = Field(
-        0, ge=0, description="first replications of every cell whose event log is kept"
+        0, ge=0, le=MOST, description="first replications of every cell whose event log is kept"
     )
+
+    @property
+    def rule(self) -> Precision | AnySelection | None:
+        """The rule that decides the number of replications; None if the number is fixed."""
+        return self.precision or self.selection
+
+    @property
+    def first(self) -> int:
+        """The number of replications of every cell, before a rule asks for more."""
+        return self.rule.first if self.rule else self.missions
+
+    @property
+    def size(self) -> int:
+        """The number of design points, computed without making them."""
+        return self.design.count if self.design else 1
+
+
+class Study(StudyData):
+    """A study: every policy at every design point, in a number of replications.
+
+    All policies and all design points use the same replications (common random numbers). The number
+    of replications of a design point is ``missions``, or is decided during the run by ``precision``
+    or ``selection``. ``load_study`` reads a study from a file and reports errors in one line.
+
+    Raises:
+        pydantic.ValidationError: If a field, a policy or a design point's scenario is not valid.
+    """
 
     _origin: tuple[str, dict[str, Any]] = PrivateAttr(("", {}))
 
@@ -165,16 +195,6 @@ class Study(StrictTable):
         missions = ["--missions", str(changes["missions"])] if "missions" in changes else []
         return ["dess", "study", "run", name or self.name, *policies, *missions]
 
-    @property
-    def rule(self) -> Precision | AnySelection | None:
-        """The rule that decides the number of replications; None if the number is fixed."""
-        return self.precision or self.selection
-
-    @property
-    def first(self) -> int:
-        """The number of replications of every cell, before a rule asks for more."""
-        return self.rule.first if self.rule else self.missions
-
     @cached_property
     def _base(self) -> ScenarioSpace:
         """The scenario that the design points change."""
@@ -184,11 +204,6 @@ class Study(StrictTable):
     def _fields(self) -> dict[str, Any]:
         """The fields of ``_base``: its file is read once, and not for every design point."""
         return dict(self._base)
-
-    @property
-    def size(self) -> int:
-        """The number of design points, computed without making them."""
-        return self.design.count if self.design else 1
 
     @cached_property
     def points(self) -> tuple[Point, ...]:

@@ -31,7 +31,7 @@ def table(missions):
 
 @pytest.fixture(scope="module")
 def costs():
-    (member,) = [Member(name="p", **{"class": "c"}, code="")]
+    (member,) = [Member(name="p", **{"class": "m:C"}, code="0" * 64)]
     return [
         Cost(policy=name, members=[member], calls=9, rows=18, median=m, slow=s, batch_rows=18,
              batch=b)

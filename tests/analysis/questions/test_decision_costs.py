@@ -11,7 +11,7 @@ from analysis.results.provenance import Member
 
 
 def cost(policy, median):
-    member = Member(name=policy, **{"class": "c"}, code="")
+    member = Member(name=policy, **{"class": "m:C"}, code="0" * 64)
     return Cost(policy=policy, members=[member], calls=4, rows=6, median=median, slow=2 * median,
                 batch_rows=1200, batch=median / 10)  # fmt: skip
 
