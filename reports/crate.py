@@ -23,7 +23,7 @@ from rocrate.rocrate import ROCrate
 
 from analysis import numbers
 from analysis.results.evidence import Evidence
-from analysis.results.store import MANIFEST
+from analysis.results.files import MANIFEST
 from analysis.results.tables import Results
 from dess import InputError
 from reports.pages.html import STUDY as EVIDENCE

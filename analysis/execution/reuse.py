@@ -3,8 +3,9 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
-from analysis.results.store import MANIFEST, Store
+from analysis.results.store import Store
 from dess import InputError
 
 

@@ -1,4 +1,7 @@
-"""Chunks: missions that are computed and stored together, and how studies are split into them."""
+"""Chunks: missions that are computed and stored together, and how studies are split into them.
+
+``rows_of`` puts the rows of their tables into the order of the parts of a study.
+"""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -6,8 +9,13 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
 from analysis.results.manifest import Cell, Manifest
 from analysis.study.study import CHECK
+from dess import InputError
 
 
 @dataclass(frozen=True)
@@ -115,3 +123,42 @@ def name_of(rows: Sequence[Sequence[Any]]) -> str:
 def short_hash(content: bytes) -> str:
     """The beginning of a hash, long enough to tell files apart."""
     return sha256(content).hexdigest()[:16]
+
+
+def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
+    """The rows of the missions of the parts, with the ``point`` of each.
+
+    Args:
+        parts: Parts of one team; the tables must contain all of them.
+        tables: Tables with the columns ``cell`` and ``replication``.
+
+    Raises:
+        InputError: If two tables have different rows for the same mission.
+    """
+    rows = _wanted(parts).merge(_stacked(tables), on=["cell", "replication"], how="left")
+    return rows[["point", *(name for name in tables[0].column_names if name != "cell")]]
+
+
+def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
+    """A table with the design point, cell and replication of every mission of the parts."""
+    lengths = [len(part.replications) for part in parts]
+    return pd.DataFrame(
+        {
+            "point": np.repeat([part.cell.point for part in parts], lengths),
+            "cell": np.repeat([part.cell.key for part in parts], lengths),
+            "replication": np.concatenate([part.replications for part in parts]),
+        }
+    )
+
+
+def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
+    """The rows of all tables."""
+    frame = pa.concat_tables(tables).to_pandas().astype({"cell": str})
+    one = [name for name in ("cell", "replication", "uav") if name in frame]
+    if frame.duplicated(one).any():  # such as after files of two folders were merged
+        frame = frame.drop_duplicates()
+        if frame.duplicated(one).any():
+            raise InputError(
+                "results: two files have different records of a mission; allowed: one of them"
+            )
+    return frame

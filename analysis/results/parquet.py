@@ -8,23 +8,35 @@ bytes, by which a damaged file is noticed.
 import json
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import Field, TypeAdapter
 
 from analysis.results.chunks import Chunk, name_of, short_hash
+from analysis.results.documents import Key, Replication
 from dess import InputError
-from dess.files import replacing, writable
-from dess.record import MISSION_RECORD, UAV_RECORD, Records
+from dess.code.memory import check_memory
+from dess.files import read_bytes, replacing, writable
+from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, Records
 from dess.state import END_NAMES
+from dess.streams import MAX_REPLICATION
 
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
+LIMIT = 2**30  # bytes of the largest file
 _PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
 _KEY = pa.dictionary(pa.int32(), pa.string())
+Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
+_ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
+# The columns of words, and the words.
+WORDS = {"end": END_NAMES, "event": EVENT_NAMES}
+# No event log has more UAVs, nodes, mission slots or cells (``dess.scenario``).
+MOST_UAVS, MOST_NODES, MOST_SLOTS, MOST_CELLS = 64, 1024, 100_000, 256
 
 
 def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
@@ -38,6 +50,15 @@ UAVS = pa.schema(
     [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
 )
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
+EVENTS = pa.schema(
+    [
+        ("time", pa.float64()),
+        ("event", pa.string()),
+        ("uav", pa.int64()),
+        ("node", pa.int64()),
+        *((name, pa.float64()) for name in ("value", "x", "y")),
+    ]
+)
 
 
 class Tables(NamedTuple):
@@ -81,26 +102,75 @@ def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> p
     return pa.table(arrays, schema=schema.with_metadata({_PARTS: json.dumps(chunk.rows)}))
 
 
-def check(missions: pa.Table, chunk: Chunk, seed: int) -> None:
-    """Check the replications, the seed and the values of missions before they are written.
+def check(tables: Tables, rows: Sequence[Row], seed: int) -> None:
+    """Check that tables have the records of some parts, and nothing that no mission can have.
+
+    Args:
+        tables: The records, such as those of a worker or of a file that anybody may have written.
+        rows: The key, start and stop of every part, in the order of the records.
+        seed: The seed of the missions.
 
     Raises:
-        ValueError: If they are not those of the chunk, or a value is not finite.
+        ValueError: If the records are those of other missions, or a value is out of range.
     """
-    wanted = np.concatenate([part.replications for part in chunk.parts])
-    if not np.array_equal(missions["replication"], wanted):
+    missions, uavs = tables
+    keys, lengths = [key for key, _, _ in rows], [stop - start for _, start, stop in rows]
+    wanted = np.concatenate([range(start, stop) for _, start, stop in rows])
+    replications = missions["replication"].to_numpy()
+    if not np.array_equal(replications, wanted):
         raise ValueError("the records are not those of the requested replications")
-    if set(missions["seed"].to_pylist()) != {seed}:
+    if (missions["seed"].to_numpy() != seed).any():
         raise ValueError(f"the records are not of seed {seed}")
-    for field in missions.schema:
-        column = missions[field.name]
-        if pa.types.is_floating(field.type) and not np.isfinite(column).all():
-            raise ValueError(f"the records have a {field.name} that is not a number")
+    _check_numbers(missions)
+    _check_numbers(uavs)
+    fleet = missions["uavs"].to_numpy()
+    if fleet.min() < 1 or fleet.max() > MOST_UAVS or fleet.sum() != len(uavs):
+        raise ValueError("the records are not those of all UAVs")
+    first = np.repeat(np.cumsum(fleet) - fleet, fleet)
+    if not (
+        np.array_equal(uavs["replication"], np.repeat(replications, fleet))
+        and np.array_equal(uavs["uav"], np.arange(len(uavs)) - first)
+    ):
+        raise ValueError("the records are not those of all UAVs")
+    cells = np.repeat(np.arange(len(rows)), lengths)
+    _check_cells(missions, keys, cells)
+    _check_cells(uavs, keys, np.repeat(cells, fleet))
 
 
-def parts_in(table: pa.Table) -> list[tuple[str, int, int]]:
-    """The parts in a table: the key, start and stop of each."""
-    return json.loads((table.schema.metadata or {}).get(_PARTS, b"[]"))
+def _check_numbers(table: pa.Table) -> None:
+    """Check that the numbers are finite, and that none but a reward is below 0."""
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if column.null_count:
+            raise ValueError(f"the records have no {name}")
+        if pa.types.is_floating(column.type) and not np.isfinite(column).all():
+            raise ValueError(f"the records have a {name} that is not a number")
+        is_number = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+        if is_number and name != "reward" and (column.to_numpy() < 0).any():
+            raise ValueError(f"the records have a {name} below 0")
+
+
+def _check_cells(table: pa.Table, keys: Sequence[str], wanted: np.ndarray) -> None:
+    """Check that the cell of every row is the wanted one, by its place among the keys."""
+    places = {key: place for place, key in reversed([*enumerate(keys)])}
+    numbers = [places[keys[place]] for place in range(len(keys))]
+    found = [
+        np.array([places.get(key, -1) for key in chunk.dictionary.to_pylist()], int)[chunk.indices]
+        for chunk in table["cell"].chunks
+    ]
+    if not np.array_equal(np.concatenate(found), np.array(numbers)[wanted]):
+        raise ValueError("the records are not those of the requested cells")
+
+
+def parts_in(table: pa.Table) -> list[Row]:
+    """The parts in a table: the key, start and stop of each.
+
+    Raises:
+        ValueError: If the file lists none, or some that are no parts.
+    """
+    rows = _ROWS.validate_json((table.schema.metadata or {}).get(_PARTS, b""))
+    if any(start >= stop for _, start, stop in rows):
+        raise ValueError("a part has no replications")
+    return rows
 
 
 def content_hash(path: Path) -> str:
@@ -125,28 +195,81 @@ def write(folder: Path, name: str, table: pa.Table) -> Path:
     return path
 
 
-def read(path: Path, schema: pa.Schema | None = None) -> pa.Table | None:
+def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     """Read a table; the result is None if the file is damaged or has another schema.
 
+    Args:
+        path: The file.
+        schema: The schema; by default that of an event log, whose values are checked as well.
+
     Raises:
-        InputError: If it cannot be read.
+        InputError: If it cannot be read, or takes more memory than there is.
     """
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; allowed: a file") from None
-    try:
-        if short_hash(content) != path.stem.rpartition("-")[2]:
-            return None
-        table = pq.ParquetFile(pa.BufferReader(content)).read(use_threads=False)
-    except (OSError, pa.ArrowException):  # what pyarrow raises
+        content = read_bytes(path, LIMIT)
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file; allowed: a file of results") from None
+    if short_hash(content) != path.stem.rpartition("-")[2]:
         return None
-    return table if schema is None or table.schema.equals(schema) else None
+    words = [name for name in schema.names if name in WORDS]
+    try:
+        # Texts stay numbers until it is known that they are few: a long one may be in every row.
+        file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=words)
+        if file.schema_arrow.names != schema.names:
+            return None
+        _check_size(path, file.metadata)
+        table = file.read(use_threads=False)
+        for name in words:
+            table = table.set_column(*_spelled(table, name))
+    except InputError:
+        raise
+    except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
+        return None
+    if not table.schema.equals(schema):
+        return None
+    return table if schema is not EVENTS or _is_log(table) else None
+
+
+def _check_size(path: Path, metadata: pq.FileMetaData) -> None:
+    """Refuse a file whose content is larger than the memory, although the file is small."""
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    size = sum(group.total_byte_size for group in groups)
+    size += 8 * metadata.num_columns * metadata.num_rows
+    check_memory(f"{path}: {metadata.num_rows:,} rows", 3 * size, "a file of dess study run")
+
+
+def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
+    """The place, name and words of a column of words.
+
+    Raises:
+        ValueError: If there are other words.
+    """
+    column = table[name]
+    for chunk in column.chunks:
+        if not {*chunk.dictionary.to_pylist()} <= {*WORDS[name]}:
+            raise ValueError(f"{name}: has other words")
+    return table.column_names.index(name), name, column.cast(pa.string())
+
+
+def _is_log(table: pa.Table) -> bool:
+    """Whether a table may be the event log of a mission, with a time and cells that exist."""
+    if not len(table) or any(column.null_count for column in table.columns):
+        return False
+    limits = {"uav": (-1, MOST_UAVS - 1), "node": (-1, MOST_NODES - 1), "time": (0, MOST_SLOTS)}
+    limits |= dict.fromkeys(("x", "y"), (-1, MOST_CELLS))
+    columns = {name: table[name].to_numpy() for name in limits}  # nan is in none of the limits
+    return (
+        all(low <= columns[name].min() for name, (low, _) in limits.items())
+        and all(columns[name].max() <= high for name, (_, high) in limits.items())
+        and bool(np.isfinite(table["value"]).all())
+        and "mission_end" in table["event"].to_pylist()
+    )
 
 
 def files_in(folder: Path) -> list[Path]:
     """The files in a folder that a run may have written."""
-    return sorted(path for path in folder.glob("*.parquet") if NAME.fullmatch(path.name))
+    paths = (path for path in folder.glob("*.parquet") if NAME.fullmatch(path.name))
+    return sorted(path for path in paths if path.is_file() and not path.is_symlink())
 
 
 def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], list[Path]]:
@@ -159,10 +282,10 @@ def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], lis
     sound: dict[str, list[tuple[Path, pa.Table]]] = defaultdict(list)
     for path in files_in(folder):
         table = read(path, schema)
-        if table is None or name_of(parts_in(table)) != content_hash(path):
-            damaged.append(path)
-        else:
+        if table is not None and _name_in(table) == content_hash(path):
             sound[content_hash(path)].append((path, table))
+        else:
+            damaged.append(path)
     for name, files in sound.items():
         first = files[0][1]
         if all(table.equals(first) for _, table in files):
@@ -172,7 +295,15 @@ def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], lis
     return tables, damaged
 
 
+def _name_in(table: pa.Table) -> str:
+    """The first half of the name that the file of a table must have; empty without valid parts."""
+    try:
+        return name_of(parts_in(table))
+    except ValueError:
+        return ""
+
+
 def missions_in(folder: Path) -> int:
     """The number of missions in a results folder, without those in damaged files."""
-    files = folder.glob("missions/policy=*/*.parquet")
+    files = (path for part in folder.glob("missions/policy=*") for path in files_in(part))
     return sum(len(table) for path in files if (table := read(path, MISSIONS)) is not None)

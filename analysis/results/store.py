@@ -14,25 +14,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Self
-from urllib.parse import quote
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 from filelock import FileLock, Timeout
 
-from analysis.results import parquet
-from analysis.results.chunks import Chunk, Failure, Part, gaps, short_hash, split
+from analysis.results import files, parquet
+from analysis.results.chunks import Chunk, Failure, Part, gaps, rows_of, split
+from analysis.results.files import FOLDERS, LOCK, MANIFEST
 from analysis.results.manifest import Cell, Manifest, Selected
-from analysis.results.rows import rows_of
 from analysis.study.study import Study
 from dess import InputError
-from dess.files import check_folder, replacing, writable
+from dess.files import check_folder, writable
 from dess.record import Records
-
-MANIFEST, LOCK = "manifest.json", ".lock"
-LONG = 150  # largest number of characters of a policy's name in the name of a folder
-FOLDERS = ("missions", "uavs", "events", "failures")
 
 
 class Store:
@@ -71,6 +66,7 @@ class Store:
         store = cls(folder, _extended(folder, manifest, accept_code))
         with writable(folder):
             folder.mkdir(parents=True, exist_ok=True)
+            files.check_places(folder)
             try:
                 store._lock.acquire(timeout=0)
             except Timeout:
@@ -116,16 +112,17 @@ class Store:
 
     def _prepare(self) -> None:
         """Write the manifest, remove temporary files of a killed run, and scan the folder."""
-        _write(self.folder / MANIFEST, self.manifest.text)
+        files.write(self.folder / MANIFEST, self.manifest.text)
         for name in FOLDERS:
             with writable(self.folder / name):
                 (self.folder / name).mkdir(exist_ok=True)
-        for pattern in (".*.tmp", "failures/.*.tmp", "*/policy=*/.*.tmp"):
-            for path in self.folder.glob(pattern):
-                path.unlink()
+        places = [self.folder / name for name in FOLDERS]
+        places += [path for place in places for path in place.glob("policy=*")]
+        for path in (path for place in (self.folder, *places) for path in place.glob(".*.tmp")):
+            files.delete(path)
         self._scan()
         while self.damaged:
-            self.damaged.pop().unlink()
+            files.delete(self.damaged.pop())
 
     def _scan(self) -> None:
         """Find out which missions are present, and which files are damaged."""
@@ -135,14 +132,24 @@ class Store:
                 self._partition("missions", team), parquet.MISSIONS
             )
             self.damaged += damaged_uavs + damaged
-            for name in missions:
-                if name in uavs:
-                    self._enter(team, name, parquet.Tables(missions[name], uavs[name]))
+            for name in sorted(missions.keys() & uavs.keys()):
+                self._examine(team, name, parquet.Tables(missions[name], uavs[name]))
             for path in parquet.files_in(self._partition("events", team)):
                 if parquet.read(path) is None:
                     self.damaged.append(path)
                 else:
                     self._logs[team, parquet.content_hash(path)] = path
+
+    def _examine(self, team: int, name: str, tables: parquet.Tables) -> None:
+        """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
+        try:
+            parquet.check(tables, parquet.parts_in(tables.missions), self.manifest.seed)
+        except ValueError:
+            for kind in ("missions", "uavs"):
+                paths = parquet.files_in(self._partition(kind, team))
+                self.damaged += [path for path in paths if parquet.content_hash(path) == name]
+        else:
+            self._enter(team, name, tables)
 
     def _enter(self, team: int, name: str, tables: parquet.Tables) -> None:
         self._tables[team, name] = tables
@@ -150,10 +157,7 @@ class Store:
             self._present[team, key].append(range(start, stop))
 
     def _partition(self, kind: str, team: int) -> Path:
-        policy = quote(self.manifest.policies[team].policy, safe="")
-        if len(policy) > LONG:
-            policy = f"{policy[:LONG]}~{short_hash(policy.encode())}"
-        return self.folder / kind / f"policy={policy}"
+        return self.folder / kind / files.partition(self.manifest.policies[team].policy)
 
     def missing(self, chunk: Chunk) -> Chunk | None:
         """The part of a chunk that is missing; None if all of it is present."""
@@ -223,12 +227,12 @@ class Store:
 
     def _keep(self, chunk: Chunk, tables: parquet.Tables) -> None:
         """Write the tables of a chunk."""
-        parquet.check(tables.missions, chunk, self.manifest.seed)
+        parquet.check(tables, chunk.rows, self.manifest.seed)
         # Missions last: a chunk is present when they are.
         parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)
         parquet.write(self._partition("missions", chunk.team), chunk.name, tables.missions)
         self._enter(chunk.team, chunk.name, tables)
-        self._failure(chunk).unlink(missing_ok=True)
+        files.delete(self._failure(chunk))
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
         """Store the event log of a replication of a cell."""
@@ -239,7 +243,7 @@ class Store:
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
         path = self._failure(chunk)
-        _write(path, json.dumps(asdict(failure), indent=2) + "\n")
+        files.write(path, json.dumps(asdict(failure), indent=2) + "\n")
         return path
 
     def _failure(self, chunk: Chunk) -> Path:
@@ -249,9 +253,9 @@ class Store:
         """Write into the manifest that all missions are present, and how many there are."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
-        _write(self.folder / MANIFEST, self.manifest.text)
+        files.write(self.folder / MANIFEST, self.manifest.text)
         for path in (self.folder / "failures").glob("*.json"):
-            path.unlink()
+            files.delete(path)
 
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of some parts of one team, with their ``point``, in the order of the parts.
@@ -329,7 +333,9 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
     path = folder / MANIFEST
     with writable(folder):
         if not path.exists():
-            others = [e for e in folder.iterdir() if not _is_ours(e)] if folder.is_dir() else []
+            others = (
+                [e for e in folder.iterdir() if not files.is_ours(e)] if folder.is_dir() else []
+            )
             if others:
                 raise InputError(
                     f"{folder}: holds other files and no {MANIFEST}; "
@@ -338,14 +344,3 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
             return manifest
     held = Manifest.read(path)
     return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file completely or not at all."""
-    with replacing(path) as temporary, writable(path):
-        temporary.write_text(text, "utf-8")
-
-
-def _is_ours(path: Path) -> bool:
-    """Whether a run may have made this file or folder before it wrote the manifest."""
-    return path.name == LOCK or (path.name.startswith(".") and path.suffix == ".tmp")

@@ -25,9 +25,9 @@ from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
 from analysis.names import ALIASES, METRICS, SWEEP, SWEEPS
 from analysis.results.chunks import short_hash
+from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
-from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import Costs

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.results.store import MANIFEST
+from analysis.results.files import MANIFEST
 from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, Check
 from analysis.verification.logs import Log

@@ -106,8 +106,8 @@ def verify(
         list[str] | None,
         typer.Option(
             metavar="FILE.py:CLASS",
-            help="A policy of a Python file that the results name: they cannot start it "
-            "themselves, since anybody may have made them; repeatable.",
+            help="A policy of a Python file that the results name. It is not run without this "
+            "option, since anybody may have made the results; repeatable.",
         ),
     ] = None,
     as_json: JsonOption = False,

@@ -163,8 +163,8 @@ def _of_study(
     folder: Path, point: int | None, policy: str | None, replication: int | None
 ) -> _Asked:
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
+    from analysis.results.files import MANIFEST
     from analysis.results.manifest import Manifest
-    from analysis.results.store import MANIFEST
     from policies.registry import check_no_files
 
     manifest = Manifest.read(folder / MANIFEST)

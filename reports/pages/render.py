@@ -21,8 +21,8 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
 from analysis.execution import decision_time
+from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
-from analysis.results.store import MANIFEST
 from dess import InputError
 from dess.files import writable
 from reports.folders import locked, temporary_folder

@@ -17,8 +17,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from analysis.results import commands
 from analysis.results.evidence import Evidence, chosen, learned_files
+from analysis.results.files import MANIFEST
 from analysis.results.resimulate import difference
-from analysis.results.store import MANIFEST, Store
+from analysis.results.store import Store
 from analysis.results.tables import results_of
 from dess import InputError, simulate
 from policies import load_team

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from analysis.results import parquet
-from analysis.results.chunks import Chunk, Part, check_parts, parts_of
+from analysis.results.chunks import Chunk, Part, check_parts, parts_of, rows_of
+from analysis.results.files import FOLDERS
 from analysis.results.manifest import Manifest
-from analysis.results.rows import rows_of
-from analysis.results.store import FOLDERS, Store
+from analysis.results.store import Store
 
 LONGEST = 120  # bytes of a file's name that are made of the text
 

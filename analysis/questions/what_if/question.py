@@ -23,8 +23,8 @@ from analysis import numbers
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
 from analysis.results.chunks import short_hash
+from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
-from analysis.results.store import MANIFEST
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess import simulate_batch

@@ -89,8 +89,8 @@ def _rewrite(out, **changes):
 
 
 FOREIGN = {
-    "truncated": (lambda out: _cut(out / "manifest.json"), "cannot be read"),
-    "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "cannot be read"),
+    "truncated": (lambda out: _cut(out / "manifest.json"), "not valid JSON"),
+    "binary": (lambda out: (out / "manifest.json").write_bytes(b"\xff\xfe"), "it is not text"),
     "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),
@@ -98,7 +98,7 @@ FOREIGN = {
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
-    "no study": (lambda out: _rewrite(out, study={}), "study: is not the data of a study"),
+    "no study": (lambda out: _rewrite(out, study={}), "study: has no design"),
 }
 
 
@@ -332,7 +332,7 @@ def test_a_manifest_that_makes_no_sense(field, out):
 def test_a_manifest_whose_study_makes_no_sense(part, out):
     study = json.loads((out / "manifest.json").read_text())["study"]
     _rewrite(out, study=study | {part: 3})
-    with pytest.raises(InputError, match=f"study: has an invalid {part}"):
+    with pytest.raises(InputError, match=f"study: {part}: "):
         load_results(out)
 
 

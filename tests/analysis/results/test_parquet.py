@@ -1,0 +1,177 @@
+"""Parquet files that anybody may have written: what is no record counts as damaged."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from analysis import load_results, run_study
+from analysis.results import parquet
+from analysis.results.chunks import name_of, short_hash
+from analysis.results.store import Store
+from dess import InputError
+from reports.cli import main
+from tests.analysis.small import files_of, small_study
+
+Forge = Callable[[pa.Table], pa.Table]
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Small results with an event log."""
+    folder = tmp_path_factory.mktemp("sound")
+    run_study(small_study(folder, logged=1, policies=["greedy"]), folder / "out")
+    return folder / "out"
+
+
+def forged(sound: Path, out: Path, kinds: str, forge: Forge) -> Path:
+    """A copy of the results in which tables are other ones, in files that have their hashes."""
+    shutil.copytree(sound, out)
+    for kind in kinds.split():
+        path = sorted((out / kind).rglob("*.parquet"))[0]
+        table = forge(pq.ParquetFile(path).read())
+        path.unlink()
+        name = path.stem.rpartition("-")[0]
+        with suppress(ValueError, RecursionError, TypeError, KeyError):  # an event log has no parts
+            name = name_of(json.loads((table.schema.metadata or {})[b"dess.parts"]))
+        parquet.write(path.parent, name, table)
+    return out
+
+
+def parts(text: Any) -> Forge:
+    content = text if isinstance(text, bytes) else json.dumps(text).encode()
+    return lambda table: table.replace_schema_metadata({"dess.parts": content})
+
+
+def column(name: str, change: Callable[[np.ndarray], Any]) -> Forge:
+    def forge(table: pa.Table) -> pa.Table:
+        place = table.schema.get_field_index(name)
+        values = pa.array(change(np.array(table[name].to_pylist())))
+        return table.set_column(place, name, values)
+
+    return forge
+
+
+KEY = "0123456789abcdef"
+FORGERIES: dict[str, tuple[str, Forge]] = {
+    "parts that are no JSON": ("missions uavs", parts(b"{")),
+    "parts that are nested": ("missions uavs", parts(b"[" * 10_000)),
+    "parts of the wrong form": ("missions uavs", parts({"a": 1})),
+    "parts of other types": ("missions uavs", parts([[5, "0", None]])),
+    "no parts": ("missions uavs", parts([])),
+    "long parts": ("missions uavs", parts([[KEY, 0, 10**18]])),
+    "parts without end": ("missions uavs", parts([[KEY, 5, 2]])),
+    "parts below 0": ("missions uavs", parts([[KEY, -4, 0]])),
+    "other parts": ("missions uavs", parts([[KEY, 0, 4]])),
+    "parts that overlap": ("missions uavs", parts([[KEY, 0, 2], [KEY, 0, 2]])),
+    "counts below 0": ("missions", column("slots", lambda v: -v)),
+    "no number": ("missions", column("collected", lambda v: v * np.nan)),
+    "no value": ("missions", column("collected", lambda v: [None, *v[1:]])),
+    "another seed": ("missions", column("seed", lambda v: (v + 1).astype(np.uint64))),
+    "many UAVs": ("missions", column("uavs", lambda v: v + 10**9)),
+    "another type": ("missions", column("slots", lambda v: v.astype(float))),
+    "another column": ("missions", lambda table: table.rename_columns({"slots": "x"})),
+    "a column less": ("missions", lambda table: table.drop_columns(["slots"])),
+    "a row less": ("missions", lambda table: table[:-1]),
+    "a UAV less": ("uavs", lambda table: table[:-1]),
+    "an end that there is not": ("uavs", column("end", lambda v: ["<script>"] * len(v))),
+    "a UAV twice": ("uavs", column("uav", lambda v: v * 0)),
+    "an event that there is not": ("events", column("event", lambda v: ["<b>"] * len(v))),
+    "a time without end": ("events", column("time", lambda v: v + 1e15)),
+    "a UAV that there is not": ("events", column("uav", lambda v: v + 10**9)),
+    "a log without rows": ("events", lambda table: table[:0]),
+}
+
+
+@pytest.mark.parametrize(("kind", "forge"), FORGERIES.values(), ids=[*FORGERIES])
+def test_a_table_that_is_no_record_is_damaged_and_computed_anew(
+    kind: str, forge: Forge, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = forged(sound, tmp_path / "out", kind, forge)
+    store = Store.read(folder)
+    assert store.damaged and all(path.is_relative_to(folder / "") for path in store.damaged)
+    assert main(["verify", str(folder)]) == 1
+    if kind != "events":
+        with pytest.raises(InputError, match="damaged: "):
+            load_results(folder)
+    again = run_study(small_study(tmp_path, logged=1, policies=["greedy"]), folder)
+    assert again.missions.equals(load_results(sound).missions)
+    assert again.uavs.equals(load_results(sound).uavs) and not load_results(folder).store.damaged
+
+
+def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(
+    sound: Path, tmp_path: Path
+) -> None:
+    """All columns are constant, so that a million rows take next to no space."""
+    folder = shutil.copytree(sound, tmp_path / "out")
+    path = sorted((folder / "uavs").rglob("*.parquet"))[0]
+    table = pq.ParquetFile(path).read()
+    block = pa.table(
+        [pa.array(np.zeros(2**20, field.type.to_pandas_dtype()))
+         if field.name not in ("cell", "end")
+         else pa.array(["battery"] * 2**20).cast(field.type) for field in table.schema],
+        schema=table.schema,
+    )  # fmt: skip
+    sink = pa.BufferOutputStream()
+    with pq.ParquetWriter(sink, table.schema, compression="zstd") as writer:
+        for _ in range(4):
+            writer.write_table(block)
+    content = sink.getvalue().to_pybytes()
+    bomb = path.with_name(f"{KEY}-{short_hash(content)}.parquet")
+    bomb.write_bytes(content)
+    assert len(content) < 2**20
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        monkeypatch.setattr("dess.code.memory.available_memory", lambda: 2**29)
+        with pytest.raises(InputError, match=r"4,194,304 rows: about .* GiB of memory"):
+            Store.read(folder)
+
+
+def test_what_only_has_the_name_of_a_chunk_is_left_alone(sound: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(sound, tmp_path / "out")
+    places = [path.parent for path in sorted(folder.rglob("*.parquet"))]
+    outside = tmp_path / "outside"
+    outside.write_text("mine")
+    for place in places:
+        os.mkfifo(place / f"{'a' * 16}-{'1' * 16}.parquet")
+        (place / f"{'a' * 16}-{'2' * 16}.parquet").mkdir()
+        (place / f"{'a' * 16}-{'3' * 16}.parquet").symlink_to(outside)
+        (place / f"{'a' * 16}-{'4' * 16}.parquet").symlink_to("/dev/zero")
+        (place / ".x.tmp").mkdir()
+    (folder / "failures" / "x.json").mkdir()
+    assert len(load_results(folder).missions) == 10
+    run_study(small_study(tmp_path, logged=1, policies=["greedy"], missions=12), folder)
+    assert outside.read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [".lock", "missions", "failures", "uavs/policy=greedy"])
+def test_a_run_does_not_write_or_delete_where_a_link_leads(
+    name: str, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, outside = shutil.copytree(sound, tmp_path / "out"), tmp_path / "outside"
+    place = folder / name
+    if place.exists():
+        shutil.move(place, outside)
+    else:
+        outside.write_text("mine")
+    place.symlink_to(outside)
+    (outside / "x.json").write_text("mine") if outside.is_dir() else None
+    before = files_of(tmp_path)
+    small_study(tmp_path)
+    command = ["study", "run", str(tmp_path / "trial.toml"), "--policy", "greedy"]
+    assert main([*command, "--out", str(folder)]) == 2
+    assert f"{place}: is a link" in capsys.readouterr().err
+    assert {**files_of(tmp_path), **before} == files_of(tmp_path)
+
+
+def test_a_file_that_is_too_large_is_not_read(sound: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(parquet, "LIMIT", 10)
+    with pytest.raises(InputError, match="is too large"):
+        load_results(sound)
