@@ -28,7 +28,7 @@ from analysis.results.tables import Results
 from dess import InputError
 from reports.pages.html import STUDY as EVIDENCE
 from reports.pages.html import embedded
-from reports.pages.verify import is_sealed
+from reports.pages.verify import is_sealed, page_text
 
 RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
@@ -84,10 +84,7 @@ def check_page(page: Path, results: Results) -> None:
     allowed = (
         f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
     )
-    try:
-        html = page.read_bytes().decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{page}: cannot be read: {error}; {allowed}") from None
+    html = page_text(page, allowed)
     keys = [Evidence.parse(text, str(page), allowed).key for text in embedded(EVIDENCE, html)]
     if keys != [results.store.manifest.key] or not is_sealed(html):
         raise InputError(f"{page}: does not show the results of this study; {allowed}")

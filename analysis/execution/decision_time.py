@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePath
 from time import perf_counter
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import joblib
 import numpy as np
@@ -17,7 +17,16 @@ from pydantic import Field, model_validator
 from threadpoolctl import threadpool_limits
 
 import dess
-from analysis.results.documents import Document
+from analysis.results.documents import (
+    Commit,
+    Count,
+    Document,
+    Finite,
+    Hash,
+    Library,
+    Seed,
+    Version,
+)
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import (
     Member,
@@ -25,7 +34,9 @@ from analysis.results.provenance import (
     engine_code,
     library_versions,
     members_of,
+    scenario_of,
 )
+from analysis.study.stopping import Text
 from dess import InputError, load_scenario, simulate, simulate_batch
 from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace
@@ -39,6 +50,8 @@ SLOW = 0.95  # the quantile that is reported for slow calls
 ROUNDS = 3  # rounds of the batch engine; the median time counts
 THREADS = 1  # threads of the numerical libraries; a UAV has at most one free core
 
+Positive = Annotated[Count, Field(ge=1)]
+Seconds = Annotated[Finite, Field(gt=0, le=1e6)]
 Clock = Callable[[], float]
 # Called with the number of steps done and of all steps.
 Progress = Callable[[int, int], None]
@@ -61,14 +74,14 @@ class Cost(Document):
         batch: Time per decision in the batch engine [s], the median over ``ROUNDS`` rounds.
     """
 
-    policy: str
+    policy: Text
     members: list[Member]
-    calls: int = Field(ge=1)
-    rows: int = Field(ge=1)
-    median: float = Field(gt=0)
-    slow: float = Field(gt=0)
-    batch_rows: int = Field(ge=1)
-    batch: float = Field(gt=0)
+    calls: Positive
+    rows: Positive
+    median: Seconds
+    slow: Seconds
+    batch_rows: Positive
+    batch: Seconds
 
 
 class Timing(Document):
@@ -86,17 +99,17 @@ class Timing(Document):
     """
 
     schema_version: int
-    version: str
-    code: str
-    commit: str | None
-    libraries: dict[str, str]
-    processor: str
-    cores: int = Field(ge=1)
-    threads: int = Field(ge=1)
-    scenario: str
+    version: Version
+    code: Hash
+    commit: Commit | None
+    libraries: dict[Library, Version]
+    processor: Text
+    cores: Positive
+    threads: Positive
+    scenario: Text
     constants: dict[str, Any]
-    seed: int
-    missions: int = Field(ge=1)
+    seed: Seed
+    missions: Positive
     costs: list[Cost] = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -104,7 +117,7 @@ class Timing(Document):
         names = [cost.policy for cost in self.costs]
         if len({*names}) < len(names):
             raise ValueError("costs: a policy is listed twice")
-        ScenarioSpace.of(**self.constants)
+        scenario_of(self.constants)
         return self
 
     @property
@@ -115,7 +128,7 @@ class Timing(Document):
     @property
     def space(self) -> ScenarioSpace:
         """The scenario of the missions."""
-        return ScenarioSpace.of(**self.constants)
+        return scenario_of(self.constants)
 
 
 def measure(

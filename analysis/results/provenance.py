@@ -141,10 +141,7 @@ class Origin(Document):
         Raises:
             InputError: If it is not valid.
         """
-        try:
-            return ScenarioSpace.model_validate(self.scenario | values)
-        except ValidationError as error:
-            raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
+        return scenario_of(self.scenario | values)
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.
@@ -175,6 +172,18 @@ class Origin(Document):
         if others := [n for n in versions if n in made and made[n] != versions[n]]:
             changes.append(f"made with other versions of {', '.join(others)}")
         return changes
+
+
+def scenario_of(fields: dict[str, Any]) -> ScenarioSpace:
+    """The scenario with the fields that a document has.
+
+    Raises:
+        InputError: If they are not valid.
+    """
+    try:
+        return ScenarioSpace.model_validate(fields)
+    except ValidationError as error:
+        raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
 
 
 def study_of(data: Mapping[str, Any]) -> StudyData:

@@ -22,9 +22,12 @@ from analysis.results.resimulate import difference
 from analysis.results.store import Store
 from analysis.results.tables import results_of
 from dess import InputError, simulate
+from dess.files import read_text
 from policies import load_team
 from policies.registry import check_no_files
 from reports.pages.html import FILES, STUDY, embedded
+
+LIMIT = 256 * 2**20  # bytes of the largest page
 
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
@@ -59,6 +62,20 @@ def is_sealed(html: str) -> bool:
     return _SEAL.search(html) is not None and sealed(html) == html
 
 
+def page_text(path: Path, allowed: str) -> str:
+    """The text of a page.
+
+    Raises:
+        InputError: If it cannot be read; the message says what is allowed.
+    """
+    try:
+        return read_text(path, LIMIT)
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"{path}: no such file; {allowed}") from None
+    except InputError as error:
+        raise InputError(f"{str(error).partition('; allowed:')[0]}; {allowed}") from None
+
+
 def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = ()) -> list[Check]:
     """Check a page: its checksum, the learned policies, and missions of its studies.
 
@@ -71,10 +88,7 @@ def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = (
     Raises:
         InputError: If the file is not a page of dess, or a policy cannot be loaded.
     """
-    try:
-        html = path.read_bytes().decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read: {error}; {_ALLOWED}") from None
+    html = page_text(path, _ALLOWED)
     if not _SEAL.search(html):
         raise InputError(f"{path}: is not a page of dess; {_ALLOWED}")
     altered = [] if is_sealed(html) else ["the page has been altered"]

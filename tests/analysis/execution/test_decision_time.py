@@ -169,7 +169,7 @@ def test_what_is_missing_or_no_json_is_refused_in_a_line(tmp_path):
     with pytest.raises(InputError, match="no such file; allowed: .* dess timing --out /"):
         decision_time.read(tmp_path / "none")
     (tmp_path / "timing.json").write_text("{")
-    with pytest.raises(InputError, match="timing.json: cannot be read: "):
+    with pytest.raises(InputError, match="timing.json: not valid JSON: "):
         decision_time.read(tmp_path)
     (tmp_path / "timing.json").write_text("[]")
     with pytest.raises(InputError, match="timing.json: "):

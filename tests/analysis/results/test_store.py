@@ -98,7 +98,7 @@ FOREIGN = {
     ),
     "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
-    "no study": (lambda out: _rewrite(out, study={}), "study: has no design"),
+    "no study": (lambda out: _rewrite(out, study={}), "study: has no description"),
 }
 
 
