@@ -47,6 +47,7 @@ from policies import load_team
 FILE = "timing.json"
 SCHEMA_VERSION = 1
 SLOW = 0.95  # the quantile that is reported for slow calls
+MAX_MISSIONS = 1_000  # of a policy: the time of every call in them is kept
 ROUNDS = 3  # rounds of the batch engine; the median time counts
 THREADS = 1  # threads of the numerical libraries; a UAV has at most one free core
 
@@ -156,9 +157,10 @@ def measure(
     Raises:
         InputError: If there is no such policy or scenario, or a number is out of range.
     """
-    if not policies or missions < 1:
+    if not policies or not 1 <= missions <= MAX_MISSIONS:
         raise InputError(
-            f"policies, missions: {len(policies)} and {missions}; allowed: at least one of each"
+            f"policies, missions: {len(policies)} and {missions}; allowed: at least one of each, "
+            f"{MAX_MISSIONS:,} missions at most"
         )
     check_seed(seed, missions - 1)
     space = load_scenario(scenario)

@@ -11,14 +11,13 @@ from analysis.execution.effort import (
     FEW,
     Clock,
     are_few,
-    check_processes,
     check_time,
     check_workers,
+    check_workers_memory,
     seconds_per_mission,
 )
 from analysis.execution.reuse import sources
-from analysis.execution.runner import CHUNK
-from analysis.results.chunks import check_parts, parts_of, split
+from analysis.results.chunks import Chunk, check_parts, parts_of
 from analysis.results.store import MANIFEST, Store
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
@@ -157,23 +156,16 @@ def check_effort(
     )
     if study.size > MAX_SIZE:
         raise InputError(f"{what}; allowed: {MAX_SIZE:,} design points")
-    if yes:
+    if yes or not sum(missing) + logs:
         return sum(missing)
-    ends = [study.point(number).scenario for number in {0, study.size - 1}]
-    held = study.size * POINT_MEMORY + study.size * study.first * len(teams) * MISSION_MEMORY
-    check_processes(what, workers, ends, held)
-    if study.size <= MANY_POINTS and all(are_few(sum(missing) + logs, space) for space in ends):
-        return sum(missing)
-    times = [
-        missing[team] * _seconds_per_mission(study, team, study.engine, clock)
-        + logs / len(teams) * (_seconds_per_mission(study, team, "events", clock) if logs else 0.0)
-        for team in teams
-        if missing[team] or logs
-    ]
-    seconds = sum(times) / workers
     if study.size > MANY_POINTS:
+        seconds = _seconds(study, missing, logs, clock) / workers
         raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
-    check_time(what, seconds)
+    ends = [study.point(number).scenario for number in {0, study.size - 1}]
+    if not all(are_few(sum(missing) + logs, space) for space in ends):
+        check_time(what, _seconds(study, missing, logs, clock) / workers)
+    held = study.size * (POINT_MEMORY + study.first * len(teams) * MISSION_MEMORY)
+    check_workers_memory(what, workers, ends, held)
     return sum(missing)
 
 
@@ -204,9 +196,8 @@ def _missing(study: Study, store: Store | None, team: int) -> tuple[int, int]:
         return study.size * study.first, study.size * study.first
     manifest = store.manifest
     parts = parts_of(manifest, team) + check_parts(manifest, team)
-    missing = (store.missing(chunk) for chunk in split(parts, CHUNK[study.engine]))
-    wanted = sum(len(part.replications) for part in parts)
-    return sum(chunk.missions for chunk in missing if chunk), wanted
+    missing = store.missing(Chunk(team, tuple(parts)))
+    return missing.missions if missing else 0, sum(len(part.replications) for part in parts)
 
 
 def _budget(study: Study) -> int:
@@ -225,6 +216,15 @@ def _logs(study: Study, store: Store | None = None) -> int:
         return needed
     cells = (cell for of_team in store.manifest.cells for cell in of_team)
     return sum(len(store.missing_logs(cell, study.logged)) for cell in cells)
+
+
+def _seconds(study: Study, missing: Sequence[int], logs: int, clock: Clock) -> float:
+    """Estimated time [s] of missing missions of every team, and of event logs, on one core."""
+    seconds = 0.0
+    for team, missions in enumerate(missing):
+        seconds += missions and missions * _seconds_per_mission(study, team, study.engine, clock)
+        seconds += logs and logs / len(missing) * _seconds_per_mission(study, team, "events", clock)
+    return seconds
 
 
 def _seconds_per_mission(study: Study, team: int, engine: str, clock: Clock) -> float:

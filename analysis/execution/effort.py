@@ -29,7 +29,7 @@ TRIAL_SEED = 400_000_000
 LONG_RUN, FEW = 3600.0, 10_000
 ORDINARY = 3 * 500  # UAVs times mission slots of the missions that FEW counts
 
-CONFIRMED = "--yes, or less"
+CONFIRMED = "--yes, or less"  # in Python: yes=True
 
 
 def check_workers(workers: int) -> None:
@@ -96,20 +96,27 @@ def check_time(what: str, seconds: float, allowed: str = CONFIRMED) -> None:
         raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {allowed}")
 
 
-def check_processes(what: str, workers: int, spaces: Iterable[ScenarioSpace], more: float) -> None:
+def check_workers_memory(
+    what: str,
+    workers: int,
+    spaces: Iterable[ScenarioSpace],
+    more: float,
+    are_processes: bool = True,
+) -> None:
     """Refuse workers that take more memory than is available.
 
     Args:
         what: What they do, for the message.
-        workers: Number of processes.
+        workers: Number of processes or threads.
         spaces: Scenarios of the missions.
         more: What this process needs in addition [bytes].
+        are_processes: Whether the workers are processes.
 
     Raises:
         InputError: If they do.
     """
-    each = max(map(channel_memory, spaces), default=0) + (WORKER_MEMORY if workers > 1 else 0)
-    check_memory(f"{what}, workers: {workers:,}", workers * each + more, CONFIRMED)
+    each = max(map(channel_memory, spaces)) + (WORKER_MEMORY if are_processes else 0)
+    check_memory(what, workers * each + more, CONFIRMED)
 
 
 def channel_memory(space: ScenarioSpace) -> int:

@@ -9,9 +9,9 @@ import numpy as np
 from analysis.execution.effort import (
     Clock,
     are_few,
-    check_processes,
     check_time,
     check_workers,
+    check_workers_memory,
     seconds_per_mission,
 )
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
@@ -175,14 +175,15 @@ def check_evaluation(
         _check(scenario, team, missions, seed, workers)
     if yes:
         return
-    what = f"evaluate: {missions * len(teams):,} missions (policies: {len(teams)})"
-    check_processes(what, workers, [scenario], MEMORY)
-    if not are_few(missions * len(teams), scenario):
+    asked = missions * len(teams)
+    what = f"evaluate: {asked:,} missions (policies: {len(teams)}, workers: {workers:,})"
+    if not are_few(asked, scenario):
         each = [
             seconds_per_mission(lambda n: [scenario] * n, load_team(team), engine, clock)
             for team in teams
         ]
-        check_time(f"{what}, workers: {workers:,}", missions * sum(each) / workers)
+        check_time(what, missions * sum(each) / workers)
+    check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
 
 
 def _check(scenario: ScenarioSpace, team: str, missions: int, seed: int, workers: int) -> None:
@@ -245,10 +246,9 @@ def _evaluations(
         policies = load_team(team)
         simulate_batch(scenario, policies, seed, 1)  # compiles
         for piece in pieces:
-            numbers = np.arange(piece.start, piece.stop)
             begin = clock()
             records = simulate_batch(
-                scenario, policies, seed, numbers, workers=workers, progress=progress
+                scenario, policies, seed, piece, workers=workers, progress=progress
             )
             yield Evaluation(team, records, clock() - begin)
         return

@@ -42,6 +42,7 @@ LONGEST = 60  # largest number of characters for the fields in a name
 # Missions in the search for the cheapest setting: at most, per setting on average and over all
 # settings; and with how many of every setting it begins.
 BUDGET, ALL, FIRST = 2_000, 1_000_000, 20
+FLEET = ("uavs", "pads", "zone")  # fields on which the numbers of UAVs and pads depend
 LITTLE = 0.01  # as a share of the prices: a saving that does not matter
 
 
@@ -213,13 +214,14 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
 
 
 def _spaces(study: Study) -> list[ScenarioSpace]:
-    """A scenario for every value of every field, with all other fields at their first value."""
+    """A scenario for every value of the fields on which the fleet depends, one at a time."""
     design = study.design
     assert isinstance(design, Grid)
     numbers, step = [0], design.count
-    for values in design.values.values():
+    for field, values in design.values.items():
         step //= len(values)
-        numbers += [step * place for place in range(1, len(values))]
+        if field in FLEET:
+            numbers += [step * place for place in range(1, len(values))]
     return [study.point(number).scenario for number in numbers]
 
 

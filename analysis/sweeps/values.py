@@ -42,8 +42,9 @@ def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
     Raises:
         InputError: If there is none, one is listed twice, or there are too many.
     """
-    if not 0 < len(given) <= MAX_SIZE:
-        counted = f"{len(given):,}" if len(given) else "no"
+    count = _count(given)
+    if not 0 < count <= MAX_SIZE:
+        counted = f"{count:,}" if count else "no"
         raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
     values = tuple(_plain(value) for value in given)
     known = set()
@@ -53,6 +54,13 @@ def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
             raise InputError(f"{field}: {text} is listed twice; allowed: distinct values")
         known.add(text)
     return values
+
+
+def _count(given: Sequence[Any] | np.ndarray) -> int:
+    """The number of values; ``len`` fails for ranges of more than 2^63."""
+    if isinstance(given, range):
+        return max(0, -((given.start - given.stop) // given.step))
+    return len(given)
 
 
 def _is_value(field: str, given: Any) -> bool:

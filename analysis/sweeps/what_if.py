@@ -174,6 +174,7 @@ def what_if(
     workers: int = 1,
     shown: str | None = None,
     progress: Progress | None = None,
+    yes: bool = False,
 ) -> WhatIf:
     """Simulate a baseline and a variation of it with common random numbers, and compare them.
 
@@ -192,12 +193,13 @@ def what_if(
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
         shown: The policy of ``typical`` and ``worst``. By default the best one in the variation.
         progress: Called with the number of missions done since its last call.
+        yes: Whether the question may take more than an hour.
 
     Raises:
         InputError: Before anything is written, if a field, a value or a policy is unknown or not
-            allowed, or a policy cannot act in the scenario.
+            allowed, a policy cannot act in the scenario, or the question would take long.
     """
     study = question.question(settings, baseline, scenario, policies, missions, seed)
     question.check_policy(study, shown or study.policies[0])
-    results = question.ask(study, folder, workers, progress)
+    results = question.ask(study, folder, workers, progress, yes)
     return WhatIf(results, shown or answer.best_policy(results, VARIATION))

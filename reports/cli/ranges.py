@@ -77,7 +77,7 @@ def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any
         return _spaced(text, first, last, count, field in INTEGERS)
     if field not in INTEGERS:
         raise _refused(text, "has no number of values", f"{text}:5, for five of them")
-    if first % 1 or last % 1:
+    if not _is_whole(first) or not _is_whole(last):
         raise _refused(text, "has an end that is not an integer", f"integers, as {field} has")
     return range(int(first), int(last) + 1)
 
@@ -91,10 +91,14 @@ def _spaced(text: str, first: Decimal, last: Decimal, count: str, is_integer: bo
         raise _refused(text, "has no number of values", f"2 to {MAX_SIZE:,} after the colon")
     values = [first + (last - first) * place / (number - 1) for place in range(number)]
     if is_integer:
-        if any(value % 1 for value in values):
+        if not all(map(_is_whole, values)):
             raise _refused(text, f"has {number} values that are not integers", "another number")
         return [int(value) for value in values]
     return [float(value) for value in values]
+
+
+def _is_whole(number: Decimal) -> bool:
+    return number == number.to_integral_value()  # unlike %, also where it has very many digits
 
 
 def _number(text: str, end: str) -> Decimal:

@@ -96,7 +96,11 @@ def verify(
     ],
     missions: Annotated[
         int,
-        typer.Option(min=1, help="Largest number of missions to simulate again, for every study."),
+        typer.Option(
+            min=1,
+            max=10_000,
+            help="Largest number of missions to simulate again, for every study.",
+        ),
     ] = 20,
     seed: Annotated[
         int | None,
@@ -153,7 +157,7 @@ def timing(
             help="Policies to measure; repeatable.  [default: those of the study comparison]",
         ),
     ] = None,
-    missions: Annotated[int, typer.Option(min=1, help="Missions per policy.")] = 30,
+    missions: Annotated[int, typer.Option(min=1, max=1_000, help="Missions per policy.")] = 30,
 ) -> None:
     """Measure how long a policy takes to decide; measurements of this machine and code are kept."""
     from analysis.execution.decision_time import is_current, measure, read, writing

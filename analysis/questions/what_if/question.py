@@ -20,6 +20,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from analysis import numbers
+from analysis.execution.dry_run import check_effort
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
 from analysis.results.chunks import short_hash
@@ -110,7 +111,11 @@ def check_policy(study: Study, policy: str) -> None:
 
 
 def ask(
-    study: Study, folder: str | Path, workers: int = 1, progress: Progress | None = None
+    study: Study,
+    folder: str | Path,
+    workers: int = 1,
+    progress: Progress | None = None,
+    yes: bool = False,
 ) -> Results:
     """Run a question into ``FOLDER/what-if/KEY``; missions of other questions there are reused.
 
@@ -119,10 +124,11 @@ def ask(
         folder: Folder in which results folders are stored.
         workers: Number of processes. Two or more take seconds to start; they help in long runs.
         progress: As for ``run_study``.
+        yes: Whether a question of any length is allowed.
 
     Raises:
-        InputError: Before anything is written, if a policy cannot act in the scenario; or if the
-            folder cannot be written or is in use.
+        InputError: Before anything is written, if a policy cannot act in the scenario, or the
+            question would take long; or if the folder cannot be written or is in use.
         ChunkError: As for ``run_study``.
     """
     for policy in study.policies:
@@ -131,6 +137,7 @@ def ask(
             simulate_batch(point.scenario, team, study.seed, 1)
     out = Path(folder) / NAME / key_of(study)
     others = sorted(p.parent for p in out.parent.glob(f"*/{MANIFEST}") if p.parent != out)
+    check_effort(study, out, workers, reuse=others, yes=yes)
     return run_study(study, out, workers, progress=progress, reuse=others)
 
 

@@ -110,7 +110,7 @@ def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
         per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
     console.say(
         f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
-        f"x {plan.points} design points x {per_cell})"
+        f"x {plan.points:,} design points x {per_cell})"
     )
     more = "at least " if plan.at_most is not None else ""
     console.say(f"about {more}{plan.seconds:,.0f} s with {workers} at work")

@@ -194,6 +194,7 @@ def test_where_nothing_can_be_written_is_refused(measured, tmp_path):
     [
         ({"policies": []}, "at least one of each"),
         ({"missions": 0}, "at least one of each"),
+        ({"missions": 1001}, "1,000 missions at most"),
         ({"policies": ["none"]}, "policy: 'none' is unknown"),
         ({"scenario": "none"}, "none: no such scenario"),
         ({"seed": -1}, "seed"),

@@ -5,6 +5,7 @@ from analysis.execution import dry_run, effort
 from analysis.execution.dry_run import check_effort, plan_study
 from analysis.execution.effort import LONG_TRIAL, ONE, TRIAL
 from dess import InputError
+from dess.code import memory
 from tests.analysis.small import files_of, grid, small_study
 
 
@@ -102,3 +103,32 @@ def test_very_many_points_are_not_made(tmp_path):
     with pytest.raises(InputError, match="20,000,000,000,000 missions .*: 1,048,576 design points"):
         check_effort(study, tmp_path / "out", yes=True)
     assert "points" not in study.__dict__
+
+
+@pytest.mark.parametrize("kind", ["latin-hypercube", "saltelli"])
+def test_very_many_points_are_planned_without_making_them(kind, tmp_path):
+    size = {"size": 2**20} if kind == "latin-hypercube" else {"base": 2**17}
+    design = {"kind": kind, "ranges": {"quota": [1, 50], "arrival_rate": [0.0, 0.1]}} | size
+    study = small_study(tmp_path, design=design, policies=["random"], missions=1)
+    plan = plan_study(study, tmp_path / "out")
+    assert plan.missions == plan.points == study.size
+    assert study.size > 600_000
+    with pytest.raises(InputError, match=f"{study.size:,} missions to simulate .*--yes, or less"):
+        check_effort(study, tmp_path / "out")
+    assert "points" not in study.__dict__ | study.design.__dict__
+
+
+def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
+    study = small_study(tmp_path, missions=10**9)
+    monkeypatch.setattr(memory, "available_memory", lambda: 2**40)
+    line = r"2,000,000,000 missions .*: about 1,86\d\.\d GiB of memory, of which 1,024.0 are avail"
+    with pytest.raises(InputError, match=line):
+        check_effort(study, tmp_path / "out", clock=Clock(0.0))
+    assert plan_study(study, tmp_path / "out").missions == 2 * 10**9
+
+
+def test_event_logs_take_time_too(tmp_path):
+    study = small_study(tmp_path, missions=4000, logged=4000, policies=["random"])
+    with pytest.raises(InputError, match="4,000 missions to simulate .*about 4 hours"):
+        check_effort(study, tmp_path / "out", clock=Clock(1.8))
+    check_effort(study, tmp_path / "out", clock=Clock(1.8), yes=True)

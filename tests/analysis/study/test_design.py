@@ -283,3 +283,18 @@ def test_a_grid_of_very_many_points_is_counted_without_making_them():
     assert [*design.point(10**12 - 2).values.values()] == [1000, 1000, 1000, 999]
     with pytest.raises(InputError, match="design: 1,000,000,000,000 points; allowed: 1,048,576"):
         len(design.points)
+
+
+def test_a_saltelli_design_has_no_more_points_than_others():
+    text = HEAD + 'saltelli"\nranges = {quota = [1, 9], uavs = [1, 2]}\nbase = '
+    assert plan(text + str(2**17)).count == 5 * 2**17
+    with pytest.raises(ValidationError, match="gives 1,310,720 design points; allowed: 131,072 at"):
+        plan(text + str(2**18))
+
+
+@pytest.mark.parametrize("kind", ["latin-hypercube", "saltelli"])
+def test_a_sampled_point_is_made_alone(kind):
+    design = plan(TOML[kind])
+    alone = design.point(7)
+    assert "points" not in design.__dict__
+    assert alone == design.points[7]

@@ -92,3 +92,9 @@ def test_a_policy_to_show_that_is_not_asked_about_is_refused(tmp_path: Path) -> 
     with pytest.raises(InputError, match="shown: 'tour' is not asked about"):
         ask(tmp_path, shown="tour")
     assert [path.name for path in tmp_path.iterdir()] == ["small.toml"]
+
+
+def test_a_question_that_would_take_too_much_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="4,000,000,000 missions to simulate .*--yes, or less"):
+        ask(tmp_path, missions=10**9)
+    assert "results" not in {path.name for path in tmp_path.iterdir()}

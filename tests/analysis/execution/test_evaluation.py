@@ -1,0 +1,127 @@
+"""Evaluations of any number of missions: their means, and the memory that they take."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from analysis.execution import effort, evaluation
+from analysis.execution.evaluation import check_evaluation, evaluate, means
+from analysis.stats.intervals import Moments, interval_of
+from dess import InputError, load_scenario
+from dess.code import memory
+from dess.streams import MAX_SEED
+from tests.analysis.small import environment
+
+SPACE = load_scenario("paper", quota=30)
+RUN = """
+import resource, sys
+from reports.cli import main
+code = main(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, code)
+"""
+
+
+@pytest.fixture
+def handed(monkeypatch):
+    """The replications that the batch engine is given at a time."""
+    calls = []
+    simulate = evaluation.simulate_batch
+
+    def counted(scenario, team, seed, replications, **options):
+        calls.append(replications)
+        return simulate(scenario, team, seed, replications, **options)
+
+    monkeypatch.setattr(evaluation, "simulate_batch", counted)
+    return calls
+
+
+def test_means_are_those_of_all_records_bit_for_bit(monkeypatch, handed):
+    monkeypatch.setattr(evaluation, "MEMORY", 20_000)  # 32 missions of three UAVs
+    records = evaluate(SPACE, "greedy,random", 300, 5).records.missions
+    handed.clear()
+    found = means(SPACE, "greedy,random", 300, 5, workers=2)
+    assert handed == [1, *(range(n, min(n + 32, 300)) for n in range(0, 300, 32))]
+    for metric in evaluation.METRICS:
+        assert found.moments[metric].interval(metric) == interval_of(metric, records[metric])
+    assert found.uav_slots == records["uav_slots"].sum()
+    events = means(SPACE, "greedy,random", 300, 5, "events")
+    assert events.moments == found.moments
+
+
+def test_blocks_are_added_up_in_order(monkeypatch):
+    monkeypatch.setattr(evaluation, "MEMORY", 20_000)
+    monkeypatch.setattr(evaluation, "BLOCK", 64)
+    records = evaluate(SPACE, "greedy", 300, 5).records.missions
+    one, two = means(SPACE, "greedy", 300, 5), means(SPACE, "greedy", 300, 5, workers=2)
+    assert one.moments == two.moments
+    monkeypatch.setattr(evaluation, "MEMORY", 5_000)
+    assert means(SPACE, "greedy", 300, 5).moments == one.moments
+    for metric in evaluation.METRICS:
+        whole = Moments.of(records[metric])
+        assert one.moments[metric] == pytest.approx(whole, rel=1e-12)
+        assert one.moments[metric][-2:] == whole[-2:]
+
+
+def test_the_missions_that_are_simulated_together_do_not_grow(handed):
+    size = evaluation._together(SPACE)
+    assert evaluation.BLOCK % size == 0
+    fleets = [load_scenario("paper", uavs=n) for n in (1, 16)]
+    assert evaluation._together(fleets[0]) > size > evaluation._together(fleets[1])
+    records = evaluate(SPACE, "random", 2).records
+    assert sum(kind.nbytes for kind in records) / 2 * size <= evaluation.MEMORY
+
+
+def test_replications_up_to_the_largest_are_evaluated(monkeypatch):
+    with pytest.raises(InputError, match=r"missions: 4294967297 .*; allowed: 1..4,294,967,296"):
+        means(SPACE, "random", 2**32 + 1)
+    with pytest.raises(InputError, match="missions: 0 is out of range"):
+        evaluate(SPACE, "random", 0)
+    assert means(SPACE, "random", 2, MAX_SEED).moments["success"].n == 2
+    with pytest.raises(InputError, match="seed: 18446744073709551616 is out of range"):
+        means(SPACE, "random", 2, MAX_SEED + 1)
+
+
+def test_what_takes_too_much_is_refused_before_it_begins(monkeypatch, handed):
+    ticks = iter(range(0, 10**9, 1))  # a trial takes a second
+    monkeypatch.setattr(effort, "LONG_RUN", 500.0)
+    check_evaluation(SPACE, ["random"], 10_000, clock=lambda: next(ticks))
+    line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), about \d+ days; allowed"
+    with pytest.raises(InputError, match=f"{line}: --yes, or less"):
+        check_evaluation(SPACE, ["random", "greedy"], 10**9, workers=4, clock=lambda: next(ticks))
+    check_evaluation(SPACE, ["random"], 10**9, yes=True)
+    monkeypatch.setattr(memory, "available_memory", lambda: 2**20)
+    with pytest.raises(InputError, match=r"GiB of memory, of which 0.0 are available"):
+        check_evaluation(SPACE, ["random"], 10)
+    assert handed == []
+
+
+def _peak(*arguments: object) -> int:
+    command = [sys.executable, "-c", RUN, "evaluate", "--json", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment())
+    *document, last = done.stdout.strip().splitlines()
+    peak, code = map(int, last.split())
+    assert code == 0, done.stderr
+    assert json.loads("\n".join(document))[0]["missions"] == arguments[-1]
+    return peak
+
+
+@pytest.mark.slow
+def test_a_million_missions_take_less_than_400_mib() -> None:
+    short = ("--policy", "greedy", "--set", "max_slots=20", "--yes")
+    few = _peak(*short, "--missions", 1000)
+    for workers in (1, 2):
+        million = _peak(*short, "--workers", workers, "--missions", 1_000_000)
+        assert million < 400 * 2**20
+        assert million - few < 120 * 2**20  # of records alone it would be 320 bytes per mission
+
+
+def test_moments_of_parts_are_those_of_the_whole() -> None:
+    values = np.random.default_rng(1).normal(1e6, 1.0, 10_000)
+    whole, parts = Moments.of(values), Moments.of(values[:10])
+    for part in np.split(values[10:], [500, 501, 7_000]):
+        parts = parts.with_others(Moments.of(part))
+    assert parts == pytest.approx(whole, rel=1e-10)
+    assert parts.student() == pytest.approx(whole.student(), rel=1e-12)
