@@ -1,16 +1,18 @@
 """What there is to know about a policy: where it comes from, what it can simulate, its card."""
 
 import inspect
-import json
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import dess
+from dess.files import read_text
 from dess.scenario import SAMPLED, load_scenario, scenario_names
 from policies.base import Policy
-from policies.registry import CONFIG, FILE, SHIPPED, folder_of, load, package_of, trained_names
+from policies.ddqn.description import read_description
+from policies.registry import FILE, SHIPPED, folder_of, load, package_of, trained_names
 
 CARD = "README.md"  # beside the weights of a trained policy
+CARD_LIMIT = 2**20  # bytes
 
 
 class About(NamedTuple):
@@ -42,11 +44,10 @@ def about(name: str) -> About:
         InputError: If it does not exist or cannot be loaded.
     """
     policy, folder = load(name), folder_of(name)
-    config = json.loads((folder / CONFIG).read_text("utf-8")) if folder else {}
-    card = folder / CARD if folder else Path(CARD)
-    requires = config.get("layout", {})
+    described = read_description(folder) if folder else None
+    requires = described.layout.model_dump() if described else {}
     scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
-    trained_on = config.get("training", {}).get("scenario")
+    trained_on = described.training.scenario if described else ""
     return About(
         name=name,
         origin=_origin(name),
@@ -56,8 +57,16 @@ def about(name: str) -> About:
         trained_on={field: scenarios[trained_on][field] for field in SAMPLED}
         if trained_on in scenarios
         else {},
-        card=card.read_text("utf-8") if folder and card.exists() else _docstring(policy),
+        card=_card(folder) or _docstring(policy),
     )
+
+
+def _card(folder: Path | None) -> str:
+    """The model card in the folder of a trained policy; empty without one."""
+    try:
+        return read_text(folder / CARD, CARD_LIMIT) if folder else ""
+    except FileNotFoundError:
+        return ""
 
 
 def _origin(name: str) -> str:

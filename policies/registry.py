@@ -102,7 +102,7 @@ def load(name: str | Path) -> Policy:
     outside = _outside()
     if name not in outside:
         _check_untrained(Path(name))
-        raise InputError(f"policy: {name!r} is unknown{one_of(name, names(), _OTHERS)}")
+        raise InputError(f"policy: {shown(name)} is unknown{one_of(name, names(), _OTHERS)}")
     return _made(name, outside[name].value, outside[name].load)
 
 
@@ -117,7 +117,7 @@ def _check_untrained(folder: Path) -> None:
     """Raise an error if a folder has a training that has not written any weights yet."""
     from policies.ddqn.config import CHECKPOINT  # imports pydantic
 
-    if (folder / CHECKPOINT).exists():
+    if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
             f"policy: {folder} is a training that has no weights yet; continue it with "
             f"dess train CONFIG --out {folder} --resume"
@@ -153,7 +153,9 @@ def _class_of(module: str, name: str) -> Callable[[], Any]:
     found = vars(import_module(module))
     if name not in found:
         classes = [n for n, value in found.items() if hasattr(value, "act")]
-        raise InputError(f"policy: {module}: {name!r} is no class of it{one_of(name, classes)}")
+        raise InputError(
+            f"policy: {module}: {shown(name)} is no class of it{one_of(name, classes)}"
+        )
     return found[name]
 
 

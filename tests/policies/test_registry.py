@@ -1,5 +1,6 @@
 """From names to policies, the shipped ones and those of outside packages."""
 
+import os
 import pickle
 import subprocess
 import sys
@@ -257,6 +258,17 @@ def test_what_a_policy_is_and_can_simulate(file: Path) -> None:
     assert about(f"{file}:Eager").origin == f"the file {file}"
 
 
+def test_the_card_of_a_policy_is_a_regular_file(tmp_path: Path) -> None:
+    folder = _trained(tmp_path / "novice")
+    assert about(str(folder)).card.startswith("A network as a policy.")
+    (folder / "README.md").write_text("# novice")
+    assert about(str(folder)).card == "# novice"
+    (folder / "README.md").unlink()
+    os.mkfifo(folder / "README.md")
+    with pytest.raises(InputError, match=r"README\.md: cannot be read: it is a pipe"):
+        about(str(folder))
+
+
 @pytest.mark.usefixtures("outside")
 def test_the_package_of_a_policy_is_named() -> None:
     assert about("still").origin == "the package outside-policies 1"
@@ -278,7 +290,10 @@ def test_which_policies_are_python_files_is_known_without_running_them(
     assert "trap" not in sys.modules
 
 
-@pytest.mark.parametrize("name", ["x" * 5000 + ".py:X", "a\0b.py:X", "\udcff.py:X", "a\0b"])
+@pytest.mark.parametrize(
+    "name", ["x" * 5000 + ".py:X", "a\0b.py:X", "\udcff.py:X", "a\0b", "x" * 5000, "a\nb"]
+)
 def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(InputError) as error:
         policies.load(name)
+    assert "\n" not in str(error.value)
