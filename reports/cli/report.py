@@ -12,6 +12,7 @@ import typer
 
 from dess import InputError
 from reports.cli import completion, console
+from reports.cli.running import YesOption
 from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ def verify(
             "option, since anybody may have made the results; repeatable.",
         ),
     ] = None,
+    yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check a page or results: simulate a random sample of the missions again, and compare."""
@@ -124,7 +126,7 @@ def verify(
     seed = secrets.randbelow(2**32) if seed is None else seed
     check = verify_results if path.is_dir() else verify_page
     with console.compile_notice():
-        verdicts = check(path, missions, seed, policy or [])
+        verdicts = check(path, missions, seed, policy or [], yes)
     if as_json:
         checks = [asdict(verdict) for verdict in verdicts]
         print(json.dumps({"seed": seed, "checks": checks}, indent=2))

@@ -7,7 +7,7 @@ missions again still shows the difference.
 """
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -15,19 +15,23 @@ from pathlib import Path
 import pandas as pd
 from pydantic import TypeAdapter, ValidationError
 
+from analysis.execution.effort import CONFIRMED, channel_memory, check_time
 from analysis.results import commands
-from analysis.results.evidence import Evidence, chosen, learned_files
+from analysis.results.evidence import Evidence, Mission, chosen, learned_files
 from analysis.results.files import MANIFEST
 from analysis.results.resimulate import difference
 from analysis.results.store import Store
 from analysis.results.tables import results_of
 from dess import InputError, simulate
+from dess.code.memory import check_memory
 from dess.files import read_text
+from dess.scenario import ScenarioSpace
 from policies import load_team
 from policies.registry import check_no_files
 from reports.pages.html import FILES, STUDY, embedded
 
-LIMIT = 256 * 2**20  # bytes of the largest page
+LIMIT = 64 * 2**20  # bytes of the largest page
+EVENT = 5e-5  # the time of an event in the SimPy engine [s], with its share of the decisions
 
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
@@ -49,6 +53,47 @@ class Check:
     compared: int
     differing: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+
+@dataclass
+class _Sampling:
+    """Which missions are simulated again, and how long all of them take.
+
+    Attributes:
+        missions: The largest number of missions of every study.
+        seed: Seed of the random choice.
+        named: Policies of Python files that the user has named.
+        yes: Whether any time and memory is allowed.
+        seconds: The longest time that the missions so far can take [s].
+    """
+
+    missions: int
+    seed: int
+    named: Collection[str] = ()
+    yes: bool = False
+    seconds: float = 0.0
+
+    def drawn(self, count: int) -> Sequence[int]:
+        """Which of a number of missions are simulated again."""
+        return chosen(count, self.missions, self.seed)
+
+    def admit(self, what: str, spaces: Sequence[ScenarioSpace]) -> None:
+        """Refuse missions that take too much, before the first of them is simulated.
+
+        Raises:
+            InputError: If all missions may take more than an hour, or one takes too much memory.
+        """
+        self.seconds += sum(map(_longest, spaces))
+        if not self.yes:
+            check_time(f"{what}: {len(spaces)} missions to simulate", self.seconds)
+            for space in spaces:
+                check_memory(f"{what}: a mission", channel_memory(space), CONFIRMED)
+
+
+def _longest(space: ScenarioSpace) -> float:
+    """The longest time that the SimPy engine takes for a mission [s]."""
+    in_slot = space.uavs[1] * space.communication_slots + len(space.nodes) * space.arrival_rate
+    return space.max_slots * in_slot * EVENT
 
 
 def sealed(html: str) -> str:
@@ -76,7 +121,9 @@ def page_text(path: Path, allowed: str) -> str:
         raise InputError(f"{str(error).partition('; allowed:')[0]}; {allowed}") from None
 
 
-def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = ()) -> list[Check]:
+def verify_page(
+    path: Path, missions: int, seed: int, named: Collection[str] = (), yes: bool = False
+) -> list[Check]:
     """Check a page: its checksum, the learned policies, and missions of its studies.
 
     Args:
@@ -84,9 +131,11 @@ def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = (
         missions: The largest number of missions to simulate again, for every study on the page.
         seed: Seed of the random choice of these missions.
         named: Policies of Python files that the user has named, so that they may be run.
+        yes: Whether missions may take any time.
 
     Raises:
-        InputError: If the file is not a page of dess, or a policy cannot be loaded.
+        InputError: If the file is not a page of dess, a policy cannot be loaded, or the missions
+            may take more than an hour.
     """
     html = page_text(path, _ALLOWED)
     if not _SEAL.search(html):
@@ -95,12 +144,14 @@ def verify_page(path: Path, missions: int, seed: int, named: Collection[str] = (
     files = [_check_files(text, path) for text in embedded(FILES, html)]
     studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
     notes = [] if studies else ["contains no missions to simulate again"]
-    records = [check_records(evidence, missions, seed, named) for evidence in studies]
+    sampling = _Sampling(missions, seed, named, yes)
+    drawn = [_drawn(evidence, sampling) for evidence in studies]  # all, before any is simulated
+    records = [_compared(*pair, named) for pair in zip(studies, drawn, strict=True)]
     return [Check("page", 1, altered, notes), *files, *records]
 
 
 def verify_results(
-    folder: Path, missions: int, seed: int, named: Collection[str] = ()
+    folder: Path, missions: int, seed: int, named: Collection[str] = (), yes: bool = False
 ) -> list[Check]:
     """Check results: the bytes of all files, and the records and event logs of random missions.
 
@@ -112,6 +163,7 @@ def verify_results(
         missions: The largest number of missions to simulate again, for every study.
         seed: Seed of the random choice of these missions.
         named: Policies of Python files that the user has named, so that they may be run.
+        yes: Whether missions may take any time.
 
     Raises:
         InputError: If there are no results, they are incomplete, or a policy cannot be loaded.
@@ -119,13 +171,14 @@ def verify_results(
     folders = sorted(path.parent for path in folder.rglob(MANIFEST))
     if not folders:
         raise InputError(f"{folder}: contains no results and is not a page; {_ALLOWED}")
+    sampling = _Sampling(missions, seed, named, yes)
     if folders == [folder]:
-        return _check_study(Store.read(folder), missions, seed, named)
+        return _check_study(Store.read(folder), sampling)
     checks = []
     for path in folders:
         try:
             if (store := Store.read(path)).manifest.complete:
-                checks += _check_study(store, missions, seed, named)
+                checks += _check_study(store, sampling)
             else:
                 checks.append(Check(str(path), 0, notes=["incomplete, so not checked"]))
         except InputError as error:
@@ -133,49 +186,64 @@ def verify_results(
     return checks
 
 
-def _check_study(store: Store, missions: int, seed: int, named: Collection[str]) -> list[Check]:
+def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: has been changed since it was written" for path in store.damaged]
         return [Check(store.manifest.study["name"], 0, lines)]
-    evidence = Evidence.of(results_of(store), missions, seed)
-    records = check_records(evidence, missions, seed, named)
-    return [records, _check_logs(store, missions, seed)] if store.logged else [records]
+    evidence = Evidence.of(results_of(store), sampling.missions, sampling.seed)
+    records = _compared(evidence, _drawn(evidence, sampling), sampling.named)
+    return [records, _check_logs(store, sampling)] if store.logged else [records]
 
 
-def check_records(
-    evidence: Evidence, missions: int, seed: int, named: Collection[str] = ()
-) -> Check:
+def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
     """Simulate a random part of the sample again, with the SimPy engine, and compare the records.
 
     Args:
         evidence: The evidence of the study.
         missions: The largest number of missions.
         seed: Seed of the random choice.
-        named: Policies of Python files that the user has named, so that they may be run.
 
     Raises:
-        InputError: If a policy does not exist or is a file that is not named, or a scenario is not
-            valid.
+        InputError: If a policy does not exist or is a Python file, a scenario is not valid, or the
+            missions may take more than an hour.
     """
-    study = evidence.study["name"]
-    check_no_files((team.policy for team in evidence.policies), f"study {study}", named)
-    lines, numbers = [], chosen(len(evidence.sample), missions, seed)
-    for mission in (evidence.sample[number] for number in numbers):
+    return _compared(evidence, _drawn(evidence, _Sampling(missions, seed)))
+
+
+def _drawn(evidence: Evidence, sampling: _Sampling) -> list[tuple[Mission, ScenarioSpace]]:
+    """The missions of a study that are simulated again, with their scenarios."""
+    study = f"study {evidence.study['name']}"
+    check_no_files((team.policy for team in evidence.policies), study, sampling.named)
+    sample = [evidence.sample[number] for number in sampling.drawn(len(evidence.sample))]
+    spaces = [evidence.space(mission.values) for mission in sample]
+    sampling.admit(study, spaces)
+    return [*zip(sample, spaces, strict=True)]
+
+
+def _compared(
+    evidence: Evidence,
+    drawn: Sequence[tuple[Mission, ScenarioSpace]],
+    named: Collection[str] = (),
+) -> Check:
+    """Simulate missions again, and compare their records."""
+    lines = []
+    for mission, space in drawn:
         policy, values, replication = mission.policy, mission.values, mission.replication
-        space = evidence.space(values)
-        team = load_team(policy, space.uavs[1])
-        record = simulate(space, team, evidence.seed, replication)
+        record = simulate(space, load_team(policy, space.uavs[1]), evidence.seed, replication)
         if changed := difference(record, mission.record):
             command = commands.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
-    return Check(study, len(numbers), lines, evidence.changes_here(named))
+    return Check(evidence.study["name"], len(drawn), lines, evidence.changes_here(named))
 
 
-def _check_logs(store: Store, missions: int, seed: int) -> Check:
+def _check_logs(store: Store, sampling: _Sampling) -> Check:
     """Simulate some missions with a stored event log again, and compare the logs."""
-    manifest, logged, lines = store.manifest, store.logged, []
-    numbers = chosen(len(logged), missions, seed)
-    for cell, replication in (logged[number] for number in numbers):
+    manifest, lines = store.manifest, []
+    all_logged = store.logged
+    logged = [all_logged[number] for number in sampling.drawn(len(all_logged))]
+    what = f"study {manifest.study['name']}"
+    sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
+    for cell, replication in logged:
         space = manifest.scenarios[cell.point]
         team = load_team(manifest.policies[cell.team].policy, space.uavs[1])
         log = simulate(space, team, manifest.seed, replication, events=True).events
@@ -184,7 +252,7 @@ def _check_logs(store: Store, missions: int, seed: int) -> Check:
         if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
             command = commands.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
-    return Check(f"{manifest.study['name']}, event logs", len(numbers), lines)
+    return Check(f"{manifest.study['name']}, event logs", len(logged), lines)
 
 
 def _check_files(text: str, path: Path) -> Check:

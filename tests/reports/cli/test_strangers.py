@@ -48,10 +48,10 @@ def stranger(sound: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pa
     return tmp_path
 
 
-def page_of(evidence: Evidence) -> str:
+def page_of(*evidence: Evidence) -> str:
     """A page with nothing but evidence, whose checksum is right."""
     seal = '<meta name="dess-checksum" content="">'
-    return sealed(seal + html.carrying([evidence]).data)
+    return sealed(seal + html.carrying(evidence).data)
 
 
 def printed(capsys: pytest.CaptureFixture[str]) -> str:
@@ -112,3 +112,29 @@ def test_a_python_file_is_run_once_the_user_names_it(
     assert main(["simulate", "--of", "out", *policy]) == 0
     assert "note" not in capsys.readouterr().err
     shutil.rmtree("out")
+
+
+@pytest.mark.parametrize("copies", [1, 30])
+def test_a_page_whose_missions_would_take_hours_is_refused_at_once(
+    copies: int, sound: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    evidence = Evidence.of(load_results(sound)).data
+    slots = 100_000 if copies == 1 else 20_000
+    evidence["scenario"] |= {"max_slots": slots, "communication_slots": 64, "quota": 1_000_000}
+    text = page_of(Evidence.parse(json.dumps(evidence), "page", ""))
+    names = (f'"name": "trial-{number}"' for number in range(copies))
+    page = tmp_path / "page.html"
+    page.write_text("".join(text.replace('"name": "trial"', name) for name in names), "utf-8")
+    assert main(["verify", str(page)]) == 2
+    line = printed(capsys)
+    assert "20 missions to simulate, about" in line and "allowed: --yes" in line
+    assert len(line) <= 300
+
+
+def test_a_page_that_no_memory_holds_is_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (tmp_path / "page.html").open("wb") as page:
+        page.truncate(2**40)
+    assert main(["verify", str(tmp_path / "page.html")]) == 2
+    assert "is too large" in printed(capsys)
