@@ -24,8 +24,8 @@ from analysis.execution import decision_time
 from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
-from dess.files import writable
-from reports.folders import locked, temporary_folder
+from dess.files import replacing_all, writable
+from reports.folders import locked
 from reports.pages import missions
 from reports.pages.index import INDEX, index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
@@ -137,7 +137,7 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     needed = [out] + [results for report in reports if "results" in report.parameters]
-    with _folders(needed), temporary_folder(out, ".rendering-") as folder:
+    with _folders(needed):
         missions.make([report.name for report in reports], results, values, progress)
         Kernels(progress).run(reports)
         files = {report.page: _page(report) for report in reports}
@@ -146,10 +146,9 @@ def _write(
         shown = [read(name, notebooks) for name in names_in(notebooks)]
         with locked(out, "index"), writable(out):  # the index shows the pages of other processes
             files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
-            for name, text in files.items():
-                (folder / name).write_bytes(text.encode())
-            for name in files:
-                os.replace(folder / name, out / name)
+            with replacing_all([out / name for name in files]) as temporaries:
+                for temporary, text in zip(temporaries, files.values(), strict=True):
+                    temporary.write_bytes(text.encode())
             for report in complete:
                 (out / f"{report.name}.partial.html").unlink(missing_ok=True)
     if failed := [report for report in reports if report.failure]:

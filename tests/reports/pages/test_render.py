@@ -9,8 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -333,6 +333,26 @@ def test_a_folder_that_cannot_be_written_is_refused(
         render(["mission"], results, tmp_path / "file" / "out", notebooks=notebooks)
 
 
+def test_a_page_takes_the_place_of_a_link_and_of_nothing_but_files(
+    results: Path, tmp_path: Path
+) -> None:
+    notebooks = write_notebooks(tmp_path / "notebooks", scorecard=SCORECARD)
+    (tmp_path / "elsewhere").write_text("of somebody")
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "scorecard.html").symlink_to(tmp_path / "elsewhere")
+    render(["scorecard"], results, out, notebooks=notebooks)
+    assert (tmp_path / "elsewhere").read_text() == "of somebody"
+    assert not (out / "scorecard.html").is_symlink()
+    (out / "scorecard.ipynb").unlink()
+    (out / "scorecard.ipynb").mkdir()
+    before = (out / "scorecard.html").read_bytes()
+    with pytest.raises(InputError, match="scorecard.ipynb: is a folder; allowed: a file"):
+        render(["scorecard"], results, out, notebooks=notebooks)
+    assert (out / "scorecard.html").read_bytes() == before
+    assert sorted(os.listdir(out)) == ["index.html", "scorecard.html", "scorecard.ipynb"]
+
+
 @pytest.mark.parametrize("name", ["speed", "results"])
 def test_an_unknown_parameter_is_refused(
     results: Path, notebooks: Path, tmp_path: Path, name: str
@@ -458,24 +478,71 @@ def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
     assert "the cell after" in (tmp_path / "mission.html").read_text("utf-8")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_ends_the_kernels_and_leaves_nothing(results: Path, tmp_path: Path) -> None:
-    begun = tmp_path / "begun"
-    cell = f"import time; open({str(begun)!r}, 'w').close(); time.sleep(600) #"
-    write_notebooks(tmp_path / "notebooks", mission=FAILING.replace("raise", cell))
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGKILL")
+
+
+@contextmanager
+def rendering(results: Path, folder: Path) -> Iterator[subprocess.Popen]:
+    """A process that renders a page into ``out`` and is in a cell; ``kernel`` names its kernel."""
+    kernel = folder / "kernel"
+    cell = (
+        f"import os, time; open({str(kernel)!r} + '.new', 'w').write(str(os.getpid())); "
+        f"os.replace({str(kernel)!r} + '.new', {str(kernel)!r}); time.sleep(600) #"
+    )
+    write_notebooks(folder / "notebooks", mission=FAILING.replace("raise", cell))
+    (folder / "tmp").mkdir()
     script = (
-        "from pathlib import Path; from reports.pages.render import render; "
+        "from pathlib import Path; from reports.interrupts import Interrupts; "
+        "from reports.pages.render import render\nwith Interrupts(is_last=False): "
         f"render([], {str(results)!r}, 'out', notebooks=Path('notebooks'))"
     )
-    # A background job of a shell ignores SIGINT, and its children with it: not this one.
-    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+
+    def heed() -> None:
+        """Heed signals that a background job of a shell ignores, and its children with it."""
+        for name in SIGNALS[:3]:
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+
     command = [sys.executable, "-c", script]
+    places = environment() | {"TMPDIR": str(folder / "tmp")}
     with subprocess.Popen(
-        command, cwd=tmp_path, env=environment(), preexec_fn=heed, stderr=subprocess.PIPE
+        command, cwd=folder, env=places, preexec_fn=heed, stderr=subprocess.PIPE
     ) as running:
-        while not begun.exists():
+        while not kernel.exists():
             assert running.poll() is None
             time.sleep(0.01)
-        running.send_signal(signal.SIGINT)
-        assert b"KeyboardInterrupt" in running.communicate(timeout=60)[1]
-    assert sorted(os.listdir(tmp_path)) == ["begun", "notebooks"]
+        yield running
+
+
+def runs(process: int) -> bool:
+    """Whether a process still runs; one that has ended may still wait for its parent."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sends signals, and looks for a process")
+@pytest.mark.parametrize("name", SIGNALS)
+def test_a_signal_ends_the_kernels_and_leaves_nothing(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """After SIGKILL, the kernels end by themselves, and the next page takes the rest away."""
+    with rendering(results, tmp_path) as running:
+        running.send_signal(getattr(signal, name))
+        error = running.communicate(timeout=60)[1]
+    assert name == "SIGKILL" or b"KeyboardInterrupt" in error
+    if name == "SIGKILL":
+        assert os.listdir(tmp_path / "tmp")
+        (tmp_path / "out" / f".dess-{running.pid}-0123abcd.tmp").write_text("half a page")
+        monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+        notebooks = write_notebooks(tmp_path / "others", scorecard=SCORECARD)
+        render([], results, tmp_path / "out", notebooks=notebooks)
+        pages = ["index.html", "scorecard.html", "scorecard.ipynb"]
+        assert sorted(os.listdir(tmp_path / "out")) == pages
+    kernel, begin = int((tmp_path / "kernel").read_text()), time.monotonic()
+    while runs(kernel):
+        assert time.monotonic() < begin + 20, "the kernel goes on"
+        time.sleep(0.05)
+    assert os.listdir(tmp_path / "tmp") == []
+    assert (tmp_path / "out").exists() == (name == "SIGKILL")
