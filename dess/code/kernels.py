@@ -13,10 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core.caching import IndexDataCacheFile
 
 from dess.code.sources import code_of, combined
+from dess.errors import InputError
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
@@ -26,7 +27,12 @@ def kernel(function: Callable, **options: Any) -> Any:
 
     The compiled function is cached on disk. If its module has no source file, or no folder for the
     cache can be written, it is compiled again in every process.
+
+    Raises:
+        InputError: If the environment does not let numba compile.
     """
+    if config.DISABLE_JIT:
+        raise InputError("NUMBA_DISABLE_JIT: the simulator runs only compiled; allowed: unset it")
     options = _OPTIONS | options
     stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:

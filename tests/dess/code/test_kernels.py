@@ -5,6 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from numba import config
+
+from dess.code.kernels import kernel
+from dess.errors import InputError
 
 CALLER = """
 from dess.code.kernels import kernel
@@ -63,3 +67,9 @@ def test_a_module_beside_the_script_counts_however_it_is_reached(folder: Path) -
     assert _run(folder) == "2 compiled"
     (folder / "constant.py").write_text("ONE = 3\n")
     assert _run(folder) == "4 compiled"
+
+
+def test_without_compilation_there_is_no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(config, "DISABLE_JIT", 1)
+    with pytest.raises(InputError, match="NUMBA_DISABLE_JIT: the simulator runs only compiled"):
+        kernel(abs)
