@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.reuse import sources
-from analysis.execution.workers import Cluster, Here, Pool
+from analysis.execution.workers import Here, Pool
 from analysis.results import commands
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
 from analysis.results.manifest import Selected
@@ -93,6 +94,7 @@ def run_study(
         InputError: If the study is not valid, the folder cannot be written, is in use or contains
             something else, or the scheduler cannot be used.
         ChunkError: If a chunk could not be computed. It is raised after all other chunks are done.
+        SchedulerError: If the connection to the scheduler is lost.
     """
     if not isinstance(study, Study):
         study = load_study(study)

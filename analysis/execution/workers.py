@@ -1,4 +1,4 @@
-"""Pools that run jobs: this process, joblib workers, or a dask.distributed cluster.
+"""Pools that run jobs: the base class, and pools on this machine.
 
 A job that raises an error has a ``Problem`` as its result. A worker that is killed is replaced, and
 its job is run again; a job that kills its worker every time also has a ``Problem``.
@@ -7,20 +7,19 @@ its job is run again; a job that kills its worker every time also has a ``Proble
 import os
 import signal
 import time
+import warnings
 from abc import abstractmethod
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import AbstractContextManager, closing
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from threading import Thread
 from typing import Any
 
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
 from analysis.results.chunks import Part
-from analysis.results.provenance import Member, engine_code, members_of
-from dess import InputError
-from dess.code.libraries import needs
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
+
 DEATHS = 2  # a job is given up after this many deaths of workers that ran only this job
 
 
@@ -30,6 +29,21 @@ class Pool(AbstractContextManager["Pool"]):
     @abstractmethod
     def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
         """Run the jobs; yield their numbers and results as they come in."""
+
+    @abstractmethod
+    def _once(self, job: Job) -> Any:
+        """The result of a job; None if its worker dies."""
+
+    def _given_up(self, job: Job) -> Problem:
+        """The problem of a job whose workers died, while no other job is running."""
+        line = "its workers died: killed, out of memory, or crashed"
+        return Problem(line, mission=self._deadly(job))
+
+    def _deadly(self, job: Job) -> Part | None:
+        """The first mission of a job that kills its worker when it is simulated alone."""
+        singles = (single for single in job.alone() if self._once(single) is None)
+        single = next(singles, None)
+        return single.chunk.parts[0] if single else None
 
 
 class Here(Pool):
@@ -52,25 +66,21 @@ class Here(Pool):
         while waiting:
             started: set[int] = set()
             for number, result in self._finished(waiting, started):
-                yield number, _reported(waiting.pop(number), result, progress)
+                yield number, reported(waiting.pop(number), result, progress)
             # A worker died, and one of the jobs that were running caused it.
             for number in sorted(started & waiting.keys()):
-                yield number, _reported(waiting[number], self._alone(waiting.pop(number)), progress)
+                yield number, reported(waiting[number], self._alone(waiting.pop(number)), progress)
 
     def _alone(self, job: Job) -> Any:
         """Run a job that may have killed its worker, while no other job is running."""
         for _ in range(DEATHS):
-            for _, result in self._finished({0: job}, set()):
+            if (result := self._once(job)) is not None:
                 return result
-        line = f"its worker died {DEATHS} times: killed, out of memory, or crashed"
-        return Problem(line, mission=self._deadly(job))
+        return self._given_up(job)
 
-    def _deadly(self, job: Job) -> Part | None:
-        """The first mission of a job that kills its worker when it is simulated alone."""
-        for single in job.alone():
-            if not [*self._finished({0: single}, set())]:
-                return single.chunk.parts[0]
-        return None
+    def _once(self, job: Job) -> Any:
+        results = [result for _, result in self._finished({0: job}, set())]
+        return results[0] if results else None
 
     def _finished(self, jobs: dict[int, Job], started: set[int]) -> Iterator[tuple[int, Any]]:
         """Results by job number as they come in, until a worker dies; ``started`` is updated."""
@@ -91,10 +101,42 @@ class Here(Pool):
                 yield delayed(_numbered)(number, job)
 
         try:
-            with closing(parallel(tasks())) as results:
-                yield from results
+            with _results(parallel, tasks()) as results:
+                # An expression in between, since "yield from" would close the results themselves.
+                yield from (result for result in results)
         except BrokenProcessPool:
             return
+
+
+@contextmanager
+def _results(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
+    """The results of tasks as joblib workers finish them; no task is left at the end.
+
+    Workers inherit that the signals are blocked. So if one is sent to all processes, this process
+    alone handles it, and ends the workers.
+    """
+    results: Generator[Any, None, None] = (_ for _ in [])
+    try:
+        with _blocked():
+            results = parallel(tasks)
+        yield results
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that tasks were not finished
+            results.close()
+
+
+@contextmanager
+def _blocked() -> Iterator[None]:
+    """Let the signals wait that end a command, where the system can do so."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
 def _in_turn(job: Job, progress: Progress | None) -> Any:
@@ -113,7 +155,7 @@ def _in_turn(job: Job, progress: Progress | None) -> Any:
     return result
 
 
-def _reported(job: Job, result: Any, progress: Progress | None) -> Any:
+def reported(job: Job, result: Any, progress: Progress | None) -> Any:
     """Report the missions of a finished job to ``progress``, and return its result."""
     if progress and job.missions:
         progress(job.missions)
@@ -143,68 +185,3 @@ def _live_and_die_with(parent: int) -> None:
         os._exit(1)
 
     Thread(target=watch, daemon=True).start()
-
-
-class Cluster(Pool):
-    """A dask.distributed cluster, whose workers must have this code."""
-
-    def __init__(self, address: str):
-        needs("distributed", "a scheduler")
-        from distributed import Client
-        from distributed.comm import get_address_host_port
-
-        try:
-            get_address_host_port(
-                address
-            )  # check first, because a Client with a wrong address would hang when it is closed
-            self.client = Client(address, timeout="10s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise InputError(
-                f"scheduler: {address} cannot be reached: {error}; allowed: tcp://HOST:PORT"
-            ) from None
-
-    def __exit__(self, *_: object) -> None:
-        self.client.close()
-
-    def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
-        """Run the jobs; yield their numbers and results as they come in."""
-        from distributed import as_completed
-
-        code = engine_code()
-        teams = {policy: members_of(policy) for policy in {job.policy for job in jobs}}
-        futures = [
-            self.client.submit(_checked, job, code, teams[job.policy], pure=False) for job in jobs
-        ]
-        numbers = {future.key: number for number, future in enumerate(futures)}
-        finished = as_completed(
-            futures, loop=self.client.loop, with_results=True, raise_errors=False
-        )
-        try:
-            for future, result in finished:
-                number = numbers[future.key]
-                if future.status == "error":  # dask gives the exception with its type and traceback
-                    result = _problem(result[1])
-                yield number, _reported(jobs[number], result, progress)
-                future.release()
-        finally:
-            self.client.cancel(futures)
-
-
-def _checked(job: Job, code: str, members: list[Member]) -> Any:
-    other = "code of dess" if engine_code() != code else ""
-    if members_of(job.policy) != members:
-        other = f"code or weights of {job.policy}"
-    if other:
-        raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")
-    return attempt(job)
-
-
-def _problem(error: Exception) -> Problem:
-    """The problem of a job whose workers died, as dask reports it; other errors are raised."""
-    from distributed import KilledWorker
-
-    if isinstance(error, KilledWorker):
-        return replace(
-            Problem.of(error), error="its workers died: killed, out of memory, or crashed"
-        )
-    raise error

@@ -35,6 +35,7 @@ def complete(
         Interruption: If it was.
         typer.Exit: If some of it could not be computed.
     """
+    from analysis.execution.cluster import SchedulerError
     from analysis.execution.runner import ChunkError
 
     try:
@@ -43,6 +44,9 @@ def complete(
     except KeyboardInterrupt:
         line = f"interrupted: run {again} to complete it"
         raise console.Interruption(line) from None
+    except SchedulerError as error:
+        line = f"dess: error: {error}; run {again} to complete it"
+        raise typer.Exit(console.fail(line, 1)) from None
     except ChunkError as error:
         for path, failure in error.failures.items():
             console.fail(f"failed: {failure.error} ({path}); command: {failure.command}", 1)

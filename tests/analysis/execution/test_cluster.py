@@ -1,0 +1,185 @@
+"""A cluster of dask: what is wrong with it is one line, and no mission is lost."""
+
+import os
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack
+
+import pytest
+
+from analysis import run_study
+from analysis.execution import cluster as clusters
+from analysis.execution.cluster import Cluster, _checked
+from analysis.execution.jobs import MissionsJob
+from analysis.execution.runner import CHUNK
+from analysis.results.chunks import Chunk, Part
+from analysis.results.manifest import Manifest
+from analysis.results.provenance import engine_code, members_of
+from dess import InputError
+from reports import cli
+from tests.analysis import troublesome
+from tests.analysis.execution.test_workers import check_that_the_rest_is_there, failing
+from tests.analysis.small import environment, files_of, small_study
+
+distributed = pytest.importorskip("distributed")
+
+OPTIONS = {"threads_per_worker": 1, "dashboard_address": None}
+SERVE = f"""
+import sys, time
+from distributed import LocalCluster
+if __name__ == "__main__":
+    cluster = LocalCluster(n_workers=1, **{OPTIONS})
+    print(cluster.scheduler_address, flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path, monkeypatch):
+    troublesome.install(tmp_path / "plugin", monkeypatch)
+    yield
+    monkeypatch.undo()
+
+
+@pytest.fixture
+def cluster():
+    """A dask cluster of two worker processes; its address."""
+    with distributed.LocalCluster(n_workers=2, **OPTIONS) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-once", "greedy"])
+    run_study(study, tmp_path / "out", scheduler=cluster)
+    assert (tmp_path / "plugin" / "killed").exists()
+    run_study(study, tmp_path / "undisturbed")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
+    study = small_study(tmp_path)
+    cell = Manifest.of(study).cells[0][0]
+    chunk = Chunk(0, (Part(cell, range(1)),))
+    job = MissionsJob(chunk, (study.points[0].scenario,), "greedy", 7, "batch")
+    code, members = engine_code(), members_of("greedy")
+    assert len(_checked(job, code, members).missions) == 1
+    for others in (("0" * 64, members), (code, members_of("random"))):
+        with pytest.raises(InputError, match="a worker has other code"):
+            _checked(job, *others)
+
+
+def test_dask_records_a_chunk_that_raises(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["raising", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert failure.error == "ZeroDivisionError: nothing to divide by"
+    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
+
+
+@pytest.mark.slow
+def test_dask_gives_up_a_chunk_that_kills_every_worker(plugin, cluster, tmp_path):
+    study = small_study(tmp_path, policies=["killed-always", "greedy"])
+    failure = failing(study, tmp_path / "out", scheduler=cluster)
+    assert "its workers died" in failure.error
+    assert shlex.split(failure.command)[-4:] == ["--policy", "killed-always", "--replication", "5"]
+
+
+def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, capfd):
+    small_study(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    with open("trial.toml", "a") as study:
+        study.write('engine = "events"\n')
+    monkeypatch.setitem(CHUNK, "events", 5)
+    words = ["study", "run", "trial.toml", "--missions", "400", "--out"]
+    with subprocess.Popen(
+        [sys.executable, "-c", SERVE],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=environment(),
+        start_new_session=True,
+    ) as serving:
+        address = serving.stdout.readline().strip()
+
+        def kill():
+            while len([*tmp_path.glob("out/missions/*/*.parquet")]) < 3:
+                time.sleep(0.01)
+            os.killpg(serving.pid, signal.SIGKILL)
+
+        threading.Thread(target=kill, daemon=True).start()
+        code = cli.main([*words, "out", "--scheduler", address])
+    line = f"dess: error: scheduler: the connection to {address} is lost; "
+    line += "run the same command again to complete it"
+    out, err = capfd.readouterr()
+    assert (code, out, err.splitlines()[-1]) == (1, "", line)
+    assert "Traceback" not in err and "distributed" not in err
+    assert cli.main([*words, "out"]) == 0
+    assert ", 0 of them present" not in capfd.readouterr().err
+    assert cli.main([*words, "undisturbed"]) == 0
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_cluster_without_workers_is_waited_for(tmp_path, monkeypatch, caplog):
+    monkeypatch.setattr(clusters, "LOOK", 0.1)
+    study = small_study(tmp_path)
+    with distributed.LocalCluster(n_workers=0, **OPTIONS) as cluster:
+        notes = []
+
+        def note(*words):
+            notes.append(words)
+            cluster.scale(1)
+
+        monkeypatch.setattr(clusters.log, "warning", note)
+        run_study(study, tmp_path / "out", scheduler=cluster.scheduler_address)
+    assert notes == [("note: %s has no workers; waiting for them", cluster.scheduler_address)]
+    run_study(study, tmp_path / "undisturbed")
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_a_worker_that_cannot_run_a_job_is_one_line(tmp_path, monkeypatch):
+    def unprepared(*_):
+        raise ModuleNotFoundError("No module named 'analysis'")
+
+    monkeypatch.setattr(clusters, "_checked", unprepared)
+    with distributed.LocalCluster(n_workers=1, processes=False, **OPTIONS) as cluster:
+        line = "a worker cannot run jobs: ModuleNotFoundError: No module named 'analysis'; allowed"
+        with pytest.raises(InputError, match=line):
+            run_study(small_study(tmp_path), tmp_path / "out", scheduler=cluster.scheduler_address)
+
+
+ADDRESSES = {
+    "nonsense": "missing port number",
+    "http://127.0.0.1:80": "unknown address scheme",
+    "inproc://": "cannot be reached",
+    "tls://127.0.0.1:80": "TLS expects",
+    "tcp://[::1:4": "ipv6 needs brackets",
+    "tcp://127.0.0.1:99999": "Timed out trying to connect",
+    "silent": "no scheduler answers within",
+    "worker": "is a Worker; allowed: tcp://HOST:PORT of a scheduler",
+}
+
+
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_what_is_no_scheduler_is_refused_at_once(address, monkeypatch, capfd):
+    monkeypatch.setattr(clusters, "ANSWER", 0.5)
+    named = address
+    with ExitStack() as stack:
+        if address == "silent":  # a server that accepts, and says nothing
+            server = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+            named = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        if address == "worker":
+            monkeypatch.setattr(clusters, "ANSWER", 10)
+            options = {"n_workers": 1, "processes": False, **OPTIONS}
+            cluster = stack.enter_context(distributed.LocalCluster(**options))
+            named = cluster.workers[0].worker_address
+        begin = time.monotonic()
+        with pytest.raises(InputError) as error, Cluster(named):
+            pass
+        assert time.monotonic() - begin < 30
+    assert str(error.value).startswith(f"scheduler: {named}: ")
+    assert ADDRESSES[address] in str(error.value)
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,174 @@
+"""A command that is killed at any moment is completed by the same command, to the same bytes."""
+
+import json
+import os
+import random
+import signal
+import time
+from itertools import count
+
+import pyarrow.parquet as pq
+import pytest
+import safetensors
+
+from analysis import run_study
+from tests.analysis.small import files_of, small_study
+from tests.killing import Command, kill
+from tests.policies.ddqn.tiny import PHASES, write_config
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
+
+GENTLE = [signal.SIGTERM, signal.SIGHUP]
+SIGNALS = [signal.SIGKILL, *GENTLE]
+KILLS = 30  # by each signal
+
+
+def seeded(*words):
+    """A generator whose seed is printed."""
+    seed = " ".join(map(str, words))
+    print(f"seed {seed!r}")
+    return random.Random(seed)
+
+
+# --- studies ---
+
+CHUNKS = "from analysis.execution import runner; runner.CHUNK['events'] = 5"
+
+
+def a_study(folder, workers, missions):
+    """The command that runs a study of two policies with chunks of five missions."""
+    folder.mkdir()
+    small_study(folder)
+    with open(folder / "trial.toml", "a") as study:
+        study.write('engine = "events"\n')
+    words = ["study", "run", "trial.toml", "--missions", missions, "--workers", workers]
+    return Command([*map(str, words)], folder, CHUNKS)
+
+
+def chunks(command):
+    """The number of chunks in the results folder."""
+    return len([*command.out.glob("missions/*/*.parquet")])
+
+
+def check_studies(folder, workers, number, kills, missions):
+    """Studies that are killed equal one that is not."""
+    undisturbed = a_study(folder / "undisturbed", workers, missions)
+    undisturbed.run()
+    whole = files_of(undisturbed.out)
+    commands = (a_study(folder / f"killed-{n}", workers, missions) for n in count())
+    for killed in kill(commands, number, kills, chunks, 0.2, seeded("study", number, workers)):
+        assert files_of(killed.out) == whole
+
+
+@pytest.mark.parametrize("number", GENTLE)
+def test_a_study_that_is_told_to_end_equals_an_undisturbed_one(number, tmp_path):
+    check_studies(tmp_path, 2, number, 1, 100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("number", SIGNALS)
+def test_studies_that_are_killed_equal_an_undisturbed_one(number, workers, tmp_path):
+    check_studies(tmp_path, workers, number, KILLS // 2, 1000)
+
+
+# --- trainings ---
+
+CHECKPOINT = "checkpoint.safetensors"
+EVERY_TICK = (
+    "sys.modules['torch.utils.tensorboard'] = None\n"
+    "from policies.ddqn import session; session.CHECKPOINT_EVERY = 0"
+)
+
+
+def a_training(folder):
+    """The command that trains a tiny policy, with a checkpoint after every tick."""
+    folder.mkdir()
+    phases = [PHASES[0] | {"ticks": 100}, PHASES[1] | {"ticks": 500}]
+    write_config(folder, phases=phases, evaluate_every=100)
+    words = ["train", "tiny.toml", "--device", "cpu"]
+    return Command(words, folder, EVERY_TICK, (CHECKPOINT, "--resume"))
+
+
+def header_of(command):
+    """The header of the last checkpoint; None without one."""
+    path = command.out / CHECKPOINT
+    if path.exists():
+        with safetensors.safe_open(path, "numpy") as file:
+            return json.loads(file.metadata()["dess"])
+    return None
+
+
+def ticks(command):
+    """The ticks before the last checkpoint."""
+    header = header_of(command)
+    return header["progress"]["tick"] if header else 0
+
+
+def trained(command):
+    """All that a training leaves but for the times."""
+    header = header_of(command)
+    del header["sha256"], header["progress"]["seconds"]
+    for row in header["curve"]:
+        del row["seconds"]
+    with safetensors.safe_open(command.out / CHECKPOINT, "numpy") as file:
+        tensors = {name: file.get_tensor(name).tobytes() for name in file.keys()}  # noqa: SIM118
+    config = json.loads((command.out / "config.json").read_text("utf-8"))
+    del config["run"]["seconds"]
+    model = (command.out / "model.safetensors").read_bytes()
+    curve = pq.read_table(command.out / "training.parquet").drop(["seconds"])
+    names = [name for name in files_of(command.out) if not name.startswith(".")]
+    return header, tensors, config, model, curve, names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SIGNALS)
+def test_trainings_that_are_killed_equal_an_undisturbed_one(number, tmp_path):
+    undisturbed = a_training(tmp_path / "undisturbed")
+    undisturbed.run()
+    whole = trained(undisturbed)
+    commands = (a_training(tmp_path / f"killed-{n}") for n in count())
+    for killed in kill(commands, number, KILLS, ticks, 0.2, seeded("train", number)):
+        assert trained(killed) == whole
+
+
+# --- pages ---
+
+
+def a_page(folder, results):
+    """The command that renders the page of a study."""
+    folder.mkdir()
+    return Command(["report", str(results)], folder)
+
+
+def renderings(command):
+    """When the last rendering began [ns]; 0 before the first."""
+    return max((path.stat().st_ctime_ns for path in command.out.glob(".rendering-*")), default=0)
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Results of a small study; nothing is rendered yet."""
+    run_study(small_study(tmp_path), tmp_path / "results")
+    return tmp_path / "results"
+
+
+@pytest.mark.parametrize("number", GENTLE)
+def test_a_report_that_is_told_to_end_leaves_nothing(number, results, tmp_path):
+    command = a_page(tmp_path / "killed", results)
+    assert command.kill(number, lambda: renderings(command) > 0, 0.5)
+    assert not command.out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", SIGNALS)
+def test_reports_that_are_killed_equal_an_undisturbed_one(number, results, tmp_path):
+    undisturbed = a_page(tmp_path / "undisturbed", results)
+    begin = time.monotonic()
+    undisturbed.run()
+    longest = time.monotonic() - begin
+    whole = files_of(undisturbed.out)
+    commands = (a_page(tmp_path / f"killed-{n}", results) for n in count())
+    generator = seeded("report", number)
+    for killed in kill(commands, number, KILLS, renderings, 0.6 * longest, generator):
+        assert files_of(killed.out) == whole
