@@ -7,6 +7,7 @@ https://www.researchobject.org/ro-crate/specification/1.1/). In the unpacked fol
 ``dess study run study.toml --out results`` finds that all missions are present.
 """
 
+import shutil
 from collections.abc import Mapping
 from datetime import date
 from importlib import metadata
@@ -23,7 +24,8 @@ from rocrate.rocrate import ROCrate
 
 from analysis import numbers
 from analysis.results.evidence import Evidence
-from analysis.results.files import MANIFEST
+from analysis.results.files import MANIFEST, partition
+from analysis.results.parquet import files_in
 from analysis.results.tables import Results
 from dess import InputError
 from reports.pages.html import STUDY as EVIDENCE
@@ -72,6 +74,7 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     ]
     with TemporaryDirectory() as folder:
         crate.write(folder)
+        _copy_tables(results, Path(folder, RESULTS))
         _zip(Path(folder), path)
 
 
@@ -180,14 +183,17 @@ def _homepage(library: str) -> str:
     """The address of a library, as its package names it."""
     if library == "python":
         return "https://www.python.org/"
-    about = metadata.metadata(library)
+    try:
+        about = metadata.metadata(library)
+    except metadata.PackageNotFoundError:  # it was installed where the results were made
+        return ""
     pairs = (text.split(", ", 1) for text in about.get_all("Project-URL") or [])
     urls = {label.lower(): url for label, url in pairs}
     return urls.get("homepage") or about["Home-page"] or next(iter(urls.values()), "")
 
 
 def _tables(crate: ROCrate, results: Results) -> Dataset:
-    """Add the results folder, without other files that a run may leave in it."""
+    """Add the results folder; its tables are copied when the crate is written."""
     folder = results.store.folder
     about = {"name": "Results", "description": "A results folder, as dess study show reads it."}
     tables = crate.add_dataset(dest_path=f"{RESULTS}/", properties=about)
@@ -195,9 +201,18 @@ def _tables(crate: ROCrate, results: Results) -> Dataset:
     parts = [_file(crate, folder / MANIFEST, f"{RESULTS}/{MANIFEST}", manifest, "application/json")]
     for name, description in _TABLES.items():
         about = {"name": name, "description": description, "encodingFormat": _PARQUET}
-        parts.append(crate.add_dataset(folder / name, f"{RESULTS}/{name}/", properties=about))
+        parts.append(crate.add_dataset(dest_path=f"{RESULTS}/{name}/", properties=about))
     tables["hasPart"] = parts
     return tables
+
+
+def _copy_tables(results: Results, into: Path) -> None:
+    """Copy the files of results, and nothing else, such as what links in their folder lead to."""
+    for name in _TABLES:
+        for place in (Path(name, partition(policy)) for policy in results.policies):
+            for path in files_in(results.store.folder / place):
+                (into / place).mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(path, into / place / path.name)
 
 
 def _documents(crate: ROCrate, results: Results) -> list[File]:

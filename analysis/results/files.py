@@ -17,7 +17,7 @@ FOLDERS = ("missions", "uavs", "events", "failures")
 
 def partition(policy: str) -> str:
     """The name of the folder with the files of a team."""
-    name = quote(policy, safe="")
+    name = quote(policy, safe="", errors="surrogatepass")
     if len(name) > LONG:
         name = f"{name[:LONG]}~{short_hash(name.encode())}"
     return f"policy={name}"

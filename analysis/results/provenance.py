@@ -131,6 +131,8 @@ class Origin(Document):
             raise ValueError("study.scenario, study.set: are not a scenario and its fields")
         if [team.policy for team in self.policies] != [*study["policies"]]:
             raise ValueError("policies: are not those of the study")
+        if self.libraries.keys() - {"python", *LIBRARIES}:
+            raise ValueError("libraries: are not those that records depend on")
         if study["seed"] != self.seed:
             raise ValueError("seed: is not that of the study")
         return self

@@ -105,7 +105,7 @@ def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
 def _add_files(folder: Path, text: str) -> None:
     """Files and folders with the text in their names, among those that belong to the results."""
     safe = text.replace("/", "\u2215").replace("\0", "\u2400")
-    name = safe.encode("utf-8", "surrogateescape")[:LONGEST].decode("utf-8", "ignore")
+    name = safe.encode("utf-8", "replace")[:LONGEST].decode("utf-8", "ignore")
     for parent in (folder, *(folder / kind for kind in FOLDERS)):
         (parent / f"{name}.json").write_text(json.dumps(text))
         (parent / f"policy={name}").mkdir(exist_ok=True)

@@ -1,6 +1,7 @@
 """A study is exported as an RO-Crate that validators accept, and that has all of it."""
 
 import json
+import os
 from datetime import date
 from importlib.resources import files
 from pathlib import Path
@@ -184,3 +185,21 @@ def test_damaged_results_are_not_exported(tmp_path):
     with pytest.raises(InputError, match="has been changed since it was written"):
         exported(tmp_path, load_results(tmp_path / "out"))
     assert results.store.damaged == []
+
+
+def test_a_crate_has_nothing_that_links_in_the_results_lead_to(tmp_path):
+    """Nor does a pipe in the place of a file block the export."""
+    results, secret = results_of(tmp_path), tmp_path / "secret"
+    secret.write_text("secret")
+    expected = exported(tmp_path, results, "expected.zip").read_bytes()
+    for place in [*(tmp_path / "out").glob("*/policy=*"), tmp_path / "out" / "missions"]:
+        os.mkfifo(place / f"{'a' * 16}-{'1' * 16}.parquet")
+        (place / f"{'a' * 16}-{'2' * 16}.parquet").symlink_to(secret)
+        (place / "note.txt").symlink_to(secret)
+    assert exported(tmp_path, load_results(tmp_path / "out")).read_bytes() == expected
+
+
+def test_a_library_that_is_not_here_has_no_homepage(tmp_path):
+    results = results_of(tmp_path)
+    results.store.manifest.libraries["not-here"] = "2.0"
+    assert graph_of(exported(tmp_path, results))["#not-here"]["version"] == "2.0"
