@@ -128,7 +128,9 @@ def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
 
 
 def test_event_logs_take_time_too(tmp_path):
-    study = small_study(tmp_path, missions=4000, logged=4000, policies=["random"])
-    with pytest.raises(InputError, match="4,000 missions to simulate .*about 4 hours"):
-        check_effort(study, tmp_path / "out", clock=Clock(1.8))
-    check_effort(study, tmp_path / "out", clock=Clock(1.8), yes=True)
+    study = small_study(tmp_path, missions=6000, logged=6000, policies=["random"])
+    with pytest.raises(InputError, match="6,000 missions to simulate .*about 20 hours"):
+        check_effort(study, tmp_path / "out", clock=Clock(6.0))
+    check_effort(study, tmp_path / "out", clock=Clock(6.0), yes=True)
+    few = small_study(tmp_path, missions=6000, policies=["random"])
+    check_effort(few, tmp_path / "out", clock=Clock(6.0))
