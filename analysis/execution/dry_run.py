@@ -27,7 +27,7 @@ from dess.scenario import ScenarioSpace
 from policies import load_team
 
 # The memory [bytes] of a design point and of a mission, measured on studies of many of either.
-POINT_MEMORY, MISSION_MEMORY = 12_000, 1_000
+POINT_MEMORY, MISSION_MEMORY = 12_000, 1_200
 
 FEW_LOGS = 1_000  # event logs that are counted as missing without a look into the folder
 

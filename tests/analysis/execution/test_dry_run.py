@@ -121,7 +121,7 @@ def test_very_many_points_are_planned_without_making_them(kind, tmp_path):
 def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     study = small_study(tmp_path, missions=10**9)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**40)
-    line = r"2,000,000,000 missions .*: about 1,86\d\.\d GiB of memory, of which 1,024.0 are avail"
+    line = r"2,000,000,000 missions .*: about 2,23\d\.\d GiB of memory, of which 1,024.0 are avail"
     with pytest.raises(InputError, match=line):
         check_effort(study, tmp_path / "out", clock=Clock(0.0))
     assert plan_study(study, tmp_path / "out").missions == 2 * 10**9

@@ -33,7 +33,7 @@ def test_the_memory_of_the_channel_is_that_of_its_tables():
 
 def test_workers_need_the_memory_that_is_available(monkeypatch):
     monkeypatch.setattr(memory, "available_memory", lambda: 2**31)
-    check_workers_memory("a study", 8, [PAPER], 0.0)
+    check_workers_memory("a study", 6, [PAPER], 0.0)
     check_workers_memory("an evaluation", 200, [PAPER], 0.0, are_processes=False)
     for workers, more in ((20, 0.0), (1, 2.0**32)):
         with pytest.raises(InputError, match=r"a study: about .* GiB of memory.*: --yes, or less"):
