@@ -76,7 +76,7 @@ def size_of(config: TrainingConfig) -> int:
         observation, network = build(config, layout_of(space))
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
-    row = 2 * units_of(network, observation.shapes)
+    row = 3 * units_of(network, observation.shapes)  # outputs, their gradients, the later state
     state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
