@@ -63,7 +63,9 @@ def check_ffmpeg() -> None:
     Raises:
         InputError: If it is missing.
     """
-    if not FFMpegWriter.isAvailable():
+    with style.look():  # whatever program a matplotlibrc in the working directory names
+        is_available = FFMpegWriter.isAvailable()
+    if not is_available:
         raise InputError(
             "animation: .mp4 needs the program ffmpeg, which is not installed; allowed: install "
             "it, or write .gif or .html, which need no other program"
