@@ -14,7 +14,7 @@ from tests.fuzz.steps import Copy
 from tests.fuzz.strategies.values import long_texts, numbers, texts, toml_values
 
 OUTPUTS = {"--out", "--events", "--figure", "--animation", "--crate"}
-_UNUSED = {"--install-completion", "--show-completion"}  # they are about the shell of a user
+_UNUSED = {"--install-completion", "--show-completion"}  # about the shell of a user
 _FIELDS = ("uavs", "quota", "initial_data", "flying_time", "nodes", "zone", "grid", "max_slots")
 # Plain values, by the name of the option or argument.
 _PLAIN: dict[str, tuple[str, ...]] = {
@@ -52,7 +52,8 @@ def _commands(command: Any, words: tuple[str, ...] = ()) -> Iterator[tuple[Any, 
     for name, one in inner.items():
         yield from _commands(one, (*words, name))
     if not inner or command.invoke_without_command:
-        yield words, [p for p in command.params if not {*p.opts} & _UNUSED]
+        unused = {*_UNUSED, "--results"} if words == ("sweep",) else _UNUSED  # there an output
+        yield words, [p for p in command.params if not {*p.opts} & unused]
 
 
 COMMANDS = [*_commands(typer.main.get_command(app))]
@@ -66,6 +67,8 @@ def command_lines(draw: st.DrawFn) -> Case:
     chosen = draw(st.lists(st.sampled_from(parameters), max_size=5)) if parameters else []
     named = [p for p in parameters if p.required or p.name in ("missions", "out")]
     arguments = [*words]
+    if words == ("sweep",):
+        arguments += ["--results", "../out"]
     for number, parameter in enumerate([*named, *chosen]):
         arguments += _words(draw, parameter, is_odd=number >= len(named) + len(chosen) - odd)
     if draw(st.integers(0, 9)) == 0:
