@@ -20,7 +20,7 @@ from tests.fuzz.strategies.trainings import trainings
 
 # How many cases of each kind a round has. Those that start further processes are dear, so few.
 ROUND: tuple[tuple[SearchStrategy[Case], int], ...] = (
-    (command_lines(), 300),
+    (command_lines(), 304),
     (documents(), 230),
     (folders.readings, 180),
     (folders.writings, 60),
@@ -29,7 +29,7 @@ ROUND: tuple[tuple[SearchStrategy[Case], int], ...] = (
     (outputs(), 60),
     (signals(), 20),
     (sizes(), 20),
-    (dear(), 10),
+    (dear(), 6),
 )
 LENGTH = sum(number for _, number in ROUND)
 

@@ -77,7 +77,7 @@ def command_lines(draw: st.DrawFn) -> Case:
         arguments.append(draw(texts))
     inputs = (ready.SCENARIO, ready.STUDY, ready.RESULTS, ready.SELECTED, ready.POLICY, ready.PAGE)
     steps = tuple(Copy(name, f"in/{name}") for name in inputs)
-    return Case("command line", tuple(arguments), steps, lasting=4)
+    return Case("command line", tuple(arguments), steps, lasting=2)
 
 
 def _words(draw: st.DrawFn, parameter: Any, is_odd: bool) -> list[str]:

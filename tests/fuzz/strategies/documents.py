@@ -80,4 +80,4 @@ def documents(draw: st.DrawFn) -> Case:
     if draw(st.integers(0, 5)) == 0:
         table += (Bytes("in/bay.csv", draw(byte_edits())),)
     arguments = draw(st.sampled_from(_commands(kind)))
-    return Case("document", arguments, (sea, *table, copy, change), lasting=4)
+    return Case("document", arguments, (sea, *table, copy, change), lasting=2)

@@ -51,7 +51,7 @@ def sizes(draw: st.DrawFn) -> Case:
         Write("in/big.toml", study.encode()),
         Write("in/big-training.toml", _training(config, training).encode()),
     )
-    return Case("size", draw(st.sampled_from(commands)), steps, lasting=5)
+    return Case("size", draw(st.sampled_from(commands)), steps, lasting=3)
 
 
 def _training(field: str, value: str) -> str:
