@@ -16,7 +16,7 @@ import stat
 import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from functools import cache, partial
+from functools import cache
 from importlib import resources
 from itertools import islice
 from pathlib import Path
@@ -118,7 +118,8 @@ def read_text(path: Path, limit: int = TEXT_LIMIT, encoding: str = "utf-8") -> s
 def read_bytes(path: Path, limit: int = TEXT_LIMIT) -> bytes:
     """The content of a regular file; arguments and errors are those of ``read_text``."""
     with _opened(path, limit) as file:
-        pieces = islice(iter(partial(file.read, _PIECE), b""), limit // _PIECE + 1)
+        # A file of the system that waits for data gives None.
+        pieces = islice(iter(lambda: file.read(_PIECE) or b"", b""), limit // _PIECE + 1)
         content = b"".join(pieces)  # reading up to the limit at once would allocate as much
     if len(content) > limit:  # it has grown, or it is a file of the system, whose size is unknown
         raise _too_large(path, limit)

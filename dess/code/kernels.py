@@ -31,7 +31,7 @@ def kernel(function: Callable, **options: Any) -> Any:
     Raises:
         InputError: If the environment does not let numba compile.
     """
-    if config.DISABLE_JIT:
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
         raise InputError("NUMBA_DISABLE_JIT: the simulator runs only compiled; allowed: unset it")
     options = _OPTIONS | options
     stamp = _code_behind(function.__module__, inspect.getfile(function))
