@@ -2,6 +2,9 @@
 
 ``config`` has the settings of a training. ``observations`` and ``network`` compute Q-values,
 ``replay`` stores transitions, ``learner`` updates the network, ``training`` is Algorithm 1 of the
-paper, ``session`` runs a training in a folder, ``checkpoint`` reads and writes files, and
-``policy`` is the trained policy.
+paper, ``session`` runs a training in a folder, and ``policy`` is the trained policy.
+
+Files may come from anybody and are checked when they are read: ``checkpoint`` is a training that
+can go on (``ranges`` has the values that its missions may have), ``trained`` the folder of a
+policy, ``description`` its ``config.json``, and ``tensors`` reads and writes arrays.
 """
