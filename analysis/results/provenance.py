@@ -197,7 +197,8 @@ def study_of(data: Mapping[str, Any]) -> StudyData:
     try:
         return StudyData.model_validate_json(json.dumps(data))
     except ValidationError as error:
-        raise ValueError(validation_line(error, "study", StudyData)) from None
+        line = validation_line(error, "study", StudyData)
+        raise ValueError(line.removeprefix("study: ")) from None
 
 
 def team_of(policy: str) -> Team:
