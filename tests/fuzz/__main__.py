@@ -1,6 +1,7 @@
 """Tries cases for some minutes and prints what breaks the contract: ``python -m tests.fuzz``."""
 
 import argparse
+import os
 import random
 import shlex
 import shutil
@@ -27,14 +28,17 @@ def main() -> int:
     parser.add_argument("--case", type=int, help="try only the case of this number")
     asked = parser.parse_args()
     seed = random.SystemRandom().randrange(10**6) if asked.seed is None else asked.seed
+    os.environ["OMP_NUM_THREADS"] = "1"  # threads of a case would be in the way of the other
     print(f"seed {seed}: cases for {asked.minutes:g} minutes", flush=True)
-    shutil.rmtree(FOLDER, ignore_errors=True)
-    forks = Forks(FOLDER.absolute() / "cases", FOLDER.absolute() / "ready")
+    cases, inputs = FOLDER.absolute() / "cases", FOLDER.absolute() / "ready"
+    for folder in (cases, inputs) if asked.case is not None else (FOLDER,):
+        shutil.rmtree(folder, ignore_errors=True)
+    forks = Forks(cases, inputs)
     ready.make(forks)
-    cases = drawing.cases(seed, asked.case or 0)
+    drawn = drawing.cases(seed, asked.case or 0)
     if asked.case is not None:
-        cases = islice(cases, 1)
-    return Session(seed, asked.minutes * 60).run(forks, cases)
+        drawn = islice(drawn, 1)
+    return Session(seed, asked.minutes * 60).run(forks, drawn)
 
 
 class Session:
@@ -68,6 +72,7 @@ class Session:
     def _report(self, number: int, outcome: Outcome, broken: list[str]) -> None:
         """Print a finding, and keep its files."""
         kept = FOLDER / str(number)
+        shutil.rmtree(kept, ignore_errors=True)
         outcome.box.rename(kept)
         again = f"python -m tests.fuzz --seed {self.seed} --case {number}"
         command = shlex.join(["dess", *outcome.case.arguments])

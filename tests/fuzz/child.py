@@ -8,6 +8,8 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import matplotlib
+
 from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
 
 STDOUT, STDERR, STARTED = "stdout", "stderr", "started"  # files in the folder ``log`` of the case
@@ -19,6 +21,7 @@ def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
     os.setsid()
     os.chdir(box / CWD)
     os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
+    os.environ["MPLCONFIGDIR"] = matplotlib.get_cachedir()  # fonts are not listed again
     tempfile.tempdir = None
     sys.argv = ["dess", *case.arguments]
     _redirect(case, box / LOG)

@@ -73,23 +73,25 @@ class Forks:
             command: What is called with the arguments of a case.
         """
         self.folder, self.ready, self._command = folder, ready, command
-        # Threads of a case would be in the way of the other; the font list is made once.
-        os.environ |= {"OMP_NUM_THREADS": "1", "MPLCONFIGDIR": str(folder / "matplotlib")}
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(["tests.fuzz.preload", "tests.fuzz.child"])
 
     def outcomes(self, cases: Iterable[tuple[int, Case]]) -> Iterator[tuple[int, Outcome]]:
         """Run numbered cases, ``AT_ONCE`` at a time; they come in the order in which they end."""
         waiting, running = iter(cases), list[_Running]()
-        while True:
-            while len(running) < AT_ONCE and (entry := next(waiting, None)) is not None:
-                running.append(self._start(*entry))
-            if not running:
-                return
-            wait([entry.process.sentinel for entry in running], timeout=0.02)
-            for entry in [entry for entry in running if entry.has_ended()]:
-                running.remove(entry)
-                yield entry.number, entry.outcome()
+        try:
+            while True:
+                while len(running) < AT_ONCE and (entry := next(waiting, None)) is not None:
+                    running.append(self._start(*entry))
+                if not running:
+                    return
+                wait([entry.process.sentinel for entry in running], timeout=0.02)
+                for entry in [entry for entry in running if entry.has_ended()]:
+                    running.remove(entry)
+                    yield entry.number, entry.outcome()
+        finally:
+            for entry in running:
+                entry.kill()
 
     def _process(self, case: Case, box: Path) -> BaseProcess:
         return self._context.Process(target=child.run, args=(case, box, self._command))
@@ -145,10 +147,15 @@ class _Running:
                 os.kill(self.process.pid, self._signals.pop(0)[1])
         if now - self._begins > self.case.seconds:
             self.late = True
-            for process in [psutil.Process(self.process.pid), *self._left()]:
-                with suppress(psutil.NoSuchProcess):
-                    process.kill()
-            self.process.join()
+            self.kill()
+
+    def kill(self) -> None:
+        """Kill the command and all its processes."""
+        self.process.kill()
+        for process in self._left():
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+        self.process.join()
 
     def outcome(self) -> Outcome:
         """What the case has done; processes that it left behind are killed."""
