@@ -1,10 +1,13 @@
 """Commands that are killed while they run, and a check of what they leave behind."""
 
+import atexit
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -28,7 +31,7 @@ PROGRESS = re.compile(
 
 
 class Command:
-    """A ``dess`` command in a folder, with a folder for temporary files beside it.
+    """A ``dess`` command in a folder, with a folder for its temporary files.
 
     Args:
         arguments: The arguments of the command, whose ``--out`` is ``out``.
@@ -45,11 +48,12 @@ class Command:
         again: tuple[str, str] | None = None,
     ):
         self.folder, self.out, self.again = folder, folder / "out", again
-        self.temporary = folder.with_name(f"{folder.name}-temporary")
-        self.temporary.mkdir(exist_ok=True)
+        # Not beside the folder, since the names of the sockets of kernels must be short.
+        self.temporary = Path(tempfile.mkdtemp(prefix="dess-killed-"))
+        atexit.register(shutil.rmtree, self.temporary, ignore_errors=True)
         script = f"import sys\n{before}\nfrom reports.cli import main\nsys.exit(main())"
         self.words = [sys.executable, "-c", script, *arguments, "--out", "out"]
-        self.stderr = self.temporary.with_suffix(".stderr")
+        self.stderr = folder.with_name(f"{folder.name}.stderr")
 
     def run(self) -> None:
         """Run the command to its end."""
@@ -117,7 +121,7 @@ class Command:
         _wait(lambda: not [*self._processes()], 0.1)
         if number != signal.SIGKILL:
             assert [*self.temporary.iterdir()] == []
-            assert not [path for path in self.out.rglob(".*") if path.name != ".lock"]
+            assert not [path for path in self.out.rglob(".*") if not path.name.endswith("lock")]
         for path in self.out.rglob("*.parquet"):
             pq.read_table(path)
 
