@@ -1,5 +1,6 @@
 """Output of the command line: results as tables on stdout, progress and errors on stderr."""
 
+import errno
 import io
 import logging
 import os
@@ -58,7 +59,8 @@ def refused(error: OSError | SystemExit) -> int:
         return 1
     place = error.filename or " and ".join(broken)
     reason = error.strerror or str(error)
-    return fail(f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}", 1)
+    code = 2 if error.errno == errno.ENAMETOOLONG else 1  # such a name is bad input
+    return fail(f"dess: error: {place}: {reason}" if place else f"dess: error: {reason}", code)
 
 
 def fail(message: str, code: int) -> int:

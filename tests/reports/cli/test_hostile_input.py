@@ -113,6 +113,10 @@ def test_words_of_the_library_are_cut_too(refused):
     refused("x" * 10**5)
 
 
+def test_an_output_below_a_long_name_is_a_line(refused, tmp_path):
+    refused("study", "run", "trial.toml", "--out", "x/" * 3000)
+
+
 def test_what_the_terminal_gets_of_a_name_is_printable(dess, tmp_path):
     (tmp_path / "bad.toml").write_text(f'description = "{RAW}"')
     code, out, _ = dess("scenarios", "show", "bad.toml")
