@@ -22,6 +22,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
+from psutil import pid_exists
+
 from dess.errors import InputError, one_of, shown
 
 # The largest text file that is read without another limit [bytes].
@@ -47,7 +49,7 @@ _DEEPEST = 100
 # Escapes that can stand for half a character, which no encoding can write.
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 # Temporary files: the number of their process, and a random one.
-_TEMPORARY = re.compile(r"\.dess-(\d+)-[0-9a-f]+\.tmp")
+_TEMPORARY = re.compile(r"\.dess-(\d{1,9})-[0-9a-f]+\.tmp")
 
 
 class Shipped(NamedTuple):
@@ -158,8 +160,8 @@ def _opened(path: Path, limit: int) -> Iterator[BinaryIO]:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    # Without O_NONBLOCK, a pipe waits for somebody who writes into it.
-    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+    # Without O_NONBLOCK, which Windows lacks, a pipe waits for somebody who writes into it.
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
 
 
 def _kind(found: os.stat_result) -> str:
@@ -315,18 +317,8 @@ def _sweep(folder: Path) -> None:
     """Delete the temporary files that processes have left which were killed, once per process."""
     with suppress(OSError):
         for path in folder.iterdir():
-            if (found := _TEMPORARY.fullmatch(path.name)) and not _is_running(int(found[1])):
+            if (found := _TEMPORARY.fullmatch(path.name)) and not pid_exists(int(found[1])):
                 path.unlink(missing_ok=True)
-
-
-def _is_running(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:  # of another user
-        pass
-    return True
 
 
 @contextmanager

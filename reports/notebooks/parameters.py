@@ -149,9 +149,7 @@ html.table(
 
 # %%
 known = html.composed(sweet_spot.guarantees(sweet))
-html.say("The guarantees of the selections:\n\n{known}", known=known)
-
-# %%
+display(html.say("The guarantees of the selections:\n\n{known}", known=known))
 contrary = sweet_spot.against_main_effects(sweet, effects, changes)
 if contrary:
     intro = "By the main effects above, some selected values are lower than another value:"

@@ -111,8 +111,8 @@ html.figure(
 # random draws in a replication, and that missions simulated again with SimPy give the same records.
 
 # %%
-verdicts = html.composed(checks.on_topics(judged, *checks.BOOKKEEPING))
-names = html.composed(suite.names)
+kept = checks.on_topics(judged, *checks.BOOKKEEPING)
+verdicts, names = map(html.composed, (kept, suite.names))
 html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, names=names)
 
 # %% [markdown]
@@ -179,8 +179,7 @@ html.gallery(figures)
 # number is read from the scenario and the manifests of the studies.
 
 # %%
-others = [study.manifest for study in suite.others.values()]
-model = stress_des.describe(suite.study.manifest, others)
+model = stress_des.describe(suite.study.manifest, [s.manifest for s in suite.others.values()])
 display(Markdown("\n\n".join(model.sections[number] for number in "12")))
 html.figure(
     drawings.slot(*model.overview),
