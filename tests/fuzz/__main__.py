@@ -3,6 +3,7 @@
 import argparse
 import os
 import random
+import resource
 import shlex
 import shutil
 import sys
@@ -18,6 +19,7 @@ from tests.fuzz.forks import Forks, Outcome
 from tests.fuzz.judge import CODES, findings
 
 FOLDER = Path("build/fuzz")
+MEMORY = 6 * 2**30  # bytes that the session itself may take; cases have a limit of their own
 
 
 def main() -> int:
@@ -28,6 +30,8 @@ def main() -> int:
     parser.add_argument("--case", type=int, help="try only the case of this number")
     asked = parser.parse_args()
     seed = random.SystemRandom().randrange(10**6) if asked.seed is None else asked.seed
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, hard))
     os.environ["OMP_NUM_THREADS"] = "1"  # threads of a case would be in the way of the other
     print(f"seed {seed}: cases for {asked.minutes:g} minutes", flush=True)
     cases, inputs = FOLDER.absolute() / "cases", FOLDER.absolute() / "ready"

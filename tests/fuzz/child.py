@@ -15,6 +15,8 @@ from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
 STDOUT, STDERR, STARTED = "stdout", "stderr", "started"  # files in the folder ``log`` of the case
 DATA = 1536 * 2**20  # bytes that a process may allocate, besides those of the loaded libraries
 
+FILE = 2**30  # bytes of a file, if the case does not say
+
 
 def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
     """Run the command of a case, in a session of its own, and exit with its code."""
@@ -29,8 +31,7 @@ def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
     _limit(resource.RLIMIT_CPU, int(case.seconds) + 1)
     _limit(resource.RLIMIT_CORE, 0)
     (box / LOG / STARTED).touch()
-    if case.file_size is not None:
-        _limit(resource.RLIMIT_FSIZE, case.file_size)
+    _limit(resource.RLIMIT_FSIZE, case.file_size or FILE)
     code = command(case.arguments)
     atexit._run_exitfuncs()  # a process of multiprocessing does not call them
     sys.exit(code)

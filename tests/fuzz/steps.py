@@ -19,6 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analysis.results.chunks import name_of, short_hash
+from dess.files import read_bytes, read_text
 from policies.ddqn import tensors
 from policies.ddqn.session import CHECKPOINT
 from reports.pages.verify import sealed
@@ -55,9 +56,8 @@ class Write:
     content: bytes
 
     def do(self, box: Path, ready: Path) -> None:
-        path = box / self.path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(self.content)
+        (box / self.path).parent.mkdir(parents=True, exist_ok=True)
+        _write(box / self.path, self.content)
 
 
 @dataclass(frozen=True)
@@ -68,14 +68,14 @@ class Lines:
     edits: tuple[tuple[int, Literal["value", "line", "remove", "repeat"], str], ...]
 
     def do(self, box: Path, ready: Path) -> None:
-        lines = (box / self.path).read_text("utf-8").splitlines()
+        lines = read_text(box / self.path).splitlines()
         for position, action, text in self.edits:
             at = position % max(len(lines), 1)
             key = lines[at].partition("=")[0] if lines else "key "
             new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
             lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
         text = "\n".join(lines) + "\n"
-        (box / self.path).write_bytes(text.encode("utf-8", "surrogateescape"))
+        _write(box / self.path, text.encode("utf-8", "surrogateescape"))
 
 
 @dataclass(frozen=True)
@@ -86,11 +86,11 @@ class Bytes:
     edits: tuple[tuple[int, bytes | None], ...]
 
     def do(self, box: Path, ready: Path) -> None:
-        content = (box / self.path).read_bytes()
+        content = read_bytes(box / self.path)
         for position, new in self.edits:
             at = position % max(len(content), 1)
             content = content[:at] + (b"" if new is None else new + content[at + len(new) :])
-        (box / self.path).write_bytes(content)
+        _write(box / self.path, content)
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,8 @@ class Json:
     edits: tuple[Edit, ...]
 
     def do(self, box: Path, ready: Path) -> None:
-        text = edited((box / self.path).read_text("utf-8"), self.edits)
-        (box / self.path).write_bytes(text.encode("utf-8", "surrogateescape"))
+        text = edited(read_text(box / self.path), self.edits)
+        _write(box / self.path, text.encode("utf-8", "surrogateescape"))
 
 
 @dataclass(frozen=True)
@@ -115,14 +115,14 @@ class Page:
     is_sealed: bool = True
 
     def do(self, box: Path, ready: Path) -> None:
-        html = (box / self.path).read_text("utf-8")
+        html = read_text(box / self.path)
         blocks = [
             *re.finditer(r'<script class="[^"]*" type="application/json">(.*?)</script>', html)
         ]
         begin, end = blocks[self.block % len(blocks)].span(1)
         html = html[:begin] + edited(html[begin:end], self.edits) + html[end:]
         html = html.encode("utf-8", "replace").decode()
-        (box / self.path).write_text(sealed(html) if self.is_sealed else html, "utf-8")
+        _write(box / self.path, (sealed(html) if self.is_sealed else html).encode())
 
 
 @dataclass(frozen=True)
@@ -151,10 +151,10 @@ class Sealed:
 
     def do(self, box: Path, ready: Path) -> None:
         description, path = box / self.folder / "config.json", box / self.folder / CHECKPOINT
-        model = (box / self.folder / "model.safetensors").read_bytes()
-        content = json.loads(description.read_bytes())
+        model = read_bytes(box / self.folder / "model.safetensors")
+        content = json.loads(read_bytes(description))
         content["model_sha256"] = [sha256(model).hexdigest()]
-        description.write_text(json.dumps(content), "utf-8")
+        _write(description, json.dumps(content).encode())
         header, data = _split(path)
         inner = json.loads(header["__metadata__"]["dess"])
         inner.pop("sha256", None)
@@ -178,10 +178,10 @@ class Forged:
         path = files[self.position % len(files)]
         name = path.stem.rpartition("-")[0]
         if self.change == "bytes":
-            content = bytearray(path.read_bytes())
+            content = bytearray(read_bytes(path))
             content[self.position % len(content)] ^= 1 + self.position % 255
         else:
-            table = pq.read_table(path, partitioning=None)
+            table = pq.read_table(pa.BufferReader(read_bytes(path)))
             table, name = self._changed(table, name)
             sink = pa.BufferOutputStream()
             pq.write_table(table, sink)
@@ -270,7 +270,7 @@ class Plant:
         for name in self.names:
             path = box / self.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(PLANTED.format(name=path.name))
+            _write(path, PLANTED.format(name=path.name).encode())
 
 
 def _device(path: Path, kind: str) -> None:
@@ -324,13 +324,20 @@ def _places(document: Any) -> list[tuple[Any, Any]]:
     return places
 
 
+def _write(path: Path, content: bytes) -> None:
+    """Write a new or a regular file; a pipe would block, a device of the machine is not ours."""
+    if path.exists() and not path.is_file():
+        raise ValueError(f"{path} is no regular file")
+    path.write_bytes(content)
+
+
 def _split(path: Path) -> tuple[dict[str, Any], bytes]:
     """The header of a safetensors file, and the bytes after it."""
-    content = path.read_bytes()
+    content = read_bytes(path)
     end = 8 + int.from_bytes(content[:8], "little")
     return json.loads(content[8:end]), content[end:]
 
 
 def _join(path: Path, header: str, content: bytes) -> None:
     new = header.encode("utf-8", "replace")
-    path.write_bytes(len(new).to_bytes(8, "little") + new + content)
+    _write(path, len(new).to_bytes(8, "little") + new + content)

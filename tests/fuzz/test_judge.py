@@ -10,7 +10,8 @@ from tests.fuzz.forks import Forks
 from tests.fuzz.judge import findings
 from tests.fuzz.planted import FAULTS
 from tests.fuzz.planted import main as planted
-from tests.fuzz.steps import Node, Write
+from tests.fuzz.steps import Bytes, Json, Node, Write
+from tests.fuzz.strategies.folders import NODES
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="uses limits that Linux has")
 SEED = 16
@@ -42,6 +43,18 @@ def test_fixed_cases_keep_the_contract(tmp_path, ready_texts):
     outcomes = [outcome for _, outcome in Forks(tmp_path, ready_texts).outcomes(enumerate(cases))]
     assert {outcome.code for outcome in outcomes} >= {0, 2}
     assert [(o.case.arguments, found) for o in outcomes if (found := findings(o))] == []
+
+
+@pytest.mark.parametrize("kind", NODES)
+def test_steps_neither_read_nor_write_what_is_no_file(kind, tmp_path, ready_texts):
+    Node("in/manifest.json", kind).do(tmp_path, ready_texts)
+    edits = ((0, "replace", "1"),)
+    for step in (Json("in/manifest.json", edits), Bytes("in/manifest.json", ((0, b"a"),))):
+        with pytest.raises((OSError, ValueError)):
+            step.do(tmp_path, ready_texts)
+    if kind != "dangling":  # a new file, where the link leads to
+        with pytest.raises((OSError, ValueError)):
+            Write("in/manifest.json", b"a").do(tmp_path, ready_texts)
 
 
 def test_cases_depend_on_their_seed_and_number_only():
