@@ -115,8 +115,8 @@ html.say(
     "Of {n:,} settings, the one with the highest mean of {metric} was selected for every policy, "
     "by <code>{rule[procedure]}</code> with an indifference of {margin}. The mean of a selected "
     "setting tends to be too high, because it was selected for its high mean. So each selected "
-    "setting was simulated in {rule[check]:,} additional missions, and only these are compared with "
-    "the paper's numbers (means of {paper:,} missions, with all parameters at their best).",
+    "setting was simulated in {rule[check]:,} additional missions, and only these are compared "
+    "with the paper's numbers (means of {paper:,} missions, with all parameters at their best).",
     n=len(sweet.manifest["points"]),
     metric=names.METRICS[rule["metric"]].lower(),
     rule=rule,
