@@ -85,7 +85,7 @@ BAD = {
     "report what-if --parameter speed=2": ["'speed' is unknown to what-if", "baseline, missions"],
     "report what-if --parameter speed": ["--parameter: 'speed' is not KEY=VALUE"],
     "report what-if --parameter results='x'": ["parameter: 'results' is unknown"],
-    "verify nope": ["nope: cannot be read"],
+    "verify nope": ["nope: no such file"],
     "verify small.toml": ["small.toml: is not a page of dess"],
     "verify .": [".: contains no results and is not a page"],
 }

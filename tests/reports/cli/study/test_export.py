@@ -37,7 +37,7 @@ BAD = {
     "out --crate out": "out: is a folder",
     "out --crate none/a.zip": "none/a.zip: cannot be written",
     "out --crate a.zip --license mine": "--license: 'mine' is unknown; allowed: an identifier of",
-    "out --crate a.zip --page none.html": "none.html: cannot be read",
+    "out --crate a.zip --page none.html": "none.html: no such file",
     "out --crate a.zip --page small.toml": "small.toml: does not show the results of this study",
     "none --crate a.zip": "none/manifest.json: no such file",
     "small.toml --crate a.zip": "small.toml/manifest.json: no such file",
