@@ -5,6 +5,7 @@ import os
 import resource
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -33,7 +34,10 @@ def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
     (box / LOG / STARTED).touch()
     _limit(resource.RLIMIT_FSIZE, case.file_size or FILE)
     code = command(case.arguments)
-    atexit._run_exitfuncs()  # a process of multiprocessing does not call them
+    # The end of an interpreter, which a process of multiprocessing has in another order: workers
+    # are stopped before anything waits for them.
+    threading._shutdown()
+    atexit._run_exitfuncs()
     sys.exit(code)
 
 
