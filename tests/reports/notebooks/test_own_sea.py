@@ -1,6 +1,7 @@
 """The page of an own sea names the cheapest fleet, and its notebook runs with another sea."""
 
 import re
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,7 @@ def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     """In Jupyter, from top to bottom; with another requirement."""
     values = {**ASKED, "scenario": str(_sea(tmp_path))}
     shown = run_changed(NAME, tmp_path, "'success': 0.5", "'success': 0.6", values)
-    (text,) = (text for text in shown if "All conditions together" in text)
+    (text,) = (unescape(text) for text in shown if "All conditions together" in text)
     prices = {"uav": 20_000, "pad": 3_000, "charge": 2, "hour": 100, "slot_seconds": 60}
     again = sweep(
         tmp_path / "sea.toml",

@@ -1,6 +1,7 @@
 """The page of a question says what its missions say."""
 
 import re
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -97,5 +98,5 @@ def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     )
     outputs = [o for c in notebook.cells if c.cell_type == "code" for o in c.outputs]
     shown = [output.data for output in outputs if output.output_type == "execute_result"]
-    assert asked.answer() in [data.get("text/markdown") for data in shown]
+    assert asked.answer() in [unescape(data.get("text/markdown", "")) for data in shown]
     assert "application/vnd.jupyter.widget-view+json" in shown[-1]
