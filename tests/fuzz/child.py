@@ -6,7 +6,7 @@ import resource
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
@@ -19,7 +19,7 @@ DATA = 1536 * 2**20  # bytes that a process may allocate, besides those of the l
 FILE = 2**30  # bytes of a file, if the case does not say
 
 
-def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
+def run(case: Case, box: Path, command: Callable[[], int]) -> None:
     """Run the command of a case, in a session of its own, and exit with its code."""
     os.setsid()
     os.chdir(box / CWD)
@@ -33,7 +33,7 @@ def run(case: Case, box: Path, command: Callable[[Sequence[str]], int]) -> None:
     _limit(resource.RLIMIT_CORE, 0)
     (box / LOG / STARTED).touch()
     _limit(resource.RLIMIT_FSIZE, case.file_size or FILE)
-    code = command(case.arguments)
+    code = command()
     # The end of an interpreter, which a process of multiprocessing has in another order: workers
     # are stopped before anything waits for them.
     threading._shutdown()

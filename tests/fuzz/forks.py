@@ -8,7 +8,7 @@ import os
 import shutil
 import signal
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
@@ -28,7 +28,7 @@ _GRACE = 5  # seconds in which the helpers of a command, such as its workers, ha
 # Errors of a step that does not fit what an earlier step has left; it does nothing then.
 _UNFIT = (OSError, ValueError, LookupError, ZeroDivisionError, RecursionError, pa.ArrowException)
 
-Command = Callable[[Sequence[str]], int]
+Command = Callable[[], int]
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Forks:
         Args:
             folder: The folder of all cases.
             ready: The folder of the ready inputs.
-            command: What is called with the arguments of a case.
+            command: What is called, with the arguments of a case as those of the process.
         """
         self.folder, self.ready, self._command = folder, ready, command
         self._context = multiprocessing.get_context("forkserver")

@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -119,6 +119,6 @@ FAULTS: dict[Callable[[], int], str] = {
 }
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Break the contract as the first argument says."""
-    return {fault.__name__: fault for fault in FAULTS}[arguments[0]]()
+def main() -> int:
+    """Break the contract as the first argument of the process says."""
+    return {fault.__name__: fault for fault in FAULTS}[sys.argv[1]]()
