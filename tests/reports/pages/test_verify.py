@@ -275,7 +275,7 @@ def test_what_is_neither_a_page_nor_results_is_refused(
         path.unlink()
     for name, message in {
         "text": "is not a page of dess",
-        "absent": "cannot be read",
+        "absent": "no such file",
         "empty": "contains no results and is not a page",
         "broken": "incomplete",
     }.items():
