@@ -70,7 +70,7 @@ def fail(message: str, code: int) -> int:
     """
     try:
         print(_line(message), file=sys.stderr)
-    except OSError:  # nobody can be told
+    except OSError:  # there is no stream left for the line
         _give_up(sys.stderr)
     return code
 
