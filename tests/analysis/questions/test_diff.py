@@ -242,7 +242,7 @@ def test_folders_without_a_common_mission_are_refused(results, tmp_path):
 def test_libraries_and_accepted_changes_that_differ_are_told(results):
     manifest = results.store.manifest
     libraries = manifest.libraries | {"numpy": "1.0"}
-    accepted = [provenance.Acceptance(modules={"dess.rules": ("a", "b")}, missions=7)]
+    accepted = [provenance.Acceptance(modules={"dess.rules": ("a" * 64, "b" * 64)}, missions=7)]
     other = replace(
         results,
         store=type(results.store)(

@@ -286,7 +286,7 @@ def test_a_grid_of_very_many_points_is_counted_without_making_them():
 
 
 def test_a_saltelli_design_has_no_more_points_than_others():
-    text = HEAD + 'saltelli"\nranges = {quota = [1, 9], uavs = [1, 2]}\nbase = '
+    text = '[design]\nkind = "saltelli"\nranges = {quota = [1, 9], uavs = [1, 2]}\nbase = '
     assert plan(text + str(2**17)).count == 5 * 2**17
     with pytest.raises(ValidationError, match="gives 1,310,720 design points; allowed: 131,072 at"):
         plan(text + str(2**18))

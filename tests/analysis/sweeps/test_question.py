@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_results, load_study, run_study
-from analysis.execution import dry_run
+from analysis.execution import dry_run, effort
 from analysis.sweeps.question import ask, file_of, folder_of, question
 from analysis.sweeps.values import values_of
 from dess import InputError
@@ -213,7 +213,8 @@ def test_a_million_settings_are_counted_before_they_are_made(asking, tmp_path):
 
 def test_missions_of_other_sweeps_take_no_time(asking, tmp_path, monkeypatch):
     monkeypatch.setattr(dry_run, "FEW", 20)
-    monkeypatch.setattr(dry_run, "LONG_RUN", 0.0)
+    monkeypatch.setattr(effort, "FEW", 20)
+    monkeypatch.setattr(effort, "LONG_RUN", 0.0)
     study = sweep_of(FIELDS, tmp_path, missions=6)
     with pytest.raises(InputError, match="24 missions to simulate"):
         ask(study, tmp_path / "results")
