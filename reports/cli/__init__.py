@@ -6,7 +6,8 @@ imports the simulator, pandas or torch when it runs.
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from reports.interrupts import Interrupts
 
@@ -20,10 +21,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 2 bad input, 130 interrupted, 1 anything else.
     """
-    # Workers and kernels import nothing from the working directory, which may be a results folder.
-    os.environ["PYTHONSAFEPATH"] = "1"
     words = sys.argv[1:] if arguments is None else [*arguments]
-    with Interrupts(is_last=arguments is None) as interrupts:
+    with _safe_path(), Interrupts(is_last=arguments is None) as interrupts:
         try:  # the imports take a while, in which a signal may come
             from reports.cli import console
             from reports.cli.commands import app
@@ -36,6 +35,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         except BaseException as error:
             return _failed(error, words, interrupts.received)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Let workers import nothing from the working directory, which may be a results folder."""
+    name = "PYTHONSAFEPATH"
+    before = os.environ.get(name)
+    os.environ[name] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
 
 
 def _failed(error: BaseException, words: Sequence[str], is_interrupted: bool) -> int:

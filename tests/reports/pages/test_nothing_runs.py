@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -46,10 +47,16 @@ def test_a_page_runs_nothing_of_the_results_folder(trap: Path, tmp_path: Path, c
     assert "matplotlibrc" not in caplog.text
 
 
-def test_processes_of_a_command_import_nothing_from_the_working_directory(trap: Path) -> None:
-    assert main(["--version"]) == 0
-    subprocess.run([sys.executable, "-c", "import joblib"], check=True)
+def test_processes_of_a_command_import_nothing_from_the_working_directory(
+    trap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start_a_process(*_: Any, **__: Any) -> int:
+        return subprocess.run([sys.executable, "-c", "import joblib"], check=True).returncode
+
+    monkeypatch.setattr("reports.cli.commands.app", start_a_process)
+    assert main([]) == 0
     assert not (trap / "hit").exists()
+    assert "PYTHONSAFEPATH" not in os.environ
 
 
 def test_the_command_imports_nothing_from_the_working_directory(trap: Path) -> None:
