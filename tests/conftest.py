@@ -7,6 +7,7 @@ draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs th
 """
 
 import os
+import signal
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
@@ -16,6 +17,8 @@ from tests.installed import installed
 __all__ = ["installed"]  # a fixture
 
 os.environ["OMP_NUM_THREADS"] = "1"
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # by nohup; commands would ignore it, too
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
