@@ -26,7 +26,8 @@ from tests.fuzz.snapshot import Snapshot, taken
 AT_ONCE = 2
 _GRACE = 5  # seconds in which the helpers of a command, such as its workers, have to end after it
 # Errors of a step that does not fit what an earlier step has left; it does nothing then.
-_UNFIT = (OSError, ValueError, LookupError, ZeroDivisionError, RecursionError, pa.ArrowException)
+_UNFIT = (OSError, ValueError, LookupError, TypeError, AttributeError, ZeroDivisionError)
+_UNFIT += (RecursionError, pa.ArrowException)
 
 Command = Callable[[], int]
 
