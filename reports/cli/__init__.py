@@ -28,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from reports.cli.commands import app
 
             console.prepare()
+            _check_text(words)
             code = app(words, prog_name="dess", standalone_mode=False) or 0
             sys.stdout.flush()  # an error of the output is an error of the command
             if code != console.INTERRUPTED:  # as typer ends a command after a Ctrl-C
@@ -35,6 +36,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise KeyboardInterrupt
         except BaseException as error:
             return _failed(error, words, interrupts.received)
+
+
+def _check_text(words: Sequence[str]) -> None:
+    """Refuse arguments that are not UTF-8, which not every library could write or print."""
+    from dess.errors import InputError, shown
+    from dess.files import is_text
+
+    for word in words:
+        if not is_text(word):
+            raise InputError(f"{shown(word)}: is not text in UTF-8; allowed: another name")
 
 
 @contextmanager

@@ -117,6 +117,11 @@ def test_an_output_below_a_long_name_is_a_line(refused, tmp_path):
     refused("study", "run", "trial.toml", "--out", "x/" * 3000)
 
 
+@pytest.mark.parametrize("command", [("train", "quick"), ("study", "run", "trial.toml")])
+def test_an_output_that_is_no_text_is_a_line(refused, command):
+    assert "is not text in UTF-8" in refused(*command, "--out", "out\udc80")
+
+
 def test_what_the_terminal_gets_of_a_name_is_printable(dess, tmp_path):
     (tmp_path / "bad.toml").write_text(f'description = "{RAW}"')
     code, out, _ = dess("scenarios", "show", "bad.toml")
