@@ -4,6 +4,7 @@ Pages read the file and never measure, because a measured time is different ever
 """
 
 import json
+import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -208,7 +209,7 @@ def read(folder: str | Path) -> Timing:
         InputError: If there is none, or it is damaged or has another version.
     """
     path = Path(folder) / FILE
-    allowed = f"allowed: what is made by: dess timing --out {Path(folder).resolve()}"
+    allowed = f"allowed: what is made by: dess timing --out {os.path.abspath(folder)}"
     return Timing.load(path, SCHEMA_VERSION, allowed, allowed)
 
 

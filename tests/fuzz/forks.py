@@ -23,7 +23,7 @@ from tests.fuzz import child
 from tests.fuzz.case import FOLDERS, HOME, LOG, Case
 from tests.fuzz.snapshot import Snapshot, taken
 
-AT_ONCE = 2
+AT_ONCE = 3  # of two cores: some cases wait for a time limit or a lock
 _GRACE = 5  # seconds in which the helpers of a command, such as its workers, have to end after it
 # Errors of a step that does not fit what an earlier step has left; it does nothing then.
 _UNFIT = (OSError, ValueError, LookupError, TypeError, AttributeError, ZeroDivisionError)
