@@ -11,9 +11,7 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.state import HOVER, STEP_X, STEP_Y
-from dess.view import View
-from policies.guard import (
+from dess.observations.guard import (
     contest,
     margin,
     must_charge,
@@ -22,6 +20,8 @@ from policies.guard import (
     safe_moves,
     slots_needed,
 )
+from dess.state import HOVER, STEP_X, STEP_Y
+from dess.view import View
 
 _RANDOM, _NEAREST, _GREEDY, _TOUR, _UNGUARDED = range(5)
 
@@ -31,7 +31,7 @@ _WORTH = 0.25
 # Weight of a node to which a teammate is nearer (greedy), and slots added to every distance.
 _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
-# Cost [slots] of a step into a cell, by the result of policies.guard.contest for that cell.
+# Cost [slots] of a step into a cell, by the result of the guard's contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 

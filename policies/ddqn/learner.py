@@ -7,8 +7,8 @@ import numpy as np
 import torch
 from torch import nn
 
+from dess.observations.states import CompactStates, masks
 from policies.ddqn.config import TrainingConfig
-from policies.ddqn.observations.states import CompactStates, masks
 from policies.ddqn.replay import Batch
 
 

@@ -8,8 +8,8 @@ import torch
 from torch import nn
 
 from dess.errors import InputError
+from dess.observations.states import Layout, compact_states, masks
 from dess.view import View
-from policies.ddqn.observations.states import Layout, compact_states, masks
 
 # The rounding errors of a network depend on the number of rows that it evaluates together, but the
 # action must not. So if the two best values differ by less than CLOSE, the values are computed

@@ -9,9 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from dess.env.stepper import MissionStepper
-from dess.scenario import SAMPLED, ScenarioSpace
-from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of
-from policies.ddqn.observations.states import (
+from dess.observations.states import (
     BATTERY,
     HOME,
     MASK,
@@ -20,6 +18,8 @@ from policies.ddqn.observations.states import (
     X,
     Y,
 )
+from dess.scenario import SAMPLED, ScenarioSpace
+from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of
 
 # What a mission has of its own; all other fields are constants of the scenario.
 _PROGRESS = ("replication", "slot", "active", "initial", "arrived", "collected", "slot_collected")

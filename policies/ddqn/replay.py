@@ -12,7 +12,7 @@ import numpy as np
 
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from policies.ddqn.observations.states import CompactStates, empty_states
+from dess.observations.states import CompactStates, empty_states
 
 
 class Batch(NamedTuple):

@@ -22,13 +22,13 @@ from dess.batch import BATCH_SIZE
 from dess.code.memory import check_memory
 from dess.errors import InputError, shown
 from dess.files import check_folder, replacing, writable
+from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV
 from policies.ddqn.checkpoint import load_training, save_training
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import MODEL
 from policies.ddqn.network import units_of
-from policies.ddqn.observations.states import layout_of
 from policies.ddqn.replay import ReplayMemory
 from policies.ddqn.trained import save_policy
 from policies.ddqn.training import Training, build

@@ -18,6 +18,7 @@ from safetensors.torch import load, save
 
 from dess.errors import InputError
 from dess.files import read_bytes, replacing
+from dess.observations.states import layout_of
 from dess.scenario import ScenarioSpace
 from policies.ddqn import tensors
 from policies.ddqn.config import TrainingConfig, config_names, learner_of, resume_command
@@ -30,7 +31,6 @@ from policies.ddqn.description import (
     Run,
     read_description,
 )
-from policies.ddqn.observations.states import layout_of
 from policies.ddqn.policy import DDQN
 from policies.ddqn.training import OBSERVATIONS, build
 

@@ -16,14 +16,9 @@ from dess.batch import simulate_batch
 from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
 from dess.errors import InputError
-from dess.scenario import ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y
-from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
-from policies.ddqn.learner import Learner
-from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
-from policies.ddqn.observations.maps import POOL, Maps
-from policies.ddqn.observations.nodes import Nodes
-from policies.ddqn.observations.states import (
+from dess.observations.maps import POOL, Maps
+from dess.observations.nodes import Nodes
+from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGE_START,
@@ -38,7 +33,12 @@ from policies.ddqn.observations.states import (
     layout_of,
     masks,
 )
-from policies.ddqn.observations.vector import Vector
+from dess.observations.vector import Vector
+from dess.scenario import ScenarioSpace
+from dess.state import HOVER, STEP_X, STEP_Y
+from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
+from policies.ddqn.learner import Learner
+from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.replay import ReplayMemory
 

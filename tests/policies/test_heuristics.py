@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 import policies
 from dess.batch import simulate_batch
 from dess.mission import simulate
+from dess.observations.guard import guard
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View
-from policies.guard import guard
 from policies.registry import SHIPPED
 from tests.drawn import Checked, replications, seeds, spaces
 

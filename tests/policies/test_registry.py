@@ -13,12 +13,12 @@ import dess
 import policies
 from dess import InputError
 from dess.mission import simulate
+from dess.observations.states import layout_of
 from dess.scenario import Scenario, load_scenario, scenario_names
 from policies import registry
 from policies.about import about
 from policies.base import Policy
 from policies.ddqn.config import config_of
-from policies.ddqn.observations.states import layout_of
 from policies.ddqn.trained import save_policy
 from policies.ddqn.training import build
 from policies.registry import SHIPPED, trained_names

@@ -156,9 +156,11 @@ def _simulated_by_other_code(out, *modules):
 
 
 def test_other_code_is_refused_by_its_modules(out, tmp_path):
-    _simulated_by_other_code(out, "dess.rules", "policies.guard")
+    _simulated_by_other_code(out, "dess.rules", "dess.observations.guard")
     before = files_of(out)
-    line = "made by other code of dess.rules, policies.guard; allowed: .*, or --accept-code"
+    line = (
+        "made by other code of dess.rules, dess.observations.guard; allowed: .*, or --accept-code"
+    )
     with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
     assert files_of(out) == before
@@ -186,8 +188,8 @@ def test_accepted_code_is_no_other_code(out, tmp_path):
     accepted = run_study(small_study(tmp_path), out, accept_code=True).manifest["accepted"]
     again = run_study(small_study(tmp_path, missions=12), out)
     assert again.manifest["accepted"] == accepted
-    _simulated_by_other_code(out, "policies.guard")
-    with pytest.raises(InputError, match="made by other code of policies.guard"):
+    _simulated_by_other_code(out, "dess.observations.guard")
+    with pytest.raises(InputError, match="made by other code of dess.observations.guard"):
         run_study(small_study(tmp_path), out)
     twice = run_study(small_study(tmp_path, missions=12), out, accept_code=True)
     assert [*map(len, (accepted, twice.manifest["accepted"]))] == [1, 2]
@@ -205,7 +207,7 @@ def test_other_weights_are_refused_whatever_is_accepted(out, tmp_path):
 
 def test_a_policy_depends_on_the_modules_of_what_it_holds():
     learned = provenance.code_behind(["ddqn"])
-    held = {"policies.ddqn.policy", "policies.ddqn.network", "policies.ddqn.observations.vector"}
+    held = {"policies.ddqn.policy", "policies.ddqn.network", "dess.observations.vector"}
     assert held <= learned.keys()
     assert "policies.ddqn.training" not in learned
 

@@ -39,7 +39,7 @@ def edit(path: Path, old: str, new: str) -> None:
 
 def test_comments_and_docstrings_change_nothing(tree: Path) -> None:
     before = hashes(tree, *ENGINES, "policies.heuristics")
-    for name in ("dess/rules.py", "dess/env/render.py", "policies/guard.py"):
+    for name in ("dess/rules.py", "dess/env/render.py", "dess/observations/guard.py"):
         path = tree / name
         path.write_text(f"# A comment.\n\n{path.read_text('utf-8')}\n# And another.\n", "utf-8")
     text = (tree / "dess/rules.py").read_text("utf-8")
@@ -62,7 +62,9 @@ def test_what_engines_do_not_import_does_not_count() -> None:
 
 
 def test_heuristics_do_not_depend_on_what_learns() -> None:
-    assert {"policies.guard", "policies.heuristics"} <= code_of("policies.heuristics").keys()
+    assert {"dess.observations.guard", "policies.heuristics"} <= code_of(
+        "policies.heuristics"
+    ).keys()
     assert not [name for name in code_of("policies.heuristics") if "ddqn" in name]
 
 

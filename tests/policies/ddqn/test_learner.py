@@ -6,8 +6,8 @@ import pytest
 import torch
 from torch import nn
 
+from dess.observations.states import masks
 from policies.ddqn.learner import Learner, double_dqn_target, soft_update
-from policies.ddqn.observations.states import masks
 from policies.ddqn.replay import Batch
 from policies.ddqn.training import Training
 from tests.policies.ddqn.tiny import CPU, PHASES, tiny

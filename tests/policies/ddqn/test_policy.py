@@ -12,14 +12,14 @@ from torch import Tensor, nn
 from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
+from dess.observations.guard import guard
+from dess.observations.maps import Maps
+from dess.observations.states import Layout, layout_of
+from dess.observations.vector import Vector
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from policies.base import Policy
 from policies.ddqn.network import DuelingNetwork, PaperNetwork
-from policies.ddqn.observations.maps import Maps
-from policies.ddqn.observations.states import Layout, layout_of
-from policies.ddqn.observations.vector import Vector
 from policies.ddqn.policy import DDQN
-from policies.guard import guard
 from tests.drawn import Checked, Recorder, Wanderer, replications, seeds, spaces
 
 PAPER = load_scenario("paper")

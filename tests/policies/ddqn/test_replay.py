@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from policies.ddqn.observations.states import empty_states
+from dess.observations.states import empty_states
 from policies.ddqn.replay import Batch, ReplayMemory
 
 SLOT, ENVIRONMENT = 0, 1  # what the columns of the missions hold here

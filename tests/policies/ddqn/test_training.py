@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from dess.batch import simulate_batch
+from dess.observations.states import ACTIVE, CHARGING, compact_states, masks
 from dess.record import empty_records
 from dess.scenario import ScenarioSpace
 from policies.ddqn import training as module
 from policies.ddqn.checkpoint import load_training, save_training
-from policies.ddqn.observations.states import ACTIVE, CHARGING, compact_states, masks
 from policies.ddqn.replay import Batch
 from policies.ddqn.training import MISSION_SEED, SELECT_BY, Training
 from tests.policies.ddqn.tiny import (

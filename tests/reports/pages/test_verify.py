@@ -221,11 +221,11 @@ def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: 
     team = evidence.policies[0]
     member = team.members[0].model_copy(update={"weights": "other"})
     other = team.model_copy(update={"members": [member]})
-    code = evidence.code | {"dess.rules": "other", "policies.guard": "other"}
+    code = evidence.code | {"dess.rules": "other", "dess.observations.guard": "other"}
     changes = {"code": code, "policies": [other, *evidence.policies[1:]]}
     found = check_records(evidence.model_copy(update=changes), ALL, 0)
     assert found.notes == [
-        "made by other code of dess.rules, policies.guard",
+        "made by other code of dess.rules, dess.observations.guard",
         "made by other weights of random",
     ]
     assert found.differing == []

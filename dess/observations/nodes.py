@@ -7,8 +7,8 @@ slots to the east is worth, and not once for every node.
 import numpy as np
 
 from dess.code.kernels import kernel
-from policies.ddqn.observations.states import CompactStates, Layout, X, Y
-from policies.ddqn.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
+from dess.observations.states import CompactStates, Layout, X, Y
+from dess.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
 
 NODE = 22
 

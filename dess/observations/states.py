@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.observations.guard import must_charge, parking_cell, safe_moves, slots_needed
 from dess.rules import on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
-from policies.guard import must_charge, parking_cell, safe_moves, slots_needed
 
 # Columns of ``CompactStates.missions``.
 CHARGE_START, CHARGE_COMPLETE = range(2)
@@ -83,8 +83,7 @@ def compact_states(state: State, guarded: bool) -> CompactStates:
 
     Args:
         state: The state of B missions.
-        guarded: True for the mask of the return guard (``policies.guard``), False for the mask of
-            all legal actions.
+        guarded: True for the mask of the return guard, False for the mask of all legal actions.
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
     _fill(state.missions, state.uavs, state.residual, guarded, states)

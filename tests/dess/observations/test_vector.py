@@ -8,9 +8,7 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
-from dess.scenario import load_scenario
-from dess.state import HOVER, STEP_X, STEP_Y
-from policies.ddqn.observations.states import (
+from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGE_COMPLETE,
@@ -29,7 +27,9 @@ from policies.ddqn.observations.states import (
     empty_states,
     layout_of,
 )
-from policies.ddqn.observations.vector import Vector
+from dess.observations.vector import Vector
+from dess.scenario import load_scenario
+from dess.state import HOVER, STEP_X, STEP_Y
 from tests.drawn import EAST, NORTH, WEST
 
 GRID = 32

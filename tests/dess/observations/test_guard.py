@@ -9,10 +9,10 @@ from hypothesis import event, given
 from dess import streams
 from dess.batch import simulate_batch
 from dess.mission import simulate
+from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER, empty_state
 from dess.view import View
-from policies.guard import guard
 from tests.drawn import EAST, NORTH, SOUTH, WEST, Fidget, replications, seeds, spaces
 
 

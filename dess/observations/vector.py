@@ -9,8 +9,7 @@ are described one by one, and all of them affect the data that is left for this 
 import numpy as np
 
 from dess.code.kernels import kernel
-from dess.state import STEP_X, STEP_Y
-from policies.ddqn.observations.states import (
+from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGE_COMPLETE,
@@ -26,6 +25,7 @@ from policies.ddqn.observations.states import (
     X,
     Y,
 )
+from dess.state import STEP_X, STEP_Y
 
 MATES = 2  # teammates described one by one, the nearest first
 _OWN = 16

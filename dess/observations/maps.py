@@ -8,7 +8,7 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.errors import InputError
-from policies.ddqn.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y
+from dess.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y
 
 # The layers of a map: the charging zone, residual data / 20 [data units], remaining flying time
 # of the active UAVs / 100 [%], and their operational status.

@@ -10,12 +10,10 @@ import policies
 from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
 from dess.mission import simulate
-from dess.scenario import ScenarioSpace, load_scenario
-from dess.state import HOVER, State
-from dess.view import View
-from policies.ddqn.observations import states as columns
-from policies.ddqn.observations.maps import Maps
-from policies.ddqn.observations.states import (
+from dess.observations import states as columns
+from dess.observations.guard import guard
+from dess.observations.maps import Maps
+from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGING,
@@ -31,7 +29,9 @@ from policies.ddqn.observations.states import (
     layout_of,
     masks,
 )
-from policies.guard import guard
+from dess.scenario import ScenarioSpace, load_scenario
+from dess.state import HOVER, State
+from dess.view import View
 from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces, teams
 
 FIELDS = {

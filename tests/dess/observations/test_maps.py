@@ -9,7 +9,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 from dess import InputError
-from policies.ddqn.observations.maps import (
+from dess.observations.maps import (
     BATTERY_SCALE,
     DATA,
     DATA_SCALE,
@@ -18,7 +18,7 @@ from policies.ddqn.observations.maps import (
     ZONE,
     Maps,
 )
-from policies.ddqn.observations.states import (
+from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CompactStates,
