@@ -13,10 +13,12 @@ Names are imported on first use, so that ``import dess`` is fast.
 from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
+from dess.env.registration import register
+
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.batch import simulate_batch as simulate_batch
-    from dess.env.batch import batch_env as batch_env
     from dess.env.parallel import parallel_env as parallel_env
+    from dess.env.vector import vector_env as vector_env
     from dess.errors import InputError as InputError
     from dess.mission import simulate as simulate
     from dess.scenario import Scenario as Scenario
@@ -33,10 +35,12 @@ _HOME = {
     "simulate": "mission",
     "simulate_batch": "batch",
     "parallel_env": "env.parallel",
-    "batch_env": "env.batch",
+    "vector_env": "env.vector",
 }
 
 __all__ = ["__version__", *_HOME]
+
+register()  # the environment of ``gymnasium.make_vec``
 
 
 def __getattr__(name: str) -> Any:

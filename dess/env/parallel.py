@@ -7,78 +7,117 @@ while env.agents:
     observations, rewards, terminated, truncated, infos = env.step(actions)
 """
 
+from collections.abc import Iterable, Iterator
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.vector.utils import batch_space, iterate
 from pettingzoo import ParallelEnv
 
-from dess.env.observation import (
-    Observation,
-    observation_bounds,
-    observation_names,
-    observation_space,
-    observe,
-)
-from dess.env.render import draw
-from dess.env.stepper import REWARD_TERMS, MissionStepper, Outcome, checked_actions
-from dess.errors import InputError
+from dess.env.render import Window, draw
+from dess.env.stepper import MissionStepper, Outcome, checked_actions, empty_outcome
+from dess.errors import InputError, one_of
+from dess.errors import shown as quoted
+from dess.observations.components import Components, component_bounds
+from dess.observations.observer import Observer
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import ACTION_NAMES, END_NAMES, HOVER
+from dess.state import ACTION_NAMES, HOVER, TRUNCATED
+
+_MASKS, _ENDED, _MODES = ("observation", "info"), ("leave", "stay"), ("rgb_array", "human")
 
 
 def parallel_env(
-    scenario: Scenario | ScenarioSpace, seed: int = 0, render_mode: str | None = None
+    scenario: Scenario | ScenarioSpace,
+    seed: int = 0,
+    render_mode: str | None = None,
+    observation: str = "vector",
+    mask: str = "observation",
+    ended: str = "leave",
+    guarded: bool = False,
 ) -> "HarvestEnv":
     """A PettingZoo environment of one mission.
 
     Args:
         scenario: The scenario, or the space from which each episode draws its parameters.
         seed: Seed of the episodes, until ``reset`` is called with another seed.
-        render_mode: None or ``"rgb_array"``.
+        render_mode: None, ``"rgb_array"``, or ``"human"`` for a window (needs matplotlib).
+        observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
+            ``state``, the components of ``dess.observations.components.component_names``.
+        mask: Where the mask of the allowed actions is: in the ``observation``, a dictionary of
+            ``observation`` and ``action_mask``, or in the ``info``.
+        ended: Whether UAVs that have ended ``leave`` the agents, or ``stay`` until the mission is
+            over.
+        guarded: Whether the masks leave out what the return guard does not allow, as for the
+            shipped learner.
 
     Raises:
-        InputError: If the seed or the render mode is not allowed.
+        InputError: If one of the arguments is not allowed.
     """
-    return HarvestEnv(scenario, seed, render_mode)
+    return HarvestEnv(scenario, seed, render_mode, observation, mask, ended, guarded)
 
 
-class HarvestEnv(ParallelEnv[str, Observation, int]):
+class HarvestEnv(ParallelEnv[str, Any, int]):
     """One mission as a PettingZoo ``ParallelEnv``; each UAV is an agent, from ``uav_0`` on.
 
     ``reset(seed=s)`` starts replication 0 of seed s and each further ``reset()`` the next
     replication, so a seed gives a reproducible sequence of episodes. ``options={"replication": r}``
-    starts replication r.
+    starts replication r. ``possible_agents`` is the largest fleet of the scenario.
 
-    In the step in which a UAV ends, its ``terminated`` is true (quota filled or battery depleted)
-    or its ``truncated`` is true (``max_slots`` reached), and the UAV is removed from ``agents``.
-    ``possible_agents`` is the largest fleet of the scenario; ``reset`` sets ``agents`` to the fleet
-    of the episode.
+    With ``ended="leave"``, ``reset`` sets ``agents`` to the fleet of the episode. In the step in
+    which a UAV ends, its ``terminated`` is true (quota filled or battery depleted) or its
+    ``truncated`` is true (``max_slots`` reached), and the UAV is removed from ``agents``.
 
-    ``info`` holds, per agent: ``reward_terms`` (their sum is the reward), ``collected`` and
-    ``team_collected`` (data units of the slot), ``end`` (``active``, ``quota``, ``battery`` or
-    ``truncated``) and ``overruled``.
+    With ``ended="stay"``, ``agents`` are all possible agents until the mission is over; then all of
+    them are terminated or truncated at once, each as it has ended. A UAV that has ended before, or
+    that a smaller fleet does not have, observes zeros, has reward 0 and may only hover; whatever
+    action it is given is ignored.
+
+    ``info`` holds numbers and arrays, per agent: ``active``, whether the UAV acts next;
+    ``reward_terms`` (6,), named by ``stepper.REWARD_TERMS``, of which the reward is the sum;
+    ``collected`` and ``team_collected`` (data units of the slot); ``end``, an index of
+    ``state.END_NAMES``; ``overruled``; and with ``mask="info"`` the ``action_mask`` (5,).
     """
 
     metadata: dict[str, Any] = {
         "name": "dess_harvest_v0",
-        "render_modes": ["rgb_array"],
+        "render_modes": list(_MODES),
         "render_fps": 4,
+        "is_parallelizable": True,
     }
 
-    def __init__(self, scenario: Scenario | ScenarioSpace, seed: int, render_mode: str | None):
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"render_mode: {render_mode!r} is unknown; allowed: None, 'rgb_array'")
+    def __init__(
+        self,
+        scenario: Scenario | ScenarioSpace,
+        seed: int,
+        render_mode: str | None,
+        observation: str,
+        mask: str,
+        ended: str,
+        guarded: bool,
+    ):
+        if render_mode is not None:
+            _check("render_mode", render_mode, _MODES)
+        _check("mask", mask, _MASKS)
+        _check("ended", ended, _ENDED)
         self.render_mode = render_mode
+        self._mask_in_info, self._stay = mask == "info", ended == "stay"
         self._stepper = MissionStepper(scenario, 1, seed)
+        self._observer = Observer(self._stepper.space, observation, guarded)
+        self._components = Components(self._stepper.space)
+        self._window = Window() if render_mode == "human" else None
         fleet = self._stepper.space.uavs[1]
-        self._components = len(observation_names(scenario))
         self.agents: list[str] = []
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
-        self.observation_spaces = {a: observation_space(scenario) for a in self.possible_agents}
+        space = self._observer.space
+        if not self._mask_in_info:
+            allowed = spaces.MultiBinary(len(ACTION_NAMES))
+            space = spaces.Dict({"observation": space, "action_mask": allowed})
+        self.observation_spaces = {agent: deepcopy(space) for agent in self.possible_agents}
         self.action_spaces = {a: spaces.Discrete(len(ACTION_NAMES)) for a in self.possible_agents}
-        low, high = (np.tile(bound, fleet) for bound in observation_bounds(scenario))
+        low, high = (np.tile(bound, fleet) for bound in component_bounds(scenario))
         self.state_space = spaces.Box(low, high, dtype=np.float32)
 
     def observation_space(self, agent: str) -> spaces.Space:
@@ -91,7 +130,7 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start the next episode.
 
         Args:
@@ -101,12 +140,10 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         Raises:
             InputError: If the seed or the replication is out of range.
         """
-        stepper, replication = self._stepper, (options or {}).get("replication")
-        if seed is not None or replication is not None:
-            stepper.start_at(stepper.seed if seed is None else seed, replication or 0)
-        stepper.launch(stepper.indices)
-        self.agents = self.possible_agents[: stepper.state.missions["uavs"][0]]
-        return self._observations(), {agent: {} for agent in self.agents}
+        self._stepper.start(seed, options)
+        active = self._stepper.state.uavs["active"]
+        self.agents = [agent for agent, flies in self._each(active[0]) if flies or self._stay]
+        return self._seen(empty_outcome(active.shape), active)
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
         """Run one mission slot.
@@ -120,26 +157,41 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         Raises:
             InputError: If no episode is in progress, or the actions are not those of ``agents``.
         """
-        acting = self.agents
+        uavs = self._stepper.state.uavs[0]
+        acting = [agent for agent, flies in self._each(uavs["active"]) if flies]
         if not acting:
             raise InputError("step: no episode is in progress; call reset() first")
-        if set(actions) != set(acting):
+        if not set(acting) <= set(actions) <= set(self.agents):
             raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {acting}")
-        index = {agent: self.possible_agents.index(agent) for agent in acting}
-        row = np.full((1, len(self.possible_agents)), HOVER)
-        row[0, list(index.values())] = checked_actions([actions[a] for a in acting], (len(acting),))
-        out = self._stepper.step(row)
-        observations = self._observations()
-        rewards = {a: float(out.reward[0, i]) for a, i in index.items()}
-        terminated = {a: bool(out.terminated[0, i]) for a, i in index.items()}
-        truncated = {a: bool(out.truncated[0, i]) for a, i in index.items()}
-        self.agents = [a for a in acting if not (terminated[a] or truncated[a])]
-        infos = {a: _info(out, i) for a, i in index.items()}
-        return observations, rewards, terminated, truncated, infos
+        index = [self.possible_agents.index(agent) for agent in acting]
+        row = np.full((1, len(uavs)), HOVER)
+        row[0, index] = checked_actions([actions[agent] for agent in acting], (len(acting),))
+        outcome = self._stepper.step(row)
+        observations, infos = self._seen(outcome, outcome.acted)
+        over = not uavs["active"].any()
+        ended = (outcome.terminated | outcome.truncated | over)[0] & (over or not self._stay)
+        truncated = ended & (outcome.end[0] == TRUNCATED)
+        rewards = self._of_agents(outcome.reward[0].tolist())
+        terminated = self._of_agents((ended & ~truncated).tolist())
+        given = observations, rewards, terminated, self._of_agents(truncated.tolist()), infos
+        self.agents = [agent for agent, left in self._each(ended) if not left and agent in rewards]
+        if self._window:
+            self.render()
+        return given
 
     def state(self) -> np.ndarray:
-        """The concatenated observations of all possible agents, for a centralised critic."""
-        return self._observe()["observation"].ravel()
+        """The state of all possible agents as one vector, for a centralised critic.
+
+        It has the components of ``dess.observations.components`` for one UAV after the other; those
+        of UAVs that a smaller fleet does not have are zeros.
+        """
+        fleet = self._stepper.state.missions["uavs"][0]
+        vector = np.zeros(self.state_space.shape, np.float32)
+        (rows,) = self._components.encode(
+            self._stepper.state, np.zeros(fleet, np.int64), np.arange(fleet)
+        )
+        vector[: rows.size] = rows.ravel()
+        return vector
 
     def record(self) -> MissionRecord:
         """The record of the episode up to the present slot."""
@@ -147,25 +199,63 @@ class HarvestEnv(ParallelEnv[str, Observation, int]):
         return MissionRecord(records.missions[0], records.uavs[0, : records.missions["uavs"][0]])
 
     def render(self) -> np.ndarray | None:
-        """A picture (H, W, 3) of uint8; None without a ``render_mode``."""
-        return draw(self._stepper.space, self._stepper.state) if self.render_mode else None
+        """A picture (H, W, 3) of uint8, or None if it is shown in a window or not asked for."""
+        if self.render_mode is None:
+            return None
+        picture = draw(self._stepper.space, self._stepper.state)
+        if self._window:
+            self._window.show(picture, 1 / self.metadata["render_fps"])
+            return None
+        return picture
 
-    def _observe(self) -> Observation:
-        return observe(self._stepper.state, self._stepper.indices, self._components)
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window:
+            self._window.close()
 
-    def _observations(self) -> dict[str, Observation]:
-        """The observations of the agents that act or acted in this step."""
-        arrays = self._observe()
-        rows = [self.possible_agents.index(agent) for agent in self.agents]
-        return {self.possible_agents[i]: {key: arrays[key][0, i] for key in arrays} for i in rows}
+    def _each(self, values: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+        """All possible agents, each with its value."""
+        return zip(self.possible_agents, values, strict=True)
+
+    def _of_agents(self, values: Iterable[Any]) -> dict[str, Any]:
+        """The values of those who are agents in this step."""
+        return {agent: value for agent, value in self._each(values) if agent in self.agents}
+
+    def _seen(self, outcome: Outcome, shown: np.ndarray) -> tuple[dict[str, Any], dict[str, Any]]:
+        """The observations and infos of the agents, after a slot."""
+        state = self._stepper.state
+        rows, masks = self._observer.observe_all(state, shown)
+        masks = masks.view(np.int8)
+        observed = iterate(batch_space(self._observer.space, len(masks)), rows)
+        if not self._mask_in_info:
+            observed = (
+                {"observation": own, "action_mask": mask}
+                for own, mask in zip(observed, masks, strict=True)
+            )
+        infos = self._of_agents(_infos(outcome, state.uavs["active"][0]))
+        if self._mask_in_info:
+            for agent, mask in self._of_agents(masks).items():
+                infos[agent]["action_mask"] = mask
+        return self._of_agents(observed), infos
 
 
-def _info(out: Outcome, i: int) -> dict[str, Any]:
-    """The outcome of a step for UAV ``i`` of a single mission, as plain values."""
-    return {
-        "reward_terms": dict(zip(REWARD_TERMS, out.reward_terms[0, i].tolist(), strict=True)),
-        "collected": float(out.collected[0, i]),
-        "team_collected": float(out.team_collected[0]),
-        "end": END_NAMES[out.end[0, i]],
-        "overruled": bool(out.overruled[0, i]),
-    }
+def _check(name: str, value: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise InputError(f"{name}: {quoted(value)} is unknown{one_of(value, allowed)}")
+
+
+def _infos(outcome: Outcome, active: np.ndarray) -> Iterator[dict[str, Any]]:
+    """What ``info`` says of each UAV of a single mission, but for the mask."""
+    team_collected = float(outcome.team_collected[0])
+    of_uavs = active, outcome.collected[0], outcome.end[0], outcome.overruled[0]
+    lists = (part.tolist() for part in of_uavs)
+    rows = zip(outcome.reward_terms[0], *lists, strict=True)
+    for terms, flies, collected, end, overruled in rows:
+        yield {
+            "active": flies,
+            "reward_terms": terms,
+            "collected": collected,
+            "team_collected": team_collected,
+            "end": end,
+            "overruled": overruled,
+        }

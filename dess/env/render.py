@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from dess.code.libraries import needs
 from dess.scenario import ScenarioSpace
 from dess.state import State
 
@@ -42,6 +43,35 @@ def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray
             _square(image, u["x"], u["y"], 1, _CHARGING if u["charging"] else _IDLE)
             _square(image, u["x"], u["y"], 3, _FLEET[i % len(_FLEET)])
     return image
+
+
+class Window:
+    """Shows pictures in a window of matplotlib, one after the other."""
+
+    def __init__(self) -> None:
+        """Open the window.
+
+        Raises:
+            MissingLibraryError: If matplotlib is not installed.
+        """
+        needs("reports", "render_mode 'human'")
+        from matplotlib import pyplot
+
+        self._pyplot = pyplot
+        self._figure, self._axes = pyplot.subplots()
+        self._axes.axis("off")
+
+    def show(self, picture: np.ndarray, seconds: float) -> None:
+        """Show a picture for this time [s] at least."""
+        for image in self._axes.images:
+            image.remove()
+        self._axes.imshow(picture)
+        if self._pyplot.get_backend() != "agg":  # which matplotlib takes where there is no screen
+            self._pyplot.pause(seconds)
+
+    def close(self) -> None:
+        """Close the window."""
+        self._pyplot.close(self._figure)
 
 
 def _square(image: np.ndarray, x: int, y: int, margin: int, colour: Any) -> None:

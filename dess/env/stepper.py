@@ -56,6 +56,21 @@ class Outcome(NamedTuple):
     team_collected: np.ndarray
 
 
+def empty_outcome(shape: tuple[int, ...]) -> Outcome:
+    """The outcome of a slot in which nothing happens, for (N, I) UAVs."""
+    return Outcome(
+        acted=np.zeros(shape, np.bool_),
+        reward=np.zeros(shape),
+        reward_terms=np.zeros((*shape, len(REWARD_TERMS))),
+        end=np.zeros(shape, np.int64),
+        terminated=np.zeros(shape, np.bool_),
+        truncated=np.zeros(shape, np.bool_),
+        overruled=np.zeros(shape, np.bool_),
+        collected=np.zeros(shape),
+        team_collected=np.zeros(shape[0]),
+    )
+
+
 class MissionStepper:
     """N missions of one scenario in progress.
 
@@ -94,6 +109,21 @@ class MissionStepper:
         check_seed(seed, replication)
         self._constants["seed"], self._next = seed, replication
 
+    def start(self, seed: int | None, options: dict[str, Any] | None) -> None:
+        """Launch a mission in every environment, as ``reset`` of an environment is asked to.
+
+        Args:
+            seed: Start at replication 0 of this seed. If None, the numbering continues.
+            options: ``{"replication": r}`` starts at replication r; other keys are ignored.
+
+        Raises:
+            InputError: If the seed or the replication is out of range.
+        """
+        replication = (options or {}).get("replication")
+        if seed is not None or replication is not None:
+            self.start_at(self.seed if seed is None else seed, replication or 0)
+        self.launch(self.indices)
+
     def launch(self, environments: np.ndarray) -> None:
         """Start the next replications in these environments, in this order."""
         check_seed(self.seed, self._next + len(environments) - 1)
@@ -106,27 +136,14 @@ class MissionStepper:
         Args:
             actions: (N, I) integers 0..4, ignored where no UAV acts.
         """
-        shape = self.state.uavs.shape
-        outcome = Outcome(
-            acted=np.empty(shape, np.bool_),
-            reward=np.empty(shape),
-            reward_terms=np.empty((*shape, len(REWARD_TERMS))),
-            end=np.empty(shape, np.int64),
-            terminated=np.empty(shape, np.bool_),
-            truncated=np.empty(shape, np.bool_),
-            overruled=np.empty(shape, np.bool_),
-            collected=np.empty(shape),
-            team_collected=np.empty(len(actions)),
-        )
+        outcome = empty_outcome(self.state.uavs.shape)
         _step(self.state, self.world, self._scratch, actions, outcome)
         return outcome
 
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
         records = empty_records(len(environments), self.state.uavs.shape[1])
-        for row, b in enumerate(environments):
-            mission, uavs, residual = (part[b] for part in self.state)
-            write_record(mission, uavs, residual, records.missions[row], records.uavs[row])
+        _record(environments, self.state, records)
         return records
 
 
@@ -139,6 +156,17 @@ def _launch(environments, first, constants, ranges, state):
         mission = state.missions[b]
         mission.replication = first + n
         rules.launch(mission, ranges, state.uavs[b], state.residual[b])
+
+
+@kernel
+def _record(environments, state, records):
+    """Write the records of the missions in these environments."""
+    for row in range(len(environments)):
+        b = environments[row]
+        write_record(
+            state.missions[b], state.uavs[b], state.residual[b],
+            records.missions[row], records.uavs[row],
+        )  # fmt: skip
 
 
 @kernel

@@ -18,6 +18,7 @@ from safetensors.torch import load, save
 
 from dess.errors import InputError
 from dess.files import read_bytes, replacing
+from dess.observations.observer import ENCODERS
 from dess.observations.states import layout_of
 from dess.scenario import ScenarioSpace
 from policies.ddqn import tensors
@@ -32,7 +33,7 @@ from policies.ddqn.description import (
     read_description,
 )
 from policies.ddqn.policy import DDQN
-from policies.ddqn.training import OBSERVATIONS, build
+from policies.ddqn.training import build
 
 # The largest file of weights that is read [bytes]; the largest network of a config is half of it.
 MODEL_LIMIT = 2**30
@@ -65,7 +66,7 @@ def save_policy(
     description = Description(
         format=FORMAT,
         name=config.name,
-        observation_version=OBSERVATIONS[config.observation].version,
+        observation_version=ENCODERS[config.observation].version,
         layout=LayoutTable(
             grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()
         ),

@@ -16,8 +16,8 @@ from dess.batch import simulate_batch
 from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
 from dess.errors import InputError
-from dess.observations.maps import POOL, Maps
-from dess.observations.nodes import Nodes
+from dess.observations.maps import POOL
+from dess.observations.observer import ENCODERS
 from dess.observations.states import (
     ACTIVE,
     BATTERY,
@@ -33,7 +33,6 @@ from dess.observations.states import (
     layout_of,
     masks,
 )
-from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
@@ -44,7 +43,6 @@ from policies.ddqn.replay import ReplayMemory
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
-OBSERVATIONS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 SELECT_BY = "collection_ratio_and_communication"
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
@@ -67,7 +65,7 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
         raise InputError(
             f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, nodes"
         )
-    observation = OBSERVATIONS[config.observation](layout)
+    observation = ENCODERS[config.observation](layout)
     if config.observation == "maps":
         return observation, PaperNetwork(observation.shapes, precision)
     if config.observation == "nodes":

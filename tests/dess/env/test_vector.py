@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from dess.env.batch import BatchEnv
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 
 import dess
 from dess import InputError, ScenarioSpace
-from dess.env.batch import BatchEnv
 from dess.state import HOVER
 from tests.dess.env.episodes import PAPER, small
 from tests.drawn import Commuter

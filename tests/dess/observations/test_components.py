@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from dess.env.observation import observation_names
 from hypothesis import given
 
 import dess
 from dess import ScenarioSpace
-from dess.env.observation import observation_names
 from dess.state import HOVER, STEP_X, STEP_Y
 from tests.dess.env.episodes import play, small
 from tests.drawn import seeds, spaces

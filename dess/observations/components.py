@@ -1,14 +1,10 @@
-"""The observation of a UAV for learners: a float32 vector and the mask of legal actions."""
+"""The state of a UAV, its mission and its teammates as a vector of named components."""
 
 import numpy as np
-from gymnasium import spaces
 
 from dess.code.kernels import kernel
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import ACTION_NAMES, HOVER, State, spaces_of
-from dess.view import legal_actions
-
-Observation = dict[str, np.ndarray]
+from dess.state import State, spaces_of
 
 # The UAV's own state, the scenario's parameters and the time. The residual data of the nodes
 # follow, then the teammates in the order of their indices.
@@ -30,7 +26,7 @@ _OWN = (
 _MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 after the teammate has ended
 
 
-def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
+def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
     Positions and distances are divided by the largest cell index of the grid, battery, C_S and C_C
@@ -44,9 +40,9 @@ def observation_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     return [*_OWN, *nodes, *mates]
 
 
-def observation_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
+def component_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
     """The lowest and the highest values (F,) of an observation."""
-    names = observation_names(scenario)
+    names = component_names(scenario)
     low, high = np.zeros(len(names), np.float32), np.ones(len(names), np.float32)
     for index, name in enumerate(names):
         if name.endswith(("dx", "dy")):
@@ -56,48 +52,37 @@ def observation_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, 
     return low, high
 
 
-def observation_space(scenario: Scenario | ScenarioSpace) -> spaces.Dict:
-    """The space of one UAV's ``observation`` (F,) and ``action_mask`` (5,)."""
-    vector = spaces.Box(*observation_bounds(scenario), dtype=np.float32)
-    mask = spaces.MultiBinary(len(ACTION_NAMES))
-    return spaces.Dict({"observation": vector, "action_mask": mask})
+class Components:
+    """Encodes the state of a UAV, its mission and its teammates as a vector of named components.
 
+    Unlike the other encoders, this one has no features made for learning; it fits every scenario.
 
-def observe(state: State, environments: np.ndarray, components: int) -> dict[str, np.ndarray]:
-    """The observations of some missions of a state; each mission keeps its row number.
-
-    Args:
-        state: The state of N missions with up to I UAVs.
-        environments: The missions to observe; the rows of the others are zeros.
-        components: Length of an observation (F).
-
-    Returns:
-        ``observation`` (N, I, F) of float32 and ``action_mask`` (N, I, 5) of int8; only Hover is
-        set for a UAV that does not act.
+    Attributes:
+        shapes: The shape of its array per row: (F,).
     """
-    vector = np.zeros((*state.uavs.shape, components), np.float32)
-    mask = np.zeros((*state.uavs.shape, len(ACTION_NAMES)), np.int8)
-    _observe(state, environments, vector, mask)
-    return {"observation": vector, "action_mask": mask}
+
+    def __init__(self, space: ScenarioSpace):
+        self.shapes = ((len(component_names(space)),),)
+
+    def encode(
+        self, state: State, missions: np.ndarray, uavs: np.ndarray
+    ) -> tuple[np.ndarray, ...]:
+        """The observations of UAV ``uavs[r]`` in mission ``missions[r]``: (R, F) float32."""
+        out = np.zeros((len(missions), *self.shapes[0]), np.float32)
+        _encode(state, missions, uavs, out)
+        return (out,)
 
 
 @kernel
-def _observe(state, environments, vector, mask):
-    fleet = state.uavs.shape[1]
-    for b in environments:
-        mission, uavs = state.missions[b], state.uavs[b]
-        legal = legal_actions(state.missions, state.uavs, np.full(fleet, b), np.arange(fleet))
-        for i in range(fleet):
-            mask[b, i, HOVER] = 1
-            if i < mission.uavs:
-                if uavs[i].active:
-                    mask[b, i] = legal[i]
-                _observe_uav(mission, uavs, i, state.residual[b], vector[b, i])
+def _encode(state, missions, uavs, out):
+    for row in range(len(missions)):
+        b = missions[row]
+        _encode_uav(state.missions[b], state.uavs[b], uavs[row], state.residual[b], out[row])
 
 
 @kernel
-def _observe_uav(mission, uavs, i, residual, out):
-    """One UAV's observation, in the order of ``observation_names``."""
+def _encode_uav(mission, uavs, i, residual, out):
+    """One UAV's observation, in the order of ``component_names``."""
     u = uavs[i]
     cell = 1.0 / (mission.grid - 1)
     out[0] = u.active

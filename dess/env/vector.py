@@ -1,0 +1,208 @@
+"""``vector_env``: many missions in lockstep as a Gymnasium ``VectorEnv`` with a row per UAV.
+
+env = vector_env(load_scenario("paper"), num_envs=256, seed=1)
+observations, info = env.reset()
+observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) actions
+"""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space, iterate
+
+from dess.env.stepper import MissionStepper, Outcome, checked_actions
+from dess.errors import InputError
+from dess.observations.observer import Observation, Observer
+from dess.record import Records
+from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.state import ACTION_NAMES, TRUNCATED, State
+from dess.view import View, acting_rows
+
+
+def vector_env(
+    scenario: Scenario | ScenarioSpace,
+    num_envs: int,
+    seed: int = 0,
+    observation: str = "vector",
+    guarded: bool = False,
+) -> "HarvestVectorEnv":
+    """An environment of many missions that advance together, with a row for each UAV.
+
+    Args:
+        scenario: The scenario, or the space from which each mission draws its parameters.
+        num_envs: Number of missions in progress (N).
+        seed: Seed of the missions, until ``reset`` is called with another seed.
+        observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
+            ``state``, the components of ``dess.observations.components.component_names``.
+        guarded: Whether the masks leave out what the return guard does not allow, as for the
+            shipped learner.
+
+    Raises:
+        InputError: If the seed, the number of missions or the observation is not allowed.
+    """
+    return HarvestVectorEnv(scenario, num_envs, seed, observation, guarded)
+
+
+def make_vec(num_envs: int, scenario: str | Scenario | ScenarioSpace, **options: Any) -> VectorEnv:
+    """``vector_env`` with the name of a scenario: what ``gymnasium.make_vec`` calls."""
+    space = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    return vector_env(space, num_envs, **options)
+
+
+class HarvestVectorEnv(VectorEnv):
+    """N missions in lockstep; each row is a UAV, so that one policy is shared by all UAVs.
+
+    There are R = N x I rows, first the UAVs of mission 0; I is the largest fleet of the scenario.
+    ``num_envs`` is R. The rows of UAVs that have ended, or that a smaller fleet does not have, are
+    zeros with a mask of Hover alone, and their actions are ignored.
+
+    The episode of a row is its mission: ``terminated`` (quota filled or battery depleted) or
+    ``truncated`` (``max_slots`` reached) of all its UAVs come in the last slot of the mission. The
+    next mission starts in the same step (``metadata["autoreset_mode"]``), and its first
+    observations are returned. The last ones are in ``info["final_obs"]``.
+
+    ``info`` has an array with R rows for each of: ``action_mask`` (R, 5) and ``active``, for the
+    next step; ``replication`` of the mission in progress; and, after a step, the arrays of
+    ``stepper.Outcome``, where ``acted`` tells which rows are transitions of a UAV. When missions
+    have ended, it has ``final_obs`` and ``final_info`` too, with ``_final_obs`` and
+    ``_final_info``, which tell their rows: the record of the mission (``record.MISSION_RECORD``),
+    and that of the UAV (``record.UAV_RECORD``) under ``uav``.
+
+    Missions are numbered in the order in which they start: replications 0 to N - 1 at the first
+    reset, then one after the other, in a lower environment first. So a seed gives the sequence of
+    missions 0, 1, 2, ... for every N, and a mission depends only on its number and on the actions
+    of its UAVs.
+
+    Attributes:
+        missions: Number of missions in progress (N).
+        num_envs: Number of rows (R).
+        state: The arrays of the missions in progress; they must not be changed.
+        world: The nodes and the tables of the channel.
+    """
+
+    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(
+        self,
+        scenario: Scenario | ScenarioSpace,
+        num_envs: int,
+        seed: int,
+        observation: str,
+        guarded: bool,
+    ):
+        if not isinstance(num_envs, int) or num_envs < 1:
+            raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
+        self.missions = num_envs
+        self._stepper = MissionStepper(scenario, num_envs, seed)
+        self._observer = Observer(self._stepper.space, observation, guarded)
+        self.state, self.world = self._stepper.state, self._stepper.world
+        self.num_envs = self.state.uavs.size
+        self.single_observation_space = self._observer.space
+        self.single_action_space = spaces.Discrete(len(ACTION_NAMES))
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._mask = np.zeros((self.num_envs, len(ACTION_NAMES)), np.bool_)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start a new mission in every environment.
+
+        Args:
+            seed: Start at replication 0 of this seed. If None, the numbering continues.
+            options: ``{"replication": r}`` starts at replication r; other keys are ignored.
+
+        Raises:
+            InputError: If the seed or the replication is out of range.
+        """
+        self._stepper.start(seed, options)
+        observations = self._observe(self.state.uavs["active"])
+        return observations, self._present()
+
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Run one mission slot of every mission.
+
+        Args:
+            actions: (R,) integers 0..4.
+
+        Returns:
+            Observations, rewards, terminated, truncated, each with R rows, and info.
+
+        Raises:
+            InputError: If ``reset`` was not called first, or the actions are not allowed.
+        """
+        state, fleet = self.state, self.state.uavs.shape[1]
+        if not state.missions["active"].all():
+            raise InputError("step: no mission is in progress; call reset() first")
+        checked = checked_actions(actions, (self.num_envs,))
+        outcome = self._stepper.step(checked.reshape(state.uavs.shape))
+        over = np.repeat(state.missions["active"] == 0, fleet)
+        truncated = over & (outcome.end.ravel() == TRUNCATED)
+        info = self._outcome(outcome)
+        shown = outcome.acted.copy()
+        if over.any():
+            info |= self._final(over, shown)
+            shown[over[::fleet]] = state.uavs["active"][over[::fleet]]
+        observations = self._observe(shown)
+        rewards = outcome.reward.ravel()
+        return observations, rewards, over & ~truncated, truncated, info | self._present()
+
+    def action_masks(self) -> np.ndarray:
+        """The (R, 5) mask of the actions that are allowed in the next step."""
+        return self._mask
+
+    def view(self) -> View:
+        """The view that a policy's ``act`` takes, with a row per UAV that must act."""
+        return View(
+            self.state, self.world, *acting_rows(self.state.missions, self.state.uavs, 1, 0)
+        )
+
+    def _observe(self, shown: np.ndarray) -> Observation:
+        observations, self._mask = self._observer.observe_all(self.state, shown)
+        return observations
+
+    def _outcome(self, outcome: Outcome) -> dict[str, Any]:
+        """The outcome of a slot, by row."""
+        info = outcome._asdict()
+        info["team_collected"] = np.repeat(outcome.team_collected, self.state.uavs.shape[1])
+        for name in ("reward", "terminated", "truncated"):
+            del info[name]
+        return {name: part.reshape(self.num_envs, *part.shape[2:]) for name, part in info.items()}
+
+    def _final(self, over: np.ndarray, shown: np.ndarray) -> dict[str, Any]:
+        """The last observations and the records of the missions that are over; starts the next."""
+        done = np.flatnonzero(over[:: self.state.uavs.shape[1]])
+        ended = State(*(part[done] for part in self.state))
+        last, _ = self._observer.observe_all(ended, shown[done])
+        space = batch_space(self.single_observation_space, int(over.sum()))
+        observations = np.empty(self.num_envs, object)
+        observations[over] = np.fromiter(iterate(space, last), object, int(over.sum()))
+        records = self._by_row(over, self._stepper.records(done))
+        self._stepper.launch(done)
+        return {
+            "final_obs": observations,
+            "_final_obs": over,
+            "final_info": records,
+            "_final_info": over,
+        }
+
+    def _by_row(self, over: np.ndarray, records: Records) -> dict[str, Any]:
+        """The records of the missions that are over as arrays, with zeros in the other rows."""
+        missions = np.zeros(self.num_envs, records.missions.dtype)
+        uavs = np.zeros(self.num_envs, records.uavs.dtype)
+        missions[over] = np.repeat(records.missions, records.uavs.shape[1])
+        uavs[over] = records.uavs.ravel()
+        of_uav = {name: uavs[name] for name in uavs.dtype.names or ()}
+        return {name: missions[name] for name in missions.dtype.names or ()} | {"uav": of_uav}
+
+    def _present(self) -> dict[str, Any]:
+        fleet = self.state.uavs.shape[1]
+        return {
+            "action_mask": self._mask,
+            "active": self.state.uavs["active"].ravel(),
+            "replication": np.repeat(self.state.missions["replication"], fleet),
+        }

@@ -1,0 +1,112 @@
+"""What UAVs observe and may do: one of the kinds of observations, with the mask of actions.
+
+observer = Observer(space, "vector", guarded=False)
+observations, masks = observer.observe(state, missions, uavs)    # (R, F) and (R, 5)
+"""
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from dess.errors import InputError, one_of, shown
+from dess.observations.components import Components, component_bounds
+from dess.observations.maps import Maps
+from dess.observations.nodes import Nodes
+from dess.observations.states import compact_states, layout_of, masks
+from dess.observations.vector import Vector
+from dess.scenario import ScenarioSpace
+from dess.state import ACTION_NAMES, HOVER, State
+from dess.view import legal_actions
+
+# The encoders that learners use, by the kind of observation, and the names of their arrays.
+ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
+_PARTS = {"nodes": ("vector", "nodes"), "maps": ("local", "global", "battery")}
+KINDS = (*ENCODERS, "state")
+
+# One array, or one for each name.
+Observation = np.ndarray | dict[str, np.ndarray]
+
+
+class Observer:
+    """Encodes what UAVs observe, and the mask of their allowed actions.
+
+    Attributes:
+        kind: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
+            ``state``, the components that ``components.component_names`` lists.
+        guarded: Whether the masks are those of the return guard; if not, they have all legal
+            actions.
+        space: The space of one UAV's observation: a ``Box``, or a ``Dict`` of several.
+    """
+
+    def __init__(self, scenario: ScenarioSpace, kind: str, guarded: bool):
+        """Make an observer for the missions of a scenario.
+
+        Raises:
+            InputError: If there is no such kind.
+        """
+        if kind not in KINDS:
+            raise InputError(f"observation: {shown(kind)} is unknown{one_of(kind, KINDS)}")
+        self.kind, self.guarded = kind, guarded
+        if kind == "state":
+            self._encoder: Any = Components(scenario)
+            self.space: spaces.Space = spaces.Box(*component_bounds(scenario), dtype=np.float32)
+            return
+        self._encoder = ENCODERS[kind](layout_of(scenario))
+        boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]
+        names = _PARTS.get(kind)
+        self.space = spaces.Dict(dict(zip(names, boxes, strict=True))) if names else boxes[0]
+
+    def observe(
+        self, state: State, missions: np.ndarray, uavs: np.ndarray
+    ) -> tuple[Observation, np.ndarray]:
+        """The observations of UAV ``uavs[r]`` in mission ``missions[r]``, for every r.
+
+        Args:
+            state: The state of B missions.
+            missions: (R,) indices of the missions.
+            uavs: (R,) indices of the UAVs.
+
+        Returns:
+            The observations, arrays with R rows, and the (R, 5) masks of the allowed actions as
+            booleans. Only Hover is allowed for a UAV that charges or is not active.
+        """
+        if self.kind == "state":
+            parts = self._encoder.encode(state, missions, uavs)
+        if self.kind != "state" or self.guarded:
+            states = compact_states(state, self.guarded)
+            allowed = masks(states, missions, uavs)
+            if self.kind != "state":
+                parts = self._encoder.encode(states, missions, uavs)
+        else:
+            allowed = legal_actions(state.missions, state.uavs, missions, uavs)
+        names = _PARTS.get(self.kind)
+        return (dict(zip(names, parts, strict=True)) if names else parts[0]), allowed
+
+    def observe_all(self, state: State, shown: np.ndarray) -> tuple[Observation, np.ndarray]:
+        """The observations and masks of all B x I UAVs, row by row of ``shown``.
+
+        Args:
+            state: The state of B missions with up to I UAVs.
+            shown: (B, I) the UAVs that observe something; the rows of the others are zeros.
+
+        Returns:
+            As ``observe``, with B x I rows.
+        """
+        rows = np.flatnonzero(shown)
+        some, allowed = self.observe(state, *np.divmod(rows, shown.shape[1]))
+        mask = np.zeros((shown.size, len(ACTION_NAMES)), np.bool_)
+        mask[:, HOVER] = True
+        mask[rows] = np.where(state.uavs["active"].reshape(-1, 1)[rows], allowed, mask[rows])
+        if isinstance(some, dict):
+            return {name: _spread(part, rows, shown.size) for name, part in some.items()}, mask
+        return _spread(some, rows, shown.size), mask
+
+
+def _spread(part: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
+    """The array with ``count`` rows that has these rows and zeros elsewhere."""
+    if len(rows) == count:
+        return part
+    out = np.zeros((count, *part.shape[1:]), part.dtype)
+    out[rows] = part
+    return out
