@@ -1,0 +1,88 @@
+"""The policy of another library as a policy of ``dess``.
+
+class Mine(Adapter):   # in my_policies.py, for dess evaluate --policy my_policies.py:Mine
+    def __init__(self):
+        super().__init__("mine", load_network(FILE), guarded=True, weights=FILE)
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dess.env.stepper import checked_actions
+from dess.observations.observer import Observer
+from dess.scenario import ScenarioSpace
+from dess.view import View
+
+_ZONE = ("zone_x", "zone_y", "zone_width", "zone_height")
+
+
+class Adapter:
+    """A policy that observes what UAVs observe in ``parallel_env`` and ``vector_env``.
+
+    An action that the mask leaves out is carried out as in the environments: if it leads off the
+    grid, the safety controller overrules it.
+
+    Attributes:
+        name: The name under which results are stored.
+        observation: The kind of observation.
+        guarded: Whether the masks are those of the return guard.
+        weights: The checksum of the file of weights, stored with results; empty if there is none.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        act: Callable[[Any, np.ndarray], Any],
+        observation: str = "vector",
+        guarded: bool = False,
+        weights: str | Path | None = None,
+    ):
+        """Make a policy of a function.
+
+        Args:
+            name: The name under which results are stored.
+            act: Chooses the (R,) actions for the observations of R UAVs, with R rows, and their
+                masks (R, 5) of booleans, for any R. The same row must always give the same action.
+            observation: ``vector``, ``nodes``, ``maps`` or ``state``, as in the training.
+            guarded: Whether the masks leave out what the return guard does not allow.
+            weights: The file with the weights of ``act``, so that a study notices if they change.
+
+        Raises:
+            OSError: If the file of weights cannot be read.
+        """
+        self.name, self.observation, self.guarded = name, observation, guarded
+        self._choose = act
+        self.weights = sha256(Path(weights).read_bytes()).hexdigest() if weights else ""
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose the (R,) actions for the rows of the view.
+
+        Raises:
+            InputError: If there is no such observation, or the function returns no actions.
+        """
+        actions = np.empty(len(view), np.int64)
+        zones, zone_of = np.unique(view.constants[[*_ZONE]], return_inverse=True)
+        for number, zone in enumerate(zones.tolist()):
+            rows = np.flatnonzero(zone_of == number)
+            seen = self._observer(view, zone).observe(
+                view.state, view.mission[rows], view.uav[rows]
+            )
+            actions[rows] = checked_actions(self._choose(*seen), rows.shape)
+        return actions
+
+    def _observer(self, view: View, zone: tuple[int, ...]) -> Observer:
+        """The observer for the missions of the view with this zone."""
+        fleet, grid = view.state.uavs.shape[1], int(view.constants["grid"][0])
+        nodes = tuple(map(tuple, view.world.nodes.tolist()))
+        return _observer(self.observation, self.guarded, fleet, grid, zone, nodes)
+
+
+@lru_cache
+def _observer(kind: str, guarded: bool, uavs: int, grid: int, zone: Any, nodes: Any) -> Observer:
+    space = ScenarioSpace.of(uavs=uavs, grid=grid, zone=zone, nodes=nodes)
+    return Observer(space, kind, guarded)
