@@ -143,6 +143,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         self._stepper.start(seed, options)
         active = self._stepper.state.uavs["active"]
         self.agents = [agent for agent, flies in self._each(active[0]) if flies or self._stay]
+        if self._window:
+            self.render()
         return self._seen(empty_outcome(active.shape), active)
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:

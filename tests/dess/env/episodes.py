@@ -28,16 +28,31 @@ def small(**values: Any) -> Scenario:
     return Scenario.of(**(SMALL | values))
 
 
+def masks_of(observations: dict[str, Any], infos: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The mask of each agent, from the info or else from the observation."""
+    return {
+        agent: info["action_mask"] if "action_mask" in info else observations[agent]["action_mask"]
+        for agent, info in infos.items()
+    }
+
+
 def play(env: HarvestEnv, actions_seed: int, **reset: Any) -> list[tuple]:
-    """An episode of random legal actions: all that the environment returned."""
+    """An episode of random legal actions: all that the environment returned.
+
+    A UAV that flies receives the same actions whether the others have left or stay.
+    """
     generator = np.random.default_rng(actions_seed)
     observations, infos = env.reset(**reset)
     story: list[tuple] = [(observations, infos)]
     while env.agents:
-        actions = {
-            agent: generator.choice(np.nonzero(observations[agent]["action_mask"])[0])
-            for agent in env.agents
-        }
-        observations, *rest = env.step(actions)
-        story.append((observations, *rest))
+        draws = dict(
+            zip(env.possible_agents, generator.random(len(env.possible_agents)), strict=True)
+        )
+        masks = masks_of(observations, infos)
+        actions = {}
+        for agent in env.agents:
+            allowed = np.flatnonzero(masks[agent])
+            actions[agent] = int(allowed[int(draws[agent] * len(allowed))])
+        observations, *rest, infos = env.step(actions)
+        story.append((observations, *rest, infos))
     return story

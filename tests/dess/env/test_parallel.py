@@ -1,7 +1,6 @@
-"""The environment of one mission: PettingZoo's own tests, and parity with the SimPy engine."""
+"""The environment of one mission equals ``simulate``, and repeats its episodes."""
 
 import runpy
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -10,28 +9,18 @@ import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from hypothesis import given
 from hypothesis import strategies as st
-from pettingzoo.test import parallel_api_test, parallel_seed_test, seed_test
-from pettingzoo.utils import parallel_to_aec
 
 import dess
 from dess import InputError, ScenarioSpace
-from dess.state import END_NAMES, HOVER
-from tests.dess.env.episodes import PAPER, play, small
+from dess.env.stepper import REWARD_TERMS
+from dess.observations.observer import ENCODERS
+from dess.observations.states import compact_states, layout_of, masks
+from dess.state import END_NAMES, HOVER, spaces_of
+from tests.dess.env.episodes import PAPER, masks_of, play, small
 from tests.drawn import Commuter, Recorder, Wanderer, replications, seeds, spaces
 
-
-@pytest.mark.parametrize("scenario", [PAPER, dess.load_scenario("paper", uavs=3)])
-def test_it_passes_pettingzoos_api_test(scenario: ScenarioSpace) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        # The fleet of an episode can be smaller than the largest one.
-        warnings.filterwarnings("ignore", "No agents present but not all possible_agents")
-        parallel_api_test(dess.parallel_env(scenario), num_cycles=600)
-
-
-def test_it_passes_pettingzoos_seed_tests() -> None:
-    parallel_seed_test(lambda: dess.parallel_env(PAPER))
-    seed_test(lambda: parallel_to_aec(dess.parallel_env(PAPER)))  # plays a whole episode
+# The arrays of an observation, in the order of the inputs of the shipped learner's network.
+NAMES = {"nodes": ("vector", "nodes"), "maps": ("local", "global", "battery")}
 
 
 def test_a_seed_repeats_a_sequence_of_whole_episodes() -> None:
@@ -77,11 +66,12 @@ def test_the_same_actions_give_the_record_of_simulate(
         _, gained, terminated, truncated, infos = env.step(actions)
         for agent, info in infos.items():
             rewards[agent] += gained[agent]
-            assert gained[agent] == sum(info["reward_terms"].values())
+            assert gained[agent] == sum(info["reward_terms"].tolist())
             assert info["team_collected"] == next(iter(infos.values()))["team_collected"]
-            assert terminated[agent] == (info["end"] in ("quota", "battery"))
-            assert truncated[agent] == (info["end"] == "truncated")
-            ends[agent] = info["end"]
+            end = END_NAMES[info["end"]]
+            assert terminated[agent] == (end in ("quota", "battery"))
+            assert truncated[agent] == (end == "truncated")
+            ends[agent] = end
         own = sum(info["collected"] for info in infos.values())
         assert own == pytest.approx(info["team_collected"], abs=1e-9)
         team_collected += info["team_collected"]
@@ -93,8 +83,38 @@ def test_the_same_actions_give_the_record_of_simulate(
     assert team_collected == record.collected
 
 
+@pytest.mark.parametrize("ended", ["leave", "stay"])
+@pytest.mark.parametrize("guarded", [False, True])
+@pytest.mark.parametrize("kind", list(ENCODERS))
+def test_observations_and_masks_are_those_of_the_shipped_learner(
+    kind: str, guarded: bool, ended: str
+) -> None:
+    space = spaces_of([PAPER])[0]
+    encoder = ENCODERS[kind](layout_of(space))
+    env = dess.parallel_env(space, observation=kind, guarded=guarded, ended=ended)
+    mission = dess.vector_env(space, 1)  # shows the view of the same moment
+    mission.reset(seed=5)
+    observations, _ = env.reset(seed=5)
+    generator = np.random.default_rng(0)
+    for _ in range(60):
+        view = mission.view()
+        states = compact_states(view.state, guarded)
+        parts = encoder.encode(states, view.mission, view.uav)
+        allowed = masks(states, view.mission, view.uav)
+        actions = {agent: HOVER for agent in env.agents}
+        for row, i in enumerate(view.uav):
+            agent = env.possible_agents[i]
+            own = observations[agent]["observation"]
+            seen = [own[name] for name in NAMES[kind]] if kind in NAMES else [own]
+            assert all(np.array_equal(a, b[row]) for a, b in zip(seen, parts, strict=True))
+            assert np.array_equal(observations[agent]["action_mask"], allowed[row])
+            actions[agent] = int(generator.choice(np.flatnonzero(allowed[row])))
+        mission.step(np.array([actions.get(agent, HOVER) for agent in env.possible_agents]))
+        observations, *_ = env.step(actions)
+
+
 def test_a_lone_uav_is_overruled_when_its_action_is_masked_and_only_then() -> None:
-    env = dess.parallel_env(small())
+    env = dess.parallel_env(small(), observation="state")
     generator = np.random.default_rng(0)
     observations, _ = env.reset(seed=0)
     overruled = 0
@@ -108,15 +128,18 @@ def test_a_lone_uav_is_overruled_when_its_action_is_masked_and_only_then() -> No
     assert overruled > 0
 
 
-def test_the_state_is_the_observations_of_all_possible_agents() -> None:
-    env = dess.parallel_env(dess.load_scenario("paper", uavs=[2, 3]), seed=0)
+def test_the_state_is_the_components_of_all_possible_agents() -> None:
+    scenario = dess.load_scenario("paper", uavs=[2, 3])
+    env, maps = dess.parallel_env(scenario, observation="state"), dess.parallel_env(scenario)
     fleets = set()
     for _ in range(10):
         observations, _ = env.reset()
+        maps.reset()
         fleets.add(len(env.agents))
         rows = [observations[agent]["observation"] for agent in env.agents]
         absent = np.zeros((3 - len(rows), len(rows[0])), np.float32)
         assert np.array_equal(env.state(), np.concatenate([*rows, *absent]))
+        assert np.array_equal(env.state(), maps.state())  # whatever the agents observe
         assert env.state_space.contains(env.state())
     assert fleets == {2, 3}
 
@@ -131,8 +154,11 @@ def test_the_state_is_the_observations_of_all_possible_agents() -> None:
         ({"quota": 8, "max_slots": 2}, "quota", 2, 100.0),  # filled in the last slot
     ],
 )
-def test_terminated_is_not_truncated(values: dict, end: str, slots: int, term: float) -> None:
-    env = dess.parallel_env(small(**values))
+@pytest.mark.parametrize("ended", ["leave", "stay"])
+def test_terminated_is_not_truncated(
+    values: dict, end: str, slots: int, term: float, ended: str
+) -> None:
+    env = dess.parallel_env(small(**values), ended=ended)
     env.reset()
     # To the west, out of the zone, so that nobody charges.
     steps = []
@@ -140,12 +166,59 @@ def test_terminated_is_not_truncated(values: dict, end: str, slots: int, term: f
         steps.append(env.step({"uav_0": 3}))
     observations, _, terminated, truncated, infos = steps[-1]
     assert env.observation_space("uav_0").contains(observations["uav_0"])
-    assert (len(steps), infos["uav_0"]["end"]) == (slots, end)
+    assert (len(steps), END_NAMES[infos["uav_0"]["end"]]) == (slots, end)
     assert terminated["uav_0"] == (end != "truncated")
     assert truncated["uav_0"] == (end == "truncated")
-    terms = infos["uav_0"]["reward_terms"]
+    terms = dict(zip(REWARD_TERMS, infos["uav_0"]["reward_terms"], strict=True))
     assert terms["quota"] + terms["depleted"] == term
     assert all(not step[2]["uav_0"] and not step[3]["uav_0"] for step in steps[:-1])
+
+
+@given(spaces(), seeds, st.integers(0, 9))
+def test_who_stays_observes_zeros_and_changes_nothing(
+    space: ScenarioSpace, seed: int, whims: int
+) -> None:
+    """With ``ended="stay"`` the mission is the same, and only flying UAVs have something in it."""
+    leave = dess.parallel_env(space, seed, mask="info")
+    stay = dess.parallel_env(space, seed, mask="info", ended="stay")
+    (_, first), (_, other) = leave.reset(), stay.reset()
+    generator, rewards = np.random.default_rng(whims), dict.fromkeys(stay.possible_agents, 0.0)
+    flying = set(leave.agents)
+    masks, stayed = masks_of({}, first), masks_of({}, other)
+    while leave.agents:
+        assert stay.agents == stay.possible_agents
+        for agent in stay.agents:
+            if agent in flying:
+                assert np.array_equal(masks[agent], stayed[agent])
+            else:
+                assert np.flatnonzero(stayed[agent]).tolist() == [HOVER]
+        actions: dict[str, Any] = {agent: int(generator.integers(5)) for agent in leave.agents}
+        observations, gained, _, _, infos = leave.step(actions)
+        surplus = {
+            a: 7 for a in stay.possible_agents if a not in flying and generator.random() < 0.5
+        }
+        all_seen, all_gained, terminated, truncated, all_infos = stay.step(actions | surplus)
+        for agent in stay.possible_agents:
+            rewards[agent] += all_gained[agent]
+            assert all_infos[agent]["active"] == (agent in leave.agents)
+            if agent in flying:
+                assert data_equivalence(all_seen[agent], observations[agent], exact=True)
+                assert all_gained[agent] == gained[agent]
+                assert data_equivalence(all_infos[agent], infos[agent], exact=True)
+            else:
+                assert not all_seen[agent].any() and all_gained[agent] == 0.0
+                assert not all_infos[agent]["reward_terms"].any()
+            over = terminated[agent] or truncated[agent]
+            assert over == (not leave.agents)
+        masks, stayed, flying = masks_of({}, infos), masks_of({}, all_infos), set(leave.agents)
+    assert stay.agents == []
+    record = stay.record()
+    assert data_equivalence(record.metrics, leave.record().metrics, exact=True)
+    ends = [END_NAMES[info["end"]] for info in all_infos.values()]
+    fleet = len(record.uavs)
+    assert ends[:fleet] == [END_NAMES[end] for end in record.uavs["end"]]
+    assert [*truncated.values()][:fleet] == [end == "truncated" for end in ends[:fleet]]
+    assert [*rewards.values()] == [*record.uavs["reward"], *[0.0] * (len(rewards) - fleet)]
 
 
 def test_bad_input_is_refused_with_one_line() -> None:
@@ -159,8 +232,9 @@ def test_bad_input_is_refused_with_one_line() -> None:
     for action in (5, -1):
         with pytest.raises(InputError, match="allowed: 0..4"):
             env.step({"uav_0": action})
-    with pytest.raises(InputError, match="render_mode"):
-        dess.parallel_env(PAPER, render_mode="human")
+    for name in ("observation", "mask", "ended", "render_mode"):
+        with pytest.raises(InputError, match=f"{name}: 'x' is unknown"):
+            dess.parallel_env(PAPER, **{name: "x"})
     with pytest.raises(InputError, match="seed"):
         env.reset(seed=-1)
     with pytest.raises(InputError, match="replication"):

@@ -1,9 +1,33 @@
-"""The picture of a mission shows where its UAVs are."""
+"""The picture of a mission shows where its UAVs are, in an array or in a window."""
 
 import numpy as np
+import pytest
+from matplotlib import pyplot
+from pettingzoo.test import render_test
+from pettingzoo.utils import parallel_to_aec
 
 import dess
 from tests.dess.env.episodes import PAPER, small
+
+
+@pytest.fixture(autouse=True)
+def agg() -> None:
+    """No window is opened on the screen of who runs the tests."""
+    pyplot.switch_backend("agg")
+
+
+@pytest.fixture
+def screen(monkeypatch: pytest.MonkeyPatch) -> list[tuple[np.ndarray, float]]:
+    """A screen: the pictures that it has shown, each with the time that the program waited [s]."""
+    shown: list[tuple[np.ndarray, float]] = []
+
+    def pause(seconds: float) -> None:
+        (image,) = pyplot.gca().images
+        shown.append((np.asarray(image.get_array()), seconds))
+
+    monkeypatch.setattr(pyplot, "get_backend", lambda: "qtagg")
+    monkeypatch.setattr(pyplot, "pause", pause)
+    return shown
 
 
 def test_a_picture_shows_the_mission() -> None:
@@ -20,3 +44,38 @@ def test_a_picture_shows_the_mission() -> None:
     # The node that was served, and two neighbours: the UAV left one for the other.
     (west_x, west_y), (east_x, east_y) = sorted(cells - {(0, 0), (4, 4)})
     assert (east_x - west_x, east_y - west_y) == (1, 0)
+
+
+@pytest.mark.parametrize("ended", ["leave", "stay"])
+def test_pettingzoos_render_test_passes(ended: str) -> None:
+    render_test(
+        lambda render_mode: parallel_to_aec(dess.parallel_env(PAPER, 0, render_mode, ended=ended))
+    )
+    pyplot.close("all")  # the test leaves a window open
+
+
+def test_a_window_shows_the_reset_and_every_step(screen: list[tuple[np.ndarray, float]]) -> None:
+    env = dess.parallel_env(small(), render_mode="human")
+    other = dess.parallel_env(small(), render_mode="rgb_array")
+    env.reset(seed=0)
+    other.reset(seed=0)
+    expected = [other.render()]
+    for action in (3, 2, 4):
+        env.step({"uav_0": action})
+        other.step({"uav_0": action})
+        expected.append(other.render())
+    pictures = [picture for picture, _ in screen]
+    assert all(np.array_equal(a, b) for a, b in zip(pictures, expected, strict=True))
+    assert {seconds for _, seconds in screen} == {1 / env.metadata["render_fps"]}
+    env.close()
+
+
+def test_close_closes_the_window_and_may_be_called_twice() -> None:
+    dess.parallel_env(small()).close()
+    dess.parallel_env(small(), render_mode="rgb_array").close()
+    open_before = pyplot.get_fignums()
+    env = dess.parallel_env(small(), render_mode="human")
+    assert len(pyplot.get_fignums()) == len(open_before) + 1
+    env.close()
+    env.close()
+    assert pyplot.get_fignums() == open_before
