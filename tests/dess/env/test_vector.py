@@ -1,16 +1,26 @@
 """A batch of missions equals single episodes, in any number of environments."""
 
+from typing import Any
+
+import gymnasium
 import numpy as np
 import pytest
-from dess.env.batch import BatchEnv
+from gymnasium.spaces import flatten
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
 
 import dess
 from dess import InputError, ScenarioSpace
-from dess.state import HOVER
+from dess.env.vector import HarvestVectorEnv
+from dess.observations.observer import KINDS
+from dess.record import MISSION_RECORD, UAV_RECORD
+from dess.state import HOVER, TRUNCATED
 from tests.dess.env.episodes import PAPER, small
 from tests.drawn import Commuter
+
+QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], charge_start=[10, 50], max_slots=60)
+FLEET = 3
 
 
 def arbitrary_action(replication: int, slot: int, uav: int) -> int:
@@ -18,107 +28,237 @@ def arbitrary_action(replication: int, slot: int, uav: int) -> int:
     return int(np.random.default_rng([replication, slot, uav]).choice([0, 1, 2, 3, 4, 4, 4]))
 
 
-def batch_actions(env: BatchEnv) -> np.ndarray:
-    """Arbitrary actions of all UAVs of a batch."""
-    fleet = range(env.state.uavs.shape[1])
+def arbitrary_actions(env: HarvestVectorEnv) -> np.ndarray:
+    """Arbitrary actions of all rows."""
     times = [(int(m["replication"]), int(m["slot"])) for m in env.state.missions]
-    return np.array([[arbitrary_action(*time, i) for i in fleet] for time in times])
+    return np.array([arbitrary_action(*time, i) for time in times for i in range(FLEET)])
 
 
-QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], charge_start=[10, 50], max_slots=60)
+def row_of(observations: Any, row: int) -> Any:
+    """One row of observations, which are an array or a dictionary of arrays."""
+    if isinstance(observations, dict):
+        return {name: part[row] for name, part in observations.items()}
+    return observations[row]
 
 
-def assert_same(observed: dict, batch: dict, b: int) -> None:
-    """The single environment's observations equal those in row ``b`` of the batch."""
-    for agent, observation in observed.items():
-        row = (b, int(agent.removeprefix("uav_")))
-        assert all(np.array_equal(observation[key], batch[key][row]) for key in batch)
+def assert_same(observed: dict[str, Any], rows: Any, first: int) -> None:
+    """The observations of a single environment equal those in the rows from ``first`` on."""
+    for agent, seen in observed.items():
+        row = row_of(rows, first + int(agent.removeprefix("uav_")))
+        assert data_equivalence(seen["observation"], row, exact=True)
 
 
 @pytest.mark.parametrize("num_envs", [1, 3, 4])
-def test_a_batch_equals_single_episodes(num_envs: int) -> None:
-    batch = dess.batch_env(QUICK, num_envs, seed=5)
-    singles = [dess.parallel_env(QUICK, seed=5) for _ in range(num_envs)]
-    observations, info = batch.reset()
+@pytest.mark.parametrize("observation", KINDS)
+def test_a_batch_equals_single_episodes(num_envs: int, observation: str) -> None:
+    guarded = num_envs == 3
+    kind: dict[str, Any] = {"seed": 5, "observation": observation, "guarded": guarded}
+    batch = dess.vector_env(QUICK, num_envs, **kind)
+    singles = [dess.parallel_env(QUICK, **kind) for _ in range(num_envs)]
+    rows, info = batch.reset()
     for b, single in enumerate(singles):
-        assert_same(single.reset(options={"replication": b})[0], observations, b)
+        assert_same(single.reset(options={"replication": b})[0], rows, b * FLEET)
     finished = 0
-    for _ in range(180):
-        actions = batch_actions(batch)
-        observations, *outcome, info = batch.step(actions)
-        over = info.get("_final_obs", np.zeros(num_envs, bool))
+    for _ in range(120):
+        actions = arbitrary_actions(batch)
+        rows, rewards, terminated, truncated, info = batch.step(actions)
+        over = (terminated | truncated).reshape(num_envs, FLEET)
         for b, single in enumerate(singles):
-            rows = [single.possible_agents.index(agent) for agent in single.agents]
-            assert info["acted"][b].nonzero()[0].tolist() == rows
-            assert all(not part[b][~info["acted"][b]].any() for part in outcome)
-            observed, *expected, _ = single.step({f"uav_{i}": actions[b, i] for i in rows})
-            assert_same(observed, info["final_obs"] if over[b] else observations, b)
-            for part, values in zip(outcome, expected, strict=True):
-                assert part[b, rows].tolist() == list(values.values())
-            assert over[b] == (not single.agents)
-            if over[b]:
-                metrics, uavs = (part[over[:b].sum()] for part in info["final_records"])
-                assert single.record().metrics == metrics
-                assert np.array_equal(single.record().uavs, uavs[: metrics["uavs"]])
-                observed, _ = single.reset(options={"replication": info["replication"][b]})
-                assert_same(observed, observations, b)
+            first = b * FLEET
+            agents, uavs = single.agents, [int(agent[4:]) for agent in single.agents]
+            assert info["acted"][first : first + FLEET].nonzero()[0].tolist() == uavs
+            observed, *expected, infos = single.step({f"uav_{i}": actions[first + i] for i in uavs})
+            assert over[b].all() == over[b].any() == (not single.agents)
+            assert_same(observed, info["final_obs"] if over[b].all() else rows, first)
+            for i in range(FLEET):
+                assert rewards[first + i] == expected[0].get(f"uav_{i}", 0.0)
+            for agent, i in zip(agents, uavs, strict=True):
+                for name in ("reward_terms", "end", "overruled", "collected", "team_collected"):
+                    assert np.array_equal(info[name][first + i], infos[agent][name]), name
+                if not over[b].all():
+                    mask = info["action_mask"][first + i]
+                    assert mask.tolist() == observed[agent]["action_mask"].tolist()
+                    assert info["active"][first + i] == infos[agent]["active"]
+            if over[b].all():
+                assert_same_record(single.record(), info["final_info"], first)
+                ends = single.record().uavs["end"]
+                whole = truncated[first : first + len(ends)]
+                assert whole.tolist() == (ends == TRUNCATED).tolist()
+                replication = {"replication": info["replication"][first]}
+                assert_same(single.reset(options=replication)[0], rows, first)
                 finished += 1
     assert finished > num_envs
 
 
+def assert_same_record(record: Any, final: dict[str, Any], first: int) -> None:
+    """The record equals the one in ``info["final_info"]`` from row ``first`` on."""
+    for i in range(FLEET):
+        for name in MISSION_RECORD.names or ():
+            assert final[name][first + i] == record.metrics[name], name
+    for name in UAV_RECORD.names or ():
+        of_uavs = final["uav"][name][first : first + len(record.uavs)]
+        assert np.array_equal(of_uavs, record.uavs[name]), name
+
+
+@pytest.mark.parametrize("observation", KINDS)
+def test_rows_without_a_uav_are_zeros_that_may_only_hover(observation: str) -> None:
+    env = dess.vector_env(QUICK, 5, observation=observation)
+    rows, info = env.reset(seed=2)
+    acted = info["active"]
+    for _ in range(100):
+        idle = ~(acted | info["active"])
+        for row in idle.nonzero()[0]:
+            assert not flatten(env.single_observation_space, row_of(rows, row)).any()
+        inactive = ~info["active"]
+        assert (info["action_mask"][inactive] == (np.arange(5) == HOVER)).all()
+        assert info["action_mask"].any(1).all()
+        assert info["action_mask"] is env.action_masks()
+        rows, rewards, terminated, truncated, info = env.step(arbitrary_actions(env))
+        assert env.observation_space.contains(rows)
+        assert not (terminated & truncated).any()
+        acted = info["acted"]
+        assert not rewards[~acted].any()
+        for row in np.flatnonzero(info.get("_final_obs", ())):
+            assert env.single_observation_space.contains(info["final_obs"][row])
+    assert idle.any()
+
+
+@pytest.mark.parametrize("observation", KINDS)
+def test_what_was_returned_is_never_overwritten(observation: str) -> None:
+    env = dess.vector_env(QUICK, 3, observation=observation)
+    env.reset()
+    steps = [env.step(arbitrary_actions(env)) for _ in range(40)]
+    again = dess.vector_env(QUICK, 3, observation=observation)
+    again.reset()
+    for step in steps:
+        assert data_equivalence(step, again.step(arbitrary_actions(again)), exact=True)
+
+
 @pytest.mark.parametrize("num_envs", [1, 2, 5])
 def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
-    env = dess.batch_env(QUICK, num_envs, seed=1)
+    env = dess.vector_env(QUICK, num_envs, seed=1)
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
-    _, info = env.reset()
-    started = info["replication"].tolist()
+    assert (env.missions, env.num_envs) == (num_envs, num_envs * FLEET)
+
+    def numbers(info: dict[str, Any]) -> np.ndarray:
+        of_rows = info["replication"].reshape(num_envs, FLEET)
+        assert (of_rows == of_rows[:, :1]).all()
+        return of_rows[:, 0]
+
+    started = numbers(env.reset()[1]).tolist()
     assert started == list(range(num_envs))
+    before = np.array(started)
     for _ in range(80):
-        before = info["replication"]
-        *_, info = env.step(batch_actions(env))
-        started += info["replication"][info["replication"] != before].tolist()
-        assert (info["active"].any(1)).all()
+        *_, info = env.step(arbitrary_actions(env))
+        now = numbers(info)
+        started += now[now != before].tolist()
+        before = now
+        assert info["active"].reshape(num_envs, FLEET).any(1).all()
     assert started == list(range(len(started)))
     assert len(started) > num_envs
     _, info = env.reset()  # goes on
-    assert info["replication"].tolist() == [len(started) + b for b in range(num_envs)]
+    assert numbers(info).tolist() == [len(started) + b for b in range(num_envs)]
+    _, info = env.reset(options={"replication": 40})
+    assert numbers(info).tolist() == [40 + b for b in range(num_envs)]
     again, info = env.reset(seed=1)
-    assert info["replication"].tolist() == list(range(num_envs))
-    fresh, _ = dess.batch_env(QUICK, num_envs, seed=1).reset()
+    assert numbers(info).tolist() == list(range(num_envs))
+    fresh, _ = dess.vector_env(QUICK, num_envs, seed=1).reset()
     assert data_equivalence(again, fresh, exact=True)
 
 
 def test_a_policy_can_play_the_batch() -> None:
-    env = dess.batch_env(QUICK, 4, seed=2)
+    env = dess.vector_env(QUICK, 4, seed=2)
     env.reset()
-    records = []
-    while len(records) < 8:
+    expected = dess.simulate_batch(QUICK, Commuter(), 2, 100)
+    played = set()
+    while len(played) < 8:
         view = env.view()
-        actions = np.full(env.action_space.shape, HOVER)
-        actions[view.mission, view.uav] = Commuter().act(view)
+        actions = np.full(env.num_envs, HOVER)
+        actions[view.mission * FLEET + view.uav] = Commuter().act(view)
         *_, info = env.step(actions)
-        if "final_records" in info:
-            records += list(info["final_records"].missions)
-    expected = dess.simulate_batch(QUICK, Commuter(), 2, 100).missions
-    assert all(record == expected[record["replication"]] for record in records)
+        for row in np.flatnonzero(info.get("_final_info", ())):
+            final, (_, i) = info["final_info"], divmod(row, FLEET)
+            number = final["replication"][row]
+            played.add(number)
+            for name in MISSION_RECORD.names or ():
+                assert final[name][row] == expected.missions[name][number], name
+            for name in UAV_RECORD.names or ():
+                assert np.array_equal(final["uav"][name][row], expected.uavs[name][number, i])
+
+
+@pytest.mark.parametrize("scenario", [PAPER, dess.load_scenario("paper", uavs=2)])
+def test_gymnasium_makes_it(scenario: ScenarioSpace) -> None:
+    env = gymnasium.make_vec("dess/Paper-v0", num_envs=3, scenario=scenario, seed=7)
+    assert isinstance(env, HarvestVectorEnv)
+    assert (env.missions, env.num_envs) == (3, 3 * scenario.uavs[1])
+    mine = dess.vector_env(scenario, 3, seed=7)
+    assert data_equivalence(env.reset(), mine.reset(), exact=True)
+
+
+def test_gymnasium_makes_it_from_a_name_with_options() -> None:
+    env = gymnasium.make_vec("dess/Paper-v0", num_envs=64)
+    assert env.num_envs == 64 * PAPER.uavs[1]
+    small_vision = gymnasium.make_vec("dess/Paper-v0", 2, observation="maps", guarded=True)
+    assert set(small_vision.single_observation_space.keys()) == {"local", "global", "battery"}
+
+
+# --- Gymnasium's own wrappers ---
+
+
+def quick(observation: str = "vector") -> HarvestVectorEnv:
+    """Four environments of quick missions."""
+    return dess.vector_env(QUICK, 4, seed=3, observation=observation)
+
+
+def test_the_returns_that_gymnasium_counts_are_those_of_the_records() -> None:
+    env = wrappers.RecordEpisodeStatistics(quick())
+    env.reset()
+    ended = 0
+    for _ in range(120):
+        *_, info = env.step(arbitrary_actions(env.unwrapped))
+        if "episode" in info:
+            over, final = info["_episode"], info["final_info"]
+            assert np.array_equal(over, info["_final_info"])
+            returns = info["episode"]["r"][over]
+            assert returns == pytest.approx(final["uav"]["reward"][over], abs=1e-9)
+            assert (info["episode"]["l"][over] == final["slots"][over]).all()
+            ended += over.sum()
+    assert ended >= 4 * FLEET
+
+
+def test_infos_become_a_list() -> None:
+    env, plain = wrappers.DictInfoToList(quick()), quick()
+    _, infos = env.reset()
+    _, expected = plain.reset()
+    ended = 0
+    for _ in range(60):
+        for row, info in enumerate(infos):
+            assert np.array_equal(info["action_mask"], expected["action_mask"][row])
+            assert ("final_info" in info) == bool(expected.get("_final_info", np.zeros(12))[row])
+            if "final_info" in info:
+                assert info["final_info"]["slots"] == expected["final_info"]["slots"][row]
+                ended += 1
+        actions = arbitrary_actions(plain)
+        *_, infos = env.step(actions)
+        *_, expected = plain.step(actions)
+    assert ended > 0
 
 
 def test_bad_input_is_refused_with_one_line() -> None:
-    env = dess.batch_env(small(), 2)
+    env = dess.vector_env(small(), 2)
     with pytest.raises(InputError, match="call reset"):
-        env.step(np.zeros((2, 1), int))
+        env.step(np.zeros(2, int))
     env.reset()
     for action in (5, -1):
         with pytest.raises(InputError, match="allowed: 0..4"):
-            env.step(np.array([[0], [action]]))
-    for actions in (
-        np.zeros((2, 1)),
-        np.zeros(2, int),
-        np.zeros((2, 2), int),
-        [["north"], ["east"]],
-    ):
-        with pytest.raises(InputError, match=r"integers of shape \(2, 1\)"):
-            env.step(actions)
+            env.step(np.array([0, action]))
+    for actions in (np.zeros(2), np.zeros(3, int), np.zeros((2, 1), int), ["north", "east"]):
+        with pytest.raises(InputError, match=r"integers of shape \(2,\)"):
+            env.step(actions)  # type: ignore[arg-type]
     for num_envs in (0, -1, 2.0):
         with pytest.raises(InputError, match="num_envs"):
-            dess.batch_env(PAPER, num_envs)  # type: ignore[arg-type]
+            dess.vector_env(PAPER, num_envs)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="observation: 'pixels' is unknown.*maps"):
+        dess.vector_env(PAPER, 2, observation="pixels")
+    with pytest.raises(InputError, match="seed"):
+        env.reset(seed=-1)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from dess.env.observation import observation_names
 from hypothesis import given
 
 import dess
 from dess import ScenarioSpace
+from dess.observations.components import component_names
 from dess.state import HOVER, STEP_X, STEP_Y
 from tests.dess.env.episodes import play, small
 from tests.drawn import seeds, spaces
@@ -16,8 +16,8 @@ from tests.drawn import seeds, spaces
 def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
     space: ScenarioSpace, seed: int
 ) -> None:
-    env = dess.parallel_env(space, seed)
-    names = observation_names(space)
+    env = dess.parallel_env(space, seed, observation="state")
+    names = component_names(space)
     edge = space.grid - 1
     for step in play(env, 0):
         for agent, observation in step[0].items():
@@ -35,9 +35,9 @@ def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
 def test_an_observation_worked_out_by_hand() -> None:
     # A zone of two cells, (3, 0) and (4, 0): the UAVs start there, 30 % is above C_S, below C_C.
     scenario = small(zone=(3, 0, 2, 1), uavs=2, flying_time=30, initial_data=[0, 8], quota=400)
-    env = dess.parallel_env(scenario)
+    env = dess.parallel_env(scenario, observation="state")
     observations, _ = env.reset()
-    names = observation_names(scenario)
+    names = component_names(scenario)
     left = min(env.agents, key=lambda a: observations[a]["observation"][names.index("x")])
     # West, out of the zone; the other one hovers: one slot, one percent, four communications.
     observations, *_ = env.step({agent: 3 if agent == left else HOVER for agent in env.agents})
