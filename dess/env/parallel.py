@@ -24,7 +24,7 @@ from dess.observations.components import Components, component_bounds
 from dess.observations.observer import Observer
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import ACTION_NAMES, HOVER, TRUNCATED
+from dess.state import ACTION_NAMES, ACTIVE, HOVER, TRUNCATED
 
 _MASKS, _ENDED, _MODES = ("observation", "info"), ("leave", "stay"), ("rgb_array", "human")
 
@@ -112,6 +112,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         self.agents: list[str] = []
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
         space = self._observer.space
+        self._rows_space = batch_space(space, fleet)
         if not self._mask_in_info:
             allowed = spaces.MultiBinary(len(ACTION_NAMES))
             space = spaces.Dict({"observation": space, "action_mask": allowed})
@@ -159,24 +160,28 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         Raises:
             InputError: If no episode is in progress, or the actions are not those of ``agents``.
         """
-        uavs = self._stepper.state.uavs[0]
-        acting = [agent for agent, flies in self._each(uavs["active"]) if flies]
-        if not acting:
+        active = self._stepper.state.uavs["active"]
+        acting = active[0].tolist()
+        pilots = [agent for agent, flies in self._each(acting) if flies]
+        if not pilots:
             raise InputError("step: no episode is in progress; call reset() first")
-        if not set(acting) <= set(actions) <= set(self.agents):
-            raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {acting}")
-        index = [self.possible_agents.index(agent) for agent in acting]
-        row = np.full((1, len(uavs)), HOVER)
-        row[0, index] = checked_actions([actions[agent] for agent in acting], (len(acting),))
-        outcome = self._stepper.step(row)
+        if not actions.keys() >= set(pilots) or not actions.keys() <= set(self.agents):
+            raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {pilots}")
+        chosen = [actions[agent] if flies else HOVER for agent, flies in self._each(acting)]
+        outcome = self._stepper.step(checked_actions([chosen], active.shape))
         observations, infos = self._seen(outcome, outcome.acted)
-        over = not uavs["active"].any()
-        ended = (outcome.terminated | outcome.truncated | over)[0] & (over or not self._stay)
-        truncated = ended & (outcome.end[0] == TRUNCATED)
-        rewards = self._of_agents(outcome.reward[0].tolist())
-        terminated = self._of_agents((ended & ~truncated).tolist())
-        given = observations, rewards, terminated, self._of_agents(truncated.tolist()), infos
-        self.agents = [agent for agent, left in self._each(ended) if not left and agent in rewards]
+        over = not active.any()
+        ends = outcome.end[0].tolist()
+        ended = [over] * len(ends) if self._stay else [end != ACTIVE for end in ends]
+        pairs = list(zip(ended, ends, strict=True))
+        given = (
+            observations,
+            self._of_agents(outcome.reward[0].tolist()),
+            self._of_agents(gone and end != TRUNCATED for gone, end in pairs),
+            self._of_agents(gone and end == TRUNCATED for gone, end in pairs),
+            infos,
+        )
+        self.agents = [agent for agent, gone in self._of_agents(ended).items() if not gone]
         if self._window:
             self.render()
         return given
@@ -228,7 +233,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         state = self._stepper.state
         rows, masks = self._observer.observe_all(state, shown)
         masks = masks.view(np.int8)
-        observed = iterate(batch_space(self._observer.space, len(masks)), rows)
+        observed = iterate(self._rows_space, rows)
         if not self._mask_in_info:
             observed = (
                 {"observation": own, "action_mask": mask}
