@@ -1,0 +1,134 @@
+"""CleanRL is a collection of single files; the example is one in its style, for ``vector_env``."""
+
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import dess
+from dess import ScenarioSpace
+from policies.adapter import Adapter
+
+torch = pytest.importorskip("torch")
+
+EXAMPLE = SimpleNamespace(
+    **runpy.run_path(str(Path(__file__).parents[2] / "examples" / "cleanrl_ppo.py"))
+)
+QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], quota=60, max_slots=25)
+FLEET = ScenarioSpace.of(QUICK, uavs=3)
+MISSIONS, ROWS = 4, 12
+
+
+@pytest.fixture
+def batches(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
+    """What the loop has learned from: the arguments of its loss, for each batch."""
+    learned = []
+
+    def loss(network, *parts):
+        learned.append(parts)
+        return EXAMPLE.loss(network, *parts)
+
+    monkeypatch.setitem(EXAMPLE.train.__globals__, "loss", loss)
+    return learned
+
+
+def trained(**options):
+    """The network after one update."""
+    return EXAMPLE.train(**{"steps": 1, "scenario": QUICK, "missions": MISSIONS} | options)
+
+
+def played(network, scenario: ScenarioSpace, slots: int):
+    """The actions of a network in an environment, with what the environment returns."""
+    env = dess.vector_env(scenario, MISSIONS, seed=1, guarded=True)
+    observation, info = env.reset()
+    for _ in range(slots):
+        mask = info["action_mask"].copy()
+        chances, _ = EXAMPLE.evaluated(network, *map(torch.tensor, (observation, mask)))
+        action = chances.sample().numpy()
+        observation, reward, terminated, truncated, info = env.step(action)
+        yield mask, chances.probs.detach().numpy(), action, reward, terminated | truncated, info
+
+
+def test_reset(batches: list[tuple]) -> None:
+    trained()
+    observation, info = dess.vector_env(QUICK, MISSIONS, seed=1, guarded=True).reset()
+    seen = torch.cat([batch[0] for batch in batches])
+    for row in torch.tensor(observation[info["active"]]):
+        assert (seen == row).all(1).any()
+
+
+def test_step(batches: list[tuple]) -> None:
+    trained()
+    seen, _, action, log_chance, *estimates = together(batches)
+    assert len(seen) > EXAMPLE.EPOCHS * EXAMPLE.SLOTS * MISSIONS
+    assert set(action.tolist()) == {0, 1, 2, 3, 4}
+    assert (log_chance <= 0).all()
+    assert all(part.isfinite().all() for part in (seen, log_chance, *estimates))
+
+
+def test_mask_is_respected(batches: list[tuple]) -> None:
+    network = trained()
+    _, masks, actions, *_ = together(batches)
+    assert masks[range(len(actions)), actions].all() and not masks.all()
+    for mask, chances, action, *_ in played(network, QUICK, 30):
+        assert not chances[~mask].any()
+        assert mask[range(ROWS), action].all()
+
+
+def test_agents_that_end(batches: list[tuple]) -> None:
+    network = trained(scenario=FLEET)
+    seen, *_ = together(batches)
+    assert seen.any(1).all()  # a row that waits observes zeros
+    assert len(seen) < EXAMPLE.EPOCHS * EXAMPLE.SLOTS * ROWS
+    waits = sum((~info["active"]).sum() for *_, info in played(network, FLEET, 60))
+    assert waits
+    # What comes after the end of a UAV does not change what it has learned before.
+    rewards, values = torch.rand(5, ROWS), torch.rand(5, ROWS)
+    goes_on = torch.ones(5, ROWS)
+    goes_on[2] = 0.0
+    found = EXAMPLE.advantages(rewards, goes_on, values, torch.rand(ROWS))
+    rewards[3:], values[3:] = 100.0, 50.0
+    again = EXAMPLE.advantages(rewards, goes_on, values, torch.rand(ROWS))
+    assert torch.equal(found[:3], again[:3]) and not torch.equal(found[3:], again[3:])
+    assert torch.equal(found[2], (rewards - values)[2])
+
+
+def test_smaller_fleets(batches: list[tuple]) -> None:
+    for scenario in (QUICK, FLEET):
+        network = trained(scenario=scenario)
+        assert all(weight.isfinite().all() for weight in network.parameters())
+        batches.append(())
+    drawn, fixed = batches[: batches.index(())], batches[batches.index(()) + 1 : -1]
+    assert len(together(drawn)[0]) < len(together(fixed)[0])
+
+
+def test_training_step() -> None:
+    once, twice = trained(seed=3), trained(seed=3, steps=EXAMPLE.SLOTS * ROWS + 1)
+    assert not same(once, twice)
+
+    @torch.no_grad()
+    def act(observations, masks):
+        return EXAMPLE.evaluated(once, *map(torch.tensor, (observations, masks)))[0].mode
+
+    policy = Adapter("ppo", act, guarded=True)
+    records = dess.simulate_batch(QUICK, policy, 2, 5)
+    assert dess.simulate(QUICK, policy, 2, 4).metrics == records.missions[4]
+
+
+def test_seeds_repeat_episodes() -> None:
+    assert same(trained(seed=3), trained(seed=3))
+    assert not same(trained(seed=3), trained(seed=4))
+    first, again = (list(played(trained(seed=3), FLEET, 3)) for _ in range(2))
+    assert np.array_equal(first[0][0], again[0][0])
+
+
+def same(one, other) -> bool:
+    """Whether two networks have the same weights."""
+    return all(map(torch.equal, one.parameters(), other.parameters()))
+
+
+def together(batches: list[tuple]) -> list:
+    """The rows of all batches."""
+    return [torch.cat(part) for part in zip(*batches, strict=True)]

@@ -1,0 +1,125 @@
+"""sb3-contrib: MaskablePPO on the rows of ``vector_env``, and its policy as one of dess."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dess
+import policies
+from dess import InputError, ScenarioSpace
+from dess.state import HOVER
+
+sb3_contrib = pytest.importorskip("sb3_contrib")
+masking = pytest.importorskip("sb3_contrib.common.maskable.utils")
+evaluation = pytest.importorskip("sb3_contrib.common.maskable.evaluation")
+sb3 = pytest.importorskip("dess.integrations.sb3")
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "sb3_maskable_ppo.py"
+QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], quota=60, max_slots=25)
+FLEET = ScenarioSpace.of(QUICK, uavs=3)
+MISSIONS, ROWS = 4, 12
+
+
+def harvest(scenario=QUICK, **options):
+    """A small environment."""
+    return sb3.SB3VecEnv(dess.vector_env(scenario, MISSIONS, **options))
+
+
+def flown(env, steps: int, seed: int = 1) -> list[tuple]:
+    """The masks, active rows, actions and outcomes of an untrained network, step by step."""
+    model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8, seed=seed)
+    env.seed(seed)
+    observations, story = env.reset(), []
+    for _ in range(steps):
+        masks, active = masking.get_action_masks(env), env.env.state.uavs["active"].ravel()
+        actions, _ = model.predict(observations, action_masks=masks)
+        observations, *outcome = env.step(actions)
+        story.append((masks, active, actions, observations, *outcome))
+    return story
+
+
+def test_reset() -> None:
+    env = harvest()
+    env.reset()
+    assert masking.is_masking_supported(env)
+    masks = masking.get_action_masks(env)
+    assert masks.shape == (ROWS, 5) and masks.dtype == bool
+    _, info = dess.vector_env(QUICK, MISSIONS).reset()
+    assert np.array_equal(masks, info["action_mask"])
+
+
+def test_step() -> None:
+    env, plain = harvest(), dess.vector_env(QUICK, MISSIONS)
+    plain.reset(seed=1)
+    info = {"action_mask": plain.action_masks()}
+    for masks, _, actions, observations, rewards, over, _ in flown(env, 40):
+        assert np.array_equal(masks, info["action_mask"])
+        expected, gained, terminated, truncated, info = plain.step(actions)
+        assert np.array_equal(observations, expected)
+        assert np.array_equal(rewards, gained)
+        assert np.array_equal(over, terminated | truncated)
+
+
+def test_mask_is_respected() -> None:
+    for guarded in (False, True):
+        story = flown(harvest(guarded=guarded), 40)
+        for masks, _, actions, *_ in story:
+            assert masks[range(ROWS), actions].all()
+        assert not all(masks[active].all() for masks, active, *_ in story)
+
+
+def test_agents_that_end() -> None:
+    waits = 0
+    for masks, active, actions, _, rewards, *_ in flown(harvest(FLEET), 60):
+        assert (masks[~active] == np.eye(5, dtype=bool)[HOVER]).all()
+        assert (actions[~active] == HOVER).all()
+        assert not rewards[~active].any()
+        waits += (~active).sum()
+    assert waits
+
+
+def test_smaller_fleets() -> None:
+    story = flown(harvest(), 60)
+    fleets = story[0][1].reshape(MISSIONS, -1).sum(1)
+    drawn = dess.simulate_batch(QUICK, policies.load("random"), 1, MISSIONS).missions["uavs"]
+    assert np.array_equal(fleets, drawn) and len(set(drawn)) > 1
+    for scenario in (QUICK, FLEET):
+        env = harvest(scenario)
+        model = sb3_contrib.MaskablePPO("MlpPolicy", env, n_steps=8, batch_size=8)
+        rewards, _ = evaluation.evaluate_policy(model, env, 12, return_episode_rewards=True)
+        assert len(rewards) == 12
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """The example after one update, and the folder with its file."""
+    folder = tmp_path_factory.mktemp("trained")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return runpy.run_path(str(EXAMPLE))["train"](minutes=0.001, missions=4), folder
+
+
+def test_training_step(trained, monkeypatch: pytest.MonkeyPatch) -> None:
+    model, folder = trained
+    assert model.num_timesteps == 32 * 12
+    assert model._n_updates == 4
+    monkeypatch.chdir(folder)
+    policy = policies.load(f"{EXAMPLE}:MaskablePPOPolicy")
+    paper = dess.load_scenario("paper")
+    records = dess.simulate_batch(paper, policy, 0, 5)
+    assert dess.simulate(paper, policy, 0, 3).metrics == records.missions[3]
+    model.learn(1)
+    model.save("maskable_ppo.zip")
+    assert policies.load(f"{EXAMPLE}:MaskablePPOPolicy").weights != policy.weights
+    Path("maskable_ppo.zip").unlink()
+    with pytest.raises(InputError, match="cannot be loaded: FileNotFoundError"):
+        policies.load(f"{EXAMPLE}:MaskablePPOPolicy")
+
+
+def test_seeds_repeat_episodes() -> None:
+    first, again, other = (flown(harvest(), 40, seed) for seed in (7, 7, 8))
+    for step, same in zip(first, again, strict=True):
+        assert all(map(np.array_equal, step[:6], same[:6]))
+    assert not np.array_equal(first[0][3], other[0][3])
