@@ -155,11 +155,14 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
             actions: An action 0..4 for each of ``agents``.
 
         Returns:
-            Observations, rewards, terminated, truncated and info of the agents that acted.
+            Observations, rewards, terminated, truncated and info of the agents that acted. They are
+            empty if there are no agents and no actions, as PettingZoo's wrappers expect it.
 
         Raises:
             InputError: If no episode is in progress, or the actions are not those of ``agents``.
         """
+        if not self.agents and not actions:
+            return {}, {}, {}, {}, {}
         active = self._stepper.state.uavs["active"]
         acting = active[0].tolist()
         pilots = [agent for agent, flies in self._each(acting) if flies]

@@ -225,6 +225,7 @@ def test_bad_input_is_refused_with_one_line() -> None:
     env = dess.parallel_env(small())
     with pytest.raises(InputError, match="call reset"):
         env.step({"uav_0": 0})
+    assert env.step({}) == ({}, {}, {}, {}, {})  # as PettingZoo has it
     env.reset()
     for actions in ({}, {"uav_1": 0}, {"uav_0": 0, "uav_1": 0}):
         with pytest.raises(InputError, match="actions: of .*uav_0"):
