@@ -4,13 +4,13 @@
     observations, infos = env.reset(seed=1)
     observations, rewards, terminated, truncated, infos = env.step(actions)
 
-    envs = dess.batch_env(dess.load_scenario("paper"), num_envs=256)   # Gymnasium: many missions
+    envs = dess.vector_env(dess.load_scenario("paper"), num_envs=64)   # Gymnasium: many missions
 
 Both environments number their missions: replication r of seed s is the mission that
 ``dess.simulate`` runs with this seed and replication, and the same actions give the same record,
 bit for bit.
 
-An observation is the vector of ``dess.env.observation`` with a mask of the legal actions; an action
+What UAVs observe, and the masks of their actions, come from ``dess.observations``; an action
 is 0 north, 1 east, 2 south, 3 west, 4 hover. The safety controller overrules a move off the grid.
 A charging UAV hovers whatever action it is given, and receives no penalty for that.
 """
