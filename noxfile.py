@@ -1,5 +1,7 @@
-"""The sessions: tests, lint, docs, reports, bench, verify, fuzz. ``nox -l`` lists them."""
+"""The sessions: tests, lint, docs, reports, bench, verify, fuzz, integrations; see ``nox -l``."""
 
+import shutil
+import sys
 from pathlib import Path
 
 import nox
@@ -25,6 +27,8 @@ STUDIES: dict[str, list[str]] = {
 # Two test files at a time, in the order of their collection.
 SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 RESULTS, REPORTS = Path("results"), Path("build/reports")
+# The tests of a library, and the pins of one that cannot be installed with those of the project.
+LIBRARIES, PINS = Path("tests/integrations"), Path("examples/requirements")
 
 
 def install(session: nox.Session, extras: str = "") -> None:
@@ -94,3 +98,44 @@ def bench(session: nox.Session) -> None:
     """Measure the speed of the engines."""
     install(session, "[test]")
     session.run("pytest", "benchmarks", *session.posargs)
+
+
+@nox.session(python=False)
+def integrations(session: nox.Session) -> None:
+    """Check the environments in other libraries; ``-- NAME`` checks one, and writes no matrix."""
+    names = sorted(path.stem.removeprefix("test_") for path in LIBRARIES.glob("test_*.py"))
+    if unknown := set(session.posargs) - set(names):
+        session.error(f"integrations: {', '.join(unknown)} is unknown; allowed: {', '.join(names)}")
+    reports, full = Path("build/integrations"), not session.posargs
+    shutil.rmtree(reports, ignore_errors=True)
+    for name in session.posargs or names:
+        python, tests = environment_of(session, name), LIBRARIES / f"test_{name}.py"
+        report = f"--junitxml={reports / name}.xml"
+        codes = range(6) if full else [0]  # the matrix shows what failed
+        run(session, python, "pytest", "-q", str(tests), report, success_codes=codes)
+    if full:
+        run(session, sys.executable, "tests.integrations.matrix", str(reports))
+
+
+def environment_of(session: nox.Session, name: str) -> str:
+    """The Python of a virtual environment with a library, shared by all that have no own pins."""
+    own = PINS / f"{name}.txt"
+    folder = Path(".nox", "integrations", name if own.exists() else "together")
+    python = str(folder.resolve() / "bin" / "python")
+    wanted = ["-e", ".[examples]", "-c", "constraints.txt"]
+    if own.exists():  # its pins replace those of the project
+        pins = Path("constraints.txt").read_text("utf-8").splitlines()
+        replaced = {line.split("==")[0] for line in own.read_text("utf-8").splitlines()}
+        kept = [line for line in pins if line.split("==")[0] not in replaced]
+        constraints = Path(session.create_tmp(), f"{name}.txt")
+        constraints.write_text("\n".join(kept), "utf-8")
+        wanted = ["-e", ".", "-r", str(own), "-c", str(constraints)]
+    if not Path(python).exists():
+        run(session, sys.executable, "venv", str(folder))
+    run(session, python, "pip", "install", "-q", "pytest", "hypothesis", *wanted)
+    return python
+
+
+def run(session: nox.Session, python: str, module: str, *arguments: str, **options: object) -> None:
+    """Run a module with the Python of another environment."""
+    session.run(python, "-m", module, *arguments, external=True, **options)

@@ -30,6 +30,10 @@ ROOMS = {
 REFUSED = {"dess": {"pandas"}, "policies": {"pandas"}}
 # What only the learner may import: it takes seconds to load, and most commands need none of it.
 LEARNER, LEARNING = "policies.ddqn", {"torch", "safetensors"}
+# The libraries that only the classes made for them import; who uses these classes imports them.
+INTEGRATIONS = "dess.integrations"
+FOREIGN = {"agilerl", "benchmarl", "pufferlib", "ray", "rliable", "sb3_contrib"}
+FOREIGN |= {"stable_baselines3", "supersuit", "tensordict", "torchrl"}
 # What a plain `dess --help` must not wait for.
 HEAVY = {"torch", "numba", "pandas", "scipy", "matplotlib"}
 # What runs without the learner.
@@ -140,10 +144,27 @@ def test_no_modules_import_each_other() -> None:
         pytest.fail(f"a cycle of imports: {' -> '.join(error.args[1])}")
 
 
+def users_of(libraries: set[str]) -> set[str]:
+    """The modules that import one of some libraries."""
+    return {n for n in SOURCES if libraries & {module.split(".")[0] for module in imports_of(n)}}
+
+
 def test_only_the_learner_imports_torch() -> None:
-    users = {n for n in SOURCES if LEARNING & {module.split(".")[0] for module in imports_of(n)}}
+    users = users_of(LEARNING)
     assert users
-    assert not {name for name in users if not name.startswith(f"{LEARNER}.")}
+    assert not {name for name in users if not name.startswith((f"{LEARNER}.", INTEGRATIONS))}
+
+
+def test_only_integrations_import_the_libraries_that_they_are_made_for() -> None:
+    users = users_of(FOREIGN)
+    assert users
+    assert not {name for name in users if not name.startswith(f"{INTEGRATIONS}.")}
+
+
+def test_nothing_imports_integrations() -> None:
+    for name in SOURCES:
+        of_integrations = {m for m in imports_of(name) if m.startswith(INTEGRATIONS)}
+        assert not of_integrations or name.startswith(INTEGRATIONS), name
 
 
 def test_the_command_line_loads_nothing_heavy() -> None:

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from packaging.utils import canonicalize_name
 
 from dess.code import libraries
 from policies.registry import trained_names
@@ -136,10 +137,16 @@ def test_packages_are_imported_without_any_extra(folder) -> None:
 
 def test_the_packages_of_an_extra_are_those_of_its_libraries() -> None:
     found = homes()
-    for extra, packages in libraries.EXTRAS.items():
+    for extra in libraries.EXTRAS.keys() - {"examples"}:  # those are not installed
+        packages = libraries.EXTRAS[extra]
         of_packages = {home for package in packages for home in found[package]}
         unused = {"jupyter"}  # opens notebooks; nothing imports it
         assert of_packages == set(requirements(*EXTRAS[extra])) - unused, extra
+
+
+def test_the_libraries_of_the_examples_have_the_names_of_their_packages() -> None:
+    packages = {canonicalize_name(package) for package in libraries.EXTRAS["examples"]}
+    assert packages == set(requirements(*EXTRAS["examples"]))
 
 
 def test_what_is_no_library_of_ours_is_no_library_that_is_missed() -> None:

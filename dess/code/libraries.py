@@ -4,6 +4,7 @@
     pip install 'dess[learning]'   trained policies and trainings
     pip install 'dess[reports]'    figures, pages, and studies of sensitivities
     pip install 'dess[all]'        everything
+    pip install 'dess[examples]'   the libraries of the examples, as far as they fit together
 
 An optional library is imported where it is used. The command line turns an import that fails into
 the line of ``absence``; who would find out only after long work asks ``needs`` first.
@@ -23,6 +24,7 @@ EXTRAS = {
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
+    "examples": ("rliable", "sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),
 }
 _TITLES = {
     "torch": "PyTorch",

@@ -1,0 +1,65 @@
+"""The matrix of libraries: how it is made from reports, and that the page has the current one."""
+
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from packaging.utils import canonicalize_name
+
+from tests.distributions import ROOT
+from tests.integrations.matrix import CHECKS, FAILED, MISSING, YES, row
+
+OWN_PINS = sorted((ROOT / "examples" / "requirements").glob("*.txt"))
+TESTED = {path.stem.removeprefix("test_") for path in (ROOT / "tests/integrations").glob("test_*")}
+
+
+def suite(**outcomes: str) -> ElementTree.Element:
+    """The report of a library whose tests had some outcomes; all others passed."""
+    cases = [
+        f'<testcase name="{check}">{outcomes.get(check, "")}</testcase>'
+        for check in CHECKS
+        if outcomes.get(check) != "absent"
+    ]
+    library = '<properties><property name="library" value="ray 2.60.0"/></properties>'
+    return ElementTree.fromstring(f"<testsuite>{library}{''.join(cases)}</testsuite>")
+
+
+def pins(path: Path) -> dict[str, str]:
+    """The exact versions in a file, by the canonical names of the distributions."""
+    lines = [line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")]
+    pairs = [re.fullmatch(r"([\w.-]+)(?:\[\w,]+\])?==([^\s=*]+)", line) for line in lines]
+    assert all(pairs), path
+    return {canonicalize_name(pair[1]): pair[2] for pair in pairs if pair}
+
+
+def test_a_library_whose_checks_pass_has_a_green_row() -> None:
+    assert row(suite(), "rllib") == ["`rllib` (`ray`)", "2.60.0", *[YES] * len(CHECKS)]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "cell"),
+    [("<failure/>", FAILED), ("<error/>", FAILED), ("<skipped/>", MISSING), ("absent", MISSING)],
+)
+def test_a_check_that_did_not_pass_is_seen(outcome: str, cell: str) -> None:
+    [*_, seeds] = row(suite(test_seeds_repeat_episodes=outcome), "rllib")
+    assert seeds == cell
+
+
+def test_one_case_that_fails_is_enough() -> None:
+    report = suite()
+    for name, inner in (("test_step[leave]", ""), ("test_step[stay]", "<failure/>")):
+        report.append(ElementTree.fromstring(f'<testcase name="{name}">{inner}</testcase>'))
+    assert row(report, "rllib")[2:4] == [YES, FAILED]
+
+
+def test_a_library_that_is_not_installed_is_seen() -> None:
+    skipped = ElementTree.fromstring("<testsuite><testcase><skipped/></testcase></testsuite>")
+    skipped[0].attrib["name"] = "tests.integrations.test_rllib"
+    assert set(row(skipped, "rllib")[1:]) == {MISSING}
+
+
+def test_own_pins_are_exact_and_those_of_a_library_with_tests() -> None:
+    for path in OWN_PINS:
+        assert pins(path)
+        assert path.stem in TESTED
