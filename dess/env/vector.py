@@ -5,12 +5,13 @@ observations, info = env.reset()
 observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) actions
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space, iterate
+from gymnasium.vector.utils import batch_space
 
 from dess.env.stepper import MissionStepper, Outcome, checked_actions
 from dess.errors import InputError
@@ -178,9 +179,8 @@ class HarvestVectorEnv(VectorEnv):
         done = np.flatnonzero(over[:: self.state.uavs.shape[1]])
         ended = State(*(part[done] for part in self.state))
         last, _ = self._observer.observe_all(ended, shown[done])
-        space = batch_space(self.single_observation_space, int(over.sum()))
         observations = np.empty(self.num_envs, object)
-        observations[over] = np.fromiter(iterate(space, last), object, int(over.sum()))
+        observations[over] = np.fromiter(_rows(last), object, int(over.sum()))
         records = self._by_row(over, self._stepper.records(done))
         self._stepper.launch(done)
         return {
@@ -206,3 +206,12 @@ class HarvestVectorEnv(VectorEnv):
             "active": self.state.uavs["active"].ravel(),
             "replication": np.repeat(self.state.missions["replication"], fleet),
         }
+
+
+def _rows(observations: Observation) -> Iterator[Any]:
+    """The rows of observations, one by one."""
+    if not isinstance(observations, dict):
+        return iter(observations)
+    names = tuple(observations)
+    rows = zip(*observations.values(), strict=True)
+    return (dict(zip(names, row, strict=True)) for row in rows)

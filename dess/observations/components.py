@@ -67,7 +67,10 @@ class Components:
     def encode(
         self, state: State, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """The observations of UAV ``uavs[r]`` in mission ``missions[r]``: (R, F) float32."""
+        """The observations of UAV ``uavs[r]`` in mission ``missions[r]``: (R, F) float32.
+
+        Where ``uavs[r]`` is -1, they are zeros.
+        """
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
         _encode(state, missions, uavs, out)
         return (out,)
@@ -76,8 +79,9 @@ class Components:
 @kernel
 def _encode(state, missions, uavs, out):
     for row in range(len(missions)):
-        b = missions[row]
-        _encode_uav(state.missions[b], state.uavs[b], uavs[row], state.residual[b], out[row])
+        b, i = missions[row], uavs[row]
+        if i >= 0:
+            _encode_uav(state.missions[b], state.uavs[b], i, state.residual[b], out[row])
 
 
 @kernel

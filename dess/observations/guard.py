@@ -118,6 +118,13 @@ def parking_cell(mission, uavs, i, taken):
 def _nearest_free(mission, uavs, i, taken):
     """The nearest zone cell that is not taken (-1 if none), and the slots to reach it."""
     u = uavs[i]
+    # No other cell is as near as the nearest of the zone, so this one is tried first.
+    x = min(max(u.x, mission.zone_x), mission.zone_x + mission.zone_width - 1)
+    y = min(max(u.y, mission.zone_y), mission.zone_y + mission.zone_height - 1)
+    slots = abs(u.x - x) + abs(u.y - y)
+    free = slots == 0 or not taken[zone_number(mission, x, y)]
+    if free and path_length(mission, uavs, i, u.x, u.y, x, y) == slots:
+        return x, y, slots
     best_x, best_y, best = -1, -1, -1
     for cell in range(mission.zone_width * mission.zone_height):
         x, y = zone_cell(mission, cell)

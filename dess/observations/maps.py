@@ -67,7 +67,7 @@ class Maps:
         Args:
             states: S missions at one moment each.
             missions: (R,) indices into the states.
-            uavs: (R,) indices of the UAVs.
+            uavs: (R,) indices of the UAVs; where it is -1, the observation is zeros.
 
         Returns:
             The local maps (R, 4, crop, crop), the global maps (R, 4, width, width) and the own
@@ -86,6 +86,8 @@ def _encode(states, layout, missions, uavs, pool, local, far, own):
     centre = layout.grid - 1
     middle = local.shape[2] // 2
     for r in range(len(missions)):
+        if uavs[r] < 0:
+            continue
         team, residual = states.uavs[missions[r]], states.residual[missions[r]]
         x, y = team[uavs[r], X], team[uavs[r], Y]
         own[r, 0] = team[uavs[r], BATTERY] / np.float32(BATTERY_SCALE)

@@ -8,7 +8,7 @@ import numpy as np
 
 from dess.code.kernels import kernel
 from dess.observations.states import CompactStates, Layout, X, Y
-from dess.observations.vector import DATA_UNIT, SCALES, Vector, lead_of, spare_slots
+from dess.observations.vector import DATA_UNIT, SCALES, Vector, nearest_teammates, spare_slots
 
 NODE = 22
 
@@ -37,6 +37,8 @@ class Nodes:
     ) -> tuple[np.ndarray, ...]:
         """The observations of UAV ``uavs[r]`` in state ``missions[r]``, as float32.
 
+        Where ``uavs[r]`` is -1, they are zeros.
+
         Returns:
             (R, F) vectors and (R, K, 22) nodes.
         """
@@ -49,16 +51,20 @@ class Nodes:
 @kernel
 def _encode(states, rows_mission, rows_uav, nodes, nearness, around, home, out):
     count = len(nodes)
+    least = np.empty(count, np.int64)
     for row in range(len(rows_mission)):
         team = states.uavs[rows_mission[row]]
         data = states.residual[rows_mission[row]]
         i = rows_uav[row]
+        if i < 0:
+            continue
         me = team[i]
+        nearest_teammates(team, i, nodes, least)
         for k in range(count):
             line = out[row, k]
             dx, dy = nodes[k, 0] - me[X], nodes[k, 1] - me[Y]
             slots = abs(dx) + abs(dy)
-            lead = lead_of(team, i, nodes[k, 0], nodes[k, 1], slots)
+            lead = least[k] - slots
             units = data[k] / DATA_UNIT
             line[0] = units
             line[1] = units * nearness[0, slots]

@@ -23,6 +23,7 @@ from dess.view import legal_actions
 ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 _PARTS = {"nodes": ("vector", "nodes"), "maps": ("local", "global", "battery")}
 KINDS = (*ENCODERS, "state")
+_ONLY_HOVER = np.arange(len(ACTION_NAMES)) == HOVER
 
 # One array, or one for each name.
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -65,7 +66,7 @@ class Observer:
         Args:
             state: The state of B missions.
             missions: (R,) indices of the missions.
-            uavs: (R,) indices of the UAVs.
+            uavs: (R,) indices of the UAVs, or -1 for an observation of zeros.
 
         Returns:
             The observations, arrays with R rows, and the (R, 5) masks of the allowed actions as
@@ -93,20 +94,8 @@ class Observer:
         Returns:
             As ``observe``, with B x I rows.
         """
-        rows = np.flatnonzero(shown)
-        some, allowed = self.observe(state, *np.divmod(rows, shown.shape[1]))
-        mask = np.zeros((shown.size, len(ACTION_NAMES)), np.bool_)
-        mask[:, HOVER] = True
-        mask[rows] = np.where(state.uavs["active"].reshape(-1, 1)[rows], allowed, mask[rows])
-        if isinstance(some, dict):
-            return {name: _spread(part, rows, shown.size) for name, part in some.items()}, mask
-        return _spread(some, rows, shown.size), mask
-
-
-def _spread(part: np.ndarray, rows: np.ndarray, count: int) -> np.ndarray:
-    """The array with ``count`` rows that has these rows and zeros elsewhere."""
-    if len(rows) == count:
-        return part
-    out = np.zeros((count, *part.shape[1:]), part.dtype)
-    out[rows] = part
-    return out
+        count, fleet = shown.shape
+        uavs = np.where(shown, np.arange(fleet), -1).ravel()
+        observations, allowed = self.observe(state, np.repeat(np.arange(count), fleet), uavs)
+        allowed[~(shown & state.uavs["active"]).ravel()] = _ONLY_HOVER
+        return observations, allowed

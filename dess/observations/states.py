@@ -125,5 +125,10 @@ def _fill(missions, uavs, residual, guarded, out):
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
     """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
-    bits = states.uavs[missions, uavs, MASK]
-    return (bits[:, None] >> np.arange(5) & 1).astype(bool)
+    return unpacked(states.uavs[missions, uavs, MASK])
+
+
+def unpacked(bits: np.ndarray) -> np.ndarray:
+    """The (R, 5) masks of (R,) numbers of column ``MASK``."""
+    columns = bits.astype(np.uint8)[:, None]
+    return np.unpackbits(columns, axis=1, count=5, bitorder="little").view(np.bool_)

@@ -8,7 +8,7 @@ are described one by one, and all of them affect the data that is left for this 
 
 import numpy as np
 
-from dess.code.kernels import kernel
+from dess.code.kernels import inlined, kernel
 from dess.observations.states import (
     ACTIVE,
     BATTERY,
@@ -25,7 +25,7 @@ from dess.observations.states import (
     X,
     Y,
 )
-from dess.state import STEP_X, STEP_Y
+from dess.state import HOVER, STEP_X, STEP_Y
 
 MATES = 2  # teammates described one by one, the nearest first
 _OWN = 16
@@ -36,7 +36,12 @@ _MATE = 11
 SCALES = np.array([1.2, 4.0, 12.0])
 _NORMS = np.array([10.0, 25.0, 80.0])
 DATA_UNIT = 10.0  # data are divided by this [data units]
-_FAR = 10.0  # leads over the teammates are divided by this [slots]
+# Leads over the teammates and spare slots are divided by these [slots] and clipped to -1..1. These
+# are tables, because a look-up takes less time than a division.
+_LEAD, _SPARE = 10, 20
+_LEADS = np.arange(-_LEAD, _LEAD + 1) / _LEAD
+_SPARES = np.arange(-_SPARE, _SPARE + 1) / _SPARE
+_WIDTH = 5 * len(SCALES) + 1  # of the table of ``_around``: whole vector registers
 
 
 class Vector:
@@ -52,7 +57,8 @@ class Vector:
     def __init__(self, layout: Layout):
         self.layout = layout
         slots = np.arange(2 * layout.grid + 2)
-        self._nearness = np.exp(-slots / SCALES[:, None])
+        self._nearness = np.exp(-slots / SCALES[1])
+        self._around = _around(slots)
         self._home = layout.zone_slots(layout.nodes)
         own = _OWN + 2 * layout.grid + _NODE * len(layout.nodes)
         self.shapes = ((own + 5 * (2 * len(SCALES) + 2) + MATES * _MATE,),)
@@ -60,50 +66,91 @@ class Vector:
     def encode(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        """The observations of UAV ``uavs[r]`` in state ``missions[r]``: (R, F) float32."""
+        """The observations of UAV ``uavs[r]`` in state ``missions[r]``: (R, F) float32.
+
+        Where ``uavs[r]`` is -1, they are zeros.
+        """
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
-        grid, nodes = self.layout.grid, self.layout.nodes
-        _encode(states, missions, uavs, grid, nodes, self._home, self._nearness, out)
+        tables = self._home, self._nearness, self._around
+        _encode(states, missions, uavs, self.layout.grid, self.layout.nodes, *tables, out)
         return (out,)
 
 
+def _around(slots: np.ndarray) -> np.ndarray:
+    """How near a node is to the cells that the five actions lead to, divided by ``_NORMS``.
+
+    Returns:
+        (9 S, 16): a row for each number of slots to the node and for each of its directions, and a
+        column for each action and scale; the last column is zero, so that a row fills whole
+        vector registers.
+    """
+    table = np.zeros((len(slots), 3, 3, _WIDTH))
+    near = np.exp(-slots / SCALES[:, None]) / _NORMS[:, None]
+    for east, south in np.ndindex(3, 3):  # 0 for a node to the west or north, 2 for the opposite
+        for action in range(5):
+            nearer = (STEP_X[action], STEP_Y[action]) in ((east - 1, 0), (0, south - 1))
+            after = slots if action == HOVER else slots + (-1 if nearer else 1)
+            column = action * len(SCALES)
+            # Some numbers of slots are impossible in some directions; these rows are not used.
+            table[:, east, south, column : column + len(SCALES)] = near[
+                :, after.clip(0, slots[-1])
+            ].T
+    return table.reshape(-1, _WIDTH)
+
+
 @kernel
-def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, out):
+def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around, out):
     count = len(nodes)
-    free = np.empty(count, np.float32)  # data at nodes that no teammate is nearer to
+    least = np.empty(count, np.int64)
+    units = np.empty(count)
+    near, free = np.empty(_WIDTH, np.float32), np.empty(_WIDTH, np.float32)
+    before, total = -1, 0.0
     for row in range(len(rows_mission)):
-        mission = states.missions[rows_mission[row]]
-        team = states.uavs[rows_mission[row]]
-        data = states.residual[rows_mission[row]]
-        i = rows_uav[row]
-        me, line = team[i], out[row]
-        at = _own(mission, team, i, data, line)
-        line[at + me[X]] = 1.0
-        line[at + grid + me[Y]] = 1.0
+        b, i = rows_mission[row], rows_uav[row]
+        if i < 0:
+            continue
+        mission, team, data, line = states.missions[b], states.uavs[b], states.residual[b], out[row]
+        if b != before:  # the UAVs of a mission share what follows from its data
+            before, total = b, 0.0
+            for k in range(count):
+                total += data[k]
+                units[k] = data[k] / DATA_UNIT
+        me = team[i]
+        x, y = np.int64(me[X]), np.int64(me[Y])
+        at = _own(mission, team, i, total / (count * DATA_UNIT), line)
+        line[at + x] = 1.0
+        line[at + grid + y] = 1.0
         at += 2 * grid
+        nearest_teammates(team, i, nodes, least)
+        near[:] = 0.0
+        free[:] = 0.0
         for k in range(count):
-            slots = abs(nodes[k, 0] - me[X]) + abs(nodes[k, 1] - me[Y])
-            lead = lead_of(team, i, nodes[k, 0], nodes[k, 1], slots)
-            free[k] = data[k] if lead >= 0 else 0.3 * data[k]
-            line[at + k] = data[k] / DATA_UNIT
-            line[at + count + k] = data[k] / DATA_UNIT * nearness[1, slots]
-            line[at + 2 * count + k] = min(max(lead / _FAR, -1.0), 1.0)
+            dx, dy = nodes[k, 0] - x, nodes[k, 1] - y
+            slots = abs(dx) + abs(dy)
+            lead = least[k] - slots
+            line[at + k] = units[k]
+            line[at + count + k] = units[k] * nearness[slots]
+            line[at + 2 * count + k] = _LEADS[min(max(lead, -_LEAD), _LEAD) + _LEAD]
             line[at + 3 * count + k] = spare_slots(me, home[k], slots)
-        at += _NODE * count
-        at = _actions(me, team, i, data, free, nodes, nearness, line, at)
+            if data[k] == 0.0:
+                continue
+            # data that no teammate is nearer to
+            own = data[k] if lead >= 0 else np.float32(0.3 * data[k])
+            entry = (slots * 3 + (dx > 0) - (dx < 0) + 1) * 3 + (dy > 0) - (dy < 0) + 1
+            for j in range(_WIDTH):
+                near[j] += data[k] * around[entry, j]
+                free[j] += own * around[entry, j]
+        at = _actions(team, i, near, free, line, at + _NODE * count)
         _mates(team, i, line, at)
 
 
-@kernel
-def _own(mission, team, i, data, line):
+@inlined
+def _own(mission, team, i, mean, line):
     """Write the UAV's own state; returns the index of the next part."""
     me = team[i]
     active = 0
     for j in range(len(team)):
         active += team[j, ACTIVE]
-    total = 0.0
-    for k in range(len(data)):
-        total += data[k]
     slack = me[BATTERY] - 1 - me[HOME]
     line[0] = me[BATTERY] / 100.0
     line[1] = me[NEEDED] / 100.0
@@ -120,31 +167,32 @@ def _own(mission, team, i, data, line):
     line[12] = min(me[NEEDED], 10) / 10.0
     line[13] = active - 1.0
     line[14] = active == 1
-    line[15] = total / (len(data) * DATA_UNIT)
+    line[15] = mean
     return _OWN
 
 
-@kernel
+@inlined
 def spare_slots(me, home, slots):
     """The spare slots / 20, within -1..1, if the UAV visits a node and then charges if it must."""
     left = me[BATTERY] - 1 - home if me[MUST_CHARGE] else me[NEEDED]
-    return min(max((left - slots) / 20.0, -1.0), 1.0)
+    return _SPARES[min(max(left - slots, -_SPARE), _SPARE) + _SPARE]
 
 
-@kernel
-def lead_of(team, i, x, y, slots):
-    """Slots by which UAV ``i`` is nearer to a cell than the nearest flying teammate."""
-    least = 10_000
+@inlined
+def nearest_teammates(team, i, nodes, least):
+    """Write the slots from each node to the flying teammate of UAV ``i`` that is nearest to it."""
+    least[:] = 10_000
     for j in range(len(team)):
         if j != i and team[j, ACTIVE] and not team[j, CHARGING]:
-            least = min(least, abs(team[j, X] - x) + abs(team[j, Y] - y))
-    return least - slots
+            x, y = np.int64(team[j, X]), np.int64(team[j, Y])
+            for k in range(len(nodes)):
+                least[k] = min(least[k], abs(nodes[k, 0] - x) + abs(nodes[k, 1] - y))
 
 
-@kernel
-def _actions(me, team, i, data, free, nodes, nearness, line, at):
+@inlined
+def _actions(team, i, near, free, line, at):
     """Write per action the mask, the teammates near the cell it leads to, and the data near it."""
-    scales = len(nearness)
+    me, scales = team[i], len(SCALES)
     for action in range(5):
         x, y = me[X] + STEP_X[action], me[Y] + STEP_Y[action]
         line[at] = me[MASK] >> action & 1
@@ -153,17 +201,14 @@ def _actions(me, team, i, data, free, nodes, nearness, line, at):
                 slots = abs(team[j, X] - x) + abs(team[j, Y] - y)
                 if slots <= 1:
                     line[at + 1] += 1.0 if slots == 0 else 0.3
-        for k in range(len(nodes)):
-            slots = abs(nodes[k, 0] - x) + abs(nodes[k, 1] - y)
-            for s in range(scales):
-                near = nearness[s, slots] / _NORMS[s]
-                line[at + 2 + s] += data[k] * near
-                line[at + 2 + scales + s] += free[k] * near
+        for s in range(scales):
+            line[at + 2 + s] = near[action * scales + s]
+            line[at + 2 + scales + s] = free[action * scales + s]
         at += 2 + 2 * scales
     return at
 
 
-@kernel
+@inlined
 def _mates(team, i, line, at):
     """Write the nearest active teammates, relative to UAV ``i``."""
     last_slots, last = -1, -1

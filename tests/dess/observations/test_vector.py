@@ -8,6 +8,7 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
+from dess.env.vector import vector_env
 from dess.observations.states import (
     ACTIVE,
     BATTERY,
@@ -24,12 +25,14 @@ from dess.observations.states import (
     Layout,
     X,
     Y,
+    compact_states,
     empty_states,
     layout_of,
 )
 from dess.observations.vector import Vector
 from dess.scenario import load_scenario
 from dess.state import HOVER, STEP_X, STEP_Y
+from tests.dess.observations.plain_vector import line_of
 from tests.drawn import EAST, NORTH, WEST
 
 GRID = 32
@@ -261,3 +264,23 @@ def test_what_it_should_tell_apart_it_does(change: int) -> None:
     line = _line(Vector(layout), team, 0)
     team.uavs[0, 0, change] ^= 1
     assert (_line(Vector(layout), team, 0) != line).any()
+
+
+@given(_worlds())
+def test_it_is_the_plain_one_bit_for_bit(world: tuple[Vector, CompactStates, int]) -> None:
+    vector, states, uav = world
+    plain = line_of(states, vector.layout, 0, uav)
+    assert _line(vector, states, uav).tobytes() == plain.tobytes()
+
+
+def test_all_of_a_fleet_are_the_plain_ones_bit_for_bit() -> None:
+    space = load_scenario("paper")
+    env = vector_env(space, 20, observation="vector")
+    generator = np.random.default_rng(0)
+    rows, _ = env.reset(seed=2)
+    for slot in range(60):
+        states = compact_states(env.state, False)
+        for row in np.flatnonzero(env.state.uavs["active"])[slot % 5 :: 5]:
+            plain = line_of(states, layout_of(space), *divmod(row, space.uavs[1]))
+            assert rows[row].tobytes() == plain.tobytes()
+        rows, *_ = env.step(generator.integers(0, 5, env.num_envs))
