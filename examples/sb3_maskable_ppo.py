@@ -29,10 +29,11 @@ def train(minutes: float, missions: int = 64) -> MaskablePPO:
     sizes = {"n_steps": 32, "batch_size": 1024, "n_epochs": 4, "gamma": 0.995}
     network = {"net_arch": [128, 128]}
     model = MaskablePPO("MlpPolicy", env, **sizes, policy_kwargs=network, seed=1)
+    model.learn(1)  # one rollout and one update; the simulator is compiled
     end = time.monotonic() + 60 * minutes
     while (left := end - time.monotonic()) > 0:
         model.lr_schedule = lambda _, left=left: 1e-3 * left / (60 * minutes)
-        model.learn(1, reset_num_timesteps=False)  # one rollout and one update
+        model.learn(1, reset_num_timesteps=False)
     model.save(FILE)
     return model
 

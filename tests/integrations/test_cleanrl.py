@@ -86,11 +86,10 @@ def test_agents_that_end(batches: list[tuple]) -> None:
     assert waits
     # What comes after the end of a UAV does not change what it has learned before.
     rewards, values = torch.rand(5, ROWS), torch.rand(5, ROWS)
-    goes_on = torch.ones(5, ROWS)
-    goes_on[2] = 0.0
-    found = EXAMPLE.advantages(rewards, goes_on, values, torch.rand(ROWS))
+    goes_on = torch.arange(5)[:, None] != 2
+    found = EXAMPLE.advantages(rewards, goes_on, values)
     rewards[3:], values[3:] = 100.0, 50.0
-    again = EXAMPLE.advantages(rewards, goes_on, values, torch.rand(ROWS))
+    again = EXAMPLE.advantages(rewards, goes_on, values)
     assert torch.equal(found[:3], again[:3]) and not torch.equal(found[3:], again[3:])
     assert torch.equal(found[2], (rewards - values)[2])
 

@@ -98,7 +98,7 @@ def trained(tmp_path_factory):
     folder = tmp_path_factory.mktemp("trained")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        return runpy.run_path(str(EXAMPLE))["train"](minutes=0.001, missions=4), folder
+        return runpy.run_path(str(EXAMPLE))["train"](minutes=0, missions=4), folder
 
 
 def test_training_step(trained, monkeypatch: pytest.MonkeyPatch) -> None:
