@@ -83,7 +83,8 @@ class HarvestVectorEnv(VectorEnv):
         world: The nodes and the tables of the channel.
     """
 
-    metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+    autoreset_mode = AutoresetMode.SAME_STEP  # where TorchRL reads it, as in Gymnasium's own
+    metadata = {"autoreset_mode": autoreset_mode}
 
     def __init__(
         self,

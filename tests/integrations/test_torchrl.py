@@ -1,4 +1,4 @@
-"""TorchRL: its ``PettingZooWrapper`` of ``parallel_env``, and ``examples/torchrl_mappo.py``."""
+"""TorchRL: its wrappers of ``parallel_env`` and ``vector_env``, ``examples/torchrl_mappo.py``."""
 
 import runpy
 from pathlib import Path
@@ -29,6 +29,14 @@ def make():
     return made
 
 
+def rows_of(scenario, seed=1):
+    """Four missions in lockstep, with a row for each UAV."""
+    env = torchrl_envs.GymWrapper(
+        dess.vector_env(scenario, 4, seed), categorical_action_encoding=True
+    )
+    return torchrl_envs.TransformedEnv(env, torchrl_envs.ActionMask())
+
+
 def flown(env, missions=1, seed=0):
     """Whole missions with random allowed actions, one after the other."""
     torch.manual_seed(seed)
@@ -56,14 +64,16 @@ def test_step(make, scenario):
     torch.testing.assert_close(after["reward"], terms)
     assert float(after["reward"].sum()) == pytest.approx(record.reward, rel=1e-4)
     assert float(after["info", "collected"].sum()) == pytest.approx(record.collected, rel=1e-4)
+    torchrl_envs.check_env_specs(rows_of(scenario))
 
 
 @fleets
 def test_mask_is_respected(make, scenario):
-    mission = flown(make(scenario))["uav"]
-    allowed = mission["action_mask"]
-    assert allowed.gather(-1, mission["action"].unsqueeze(-1)).all()
-    assert not allowed.all() and (allowed.sum(-1) > 1).any()
+    torch.manual_seed(0)
+    for flight in (make(scenario).rollout(1000)["uav"], rows_of(scenario).rollout(50)):
+        allowed = flight["action_mask"]
+        assert allowed.gather(-1, flight["action"].unsqueeze(-1)).all()
+        assert not allowed.all() and (allowed.sum(-1) > 1).any()
 
 
 def test_agents_that_end(make):
@@ -104,6 +114,25 @@ def test_training_step(tmp_path):
     assert np.array_equal(missions, dess.simulate_batch(SHORT, policy, 3, 4).missions)
 
 
+def follow_vector_env(env):
+    """Check that whole missions are those of a ``vector_env`` with the same seed and actions."""
+    flight = env.rollout(
+        200, auto_reset=False, tensordict=env.reset(seed=7), break_when_any_done=False
+    )
+    rows = dess.vector_env(DRAWN, 4)
+    seen, _ = rows.reset(seed=7)
+    for slot in flight.unbind(1):
+        assert np.array_equal(slot["observation"], seen)
+        seen, rewards, terminated, truncated, info = rows.step(slot["action"].numpy())
+        last = seen.copy()
+        if "final_obs" in info:
+            last[info["_final_obs"]] = np.stack(info["final_obs"][info["_final_obs"]])
+        assert np.array_equal(slot["next", "observation"], last)
+        assert np.array_equal(slot["next", "done"][:, 0], terminated | truncated)
+        assert np.array_equal(slot["next", "reward"][:, 0], rewards.astype(np.float32))
+    assert flight["next", "done"].any()
+
+
 def test_seeds_repeat_episodes(make):
     mission, again, other = (flown(make(SHORT, seed), missions=3) for seed in (1, 1, 2))
     assert (mission == again).all()
@@ -112,6 +141,7 @@ def test_seeds_repeat_episodes(make):
     first, _ = dess.parallel_env(SHORT, mask="info", ended="stay").reset(seed=7)
     rows = torch.from_numpy(np.stack([*first.values()]))
     assert torch.equal(env.reset(seed=7)["uav", "observation"], rows)
+    follow_vector_env(rows_of(DRAWN))
     env.set_seed(5)
     mission = env.rollout(3)["uav", "observation"][0]
     env.set_seed(5)
