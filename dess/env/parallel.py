@@ -9,6 +9,7 @@ while env.agents:
 
 from collections.abc import Iterable, Iterator
 from copy import deepcopy
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from dess.observations.components import Components, component_bounds
 from dess.observations.observer import Observer
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import ACTION_NAMES, ACTIVE, HOVER, TRUNCATED
+from dess.state import ACTION_NAMES, HOVER, TRUNCATED
 
 _MASKS, _ENDED, _MODES = ("observation", "info"), ("leave", "stay"), ("rgb_array", "human")
 
@@ -109,13 +110,13 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         self._components = Components(self._stepper.space)
         self._window = Window() if render_mode == "human" else None
         fleet = self._stepper.space.uavs[1]
-        self.agents: list[str] = []
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
         space = self._observer.space
         self._rows_space = batch_space(space, fleet)
         if not self._mask_in_info:
             allowed = spaces.MultiBinary(len(ACTION_NAMES))
             space = spaces.Dict({"observation": space, "action_mask": allowed})
+        self._gather()
         self.observation_spaces = {agent: deepcopy(space) for agent in self.possible_agents}
         self.action_spaces = {a: spaces.Discrete(len(ACTION_NAMES)) for a in self.possible_agents}
         low, high = (np.tile(bound, fleet) for bound in component_bounds(scenario))
@@ -142,10 +143,10 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
             InputError: If the seed or the replication is out of range.
         """
         self._stepper.start(seed, options)
-        active = self._stepper.state.uavs["active"]
-        self.agents = [agent for agent, flies in self._each(active[0]) if flies or self._stay]
+        self._gather()
         if self._window:
             self.render()
+        active = self._stepper.state.uavs["active"]
         return self._seen(empty_outcome(active.shape), active)
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
@@ -163,31 +164,20 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         """
         if not self.agents and not actions:
             return {}, {}, {}, {}, {}
-        active = self._stepper.state.uavs["active"]
-        acting = active[0].tolist()
-        pilots = [agent for agent, flies in self._each(acting) if flies]
+        pilots = list(compress(self.possible_agents, self._flying))
         if not pilots:
             raise InputError("step: no episode is in progress; call reset() first")
         if not actions.keys() >= set(pilots) or not actions.keys() <= set(self.agents):
             raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {pilots}")
-        chosen = [actions[agent] if flies else HOVER for agent, flies in self._each(acting)]
-        outcome = self._stepper.step(checked_actions([chosen], active.shape))
+        chosen = [actions[agent] if flies else HOVER for agent, flies in self._each(self._flying)]
+        outcome = self._stepper.step(checked_actions([chosen], (1, len(chosen))))
         observations, infos = self._seen(outcome, outcome.acted)
-        over = not active.any()
-        ends = outcome.end[0].tolist()
-        ended = [over] * len(ends) if self._stay else [end != ACTIVE for end in ends]
-        pairs = list(zip(ended, ends, strict=True))
-        given = (
-            observations,
-            self._of_agents(outcome.reward[0].tolist()),
-            self._of_agents(gone and end != TRUNCATED for gone, end in pairs),
-            self._of_agents(gone and end == TRUNCATED for gone, end in pairs),
-            infos,
-        )
-        self.agents = [agent for agent, gone in self._of_agents(ended).items() if not gone]
+        rewards = self._of_agents(outcome.reward[0].tolist())
+        terminated, truncated = map(self._of_agents, self._ends(outcome))
+        self._gather()
         if self._window:
             self.render()
-        return given
+        return observations, rewards, terminated, truncated, infos
 
     def state(self) -> np.ndarray:
         """The state of all possible agents as one vector, for a centralised critic.
@@ -223,13 +213,27 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         if self._window:
             self._window.close()
 
+    def _gather(self) -> None:
+        """Set the agents of the next step: those who fly, or all until the mission is over."""
+        self._flying = self._stepper.state.uavs["active"][0].tolist()
+        self._here = [any(self._flying)] * len(self._flying) if self._stay else self._flying
+        self.agents = list(compress(self.possible_agents, self._here))
+
     def _each(self, values: Iterable[Any]) -> Iterator[tuple[str, Any]]:
         """All possible agents, each with its value."""
         return zip(self.possible_agents, values, strict=True)
 
     def _of_agents(self, values: Iterable[Any]) -> dict[str, Any]:
         """The values of those who are agents in this step."""
-        return {agent: value for agent, value in self._each(values) if agent in self.agents}
+        return dict(compress(self._each(values), self._here))
+
+    def _ends(self, outcome: Outcome) -> tuple[list[bool], list[bool]]:
+        """Who is terminated, and who is truncated."""
+        if not self._stay:
+            return outcome.terminated[0].tolist(), outcome.truncated[0].tolist()
+        over = not self._stepper.state.missions["active"][0]
+        truncated = [over and end == TRUNCATED for end in outcome.end[0].tolist()]
+        return [over and not cut for cut in truncated], truncated
 
     def _seen(self, outcome: Outcome, shown: np.ndarray) -> tuple[dict[str, Any], dict[str, Any]]:
         """The observations and infos of the agents, after a slot."""
