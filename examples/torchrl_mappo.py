@@ -44,11 +44,14 @@ def train(scenario, slots, per_batch=2000, seed=0):
         return_log_prob=True,
         log_prob_key=("uav", "log_prob"),
     )
-    loss = ClipPPOLoss(actor, TensorDictModule(critic, [SEEN], [("uav", "state_value")]))
+    values = TensorDictModule(critic, [SEEN], [("uav", "state_value")])
+    loss = ClipPPOLoss(actor, values, normalize_advantage=True)
     loss.set_keys(**{key: ("uav", name) for key, name in NAMES.items()})
     loss.make_value_estimator(ValueEstimators.GAE, gamma=0.99, lmbda=0.95)
     optimizer = torch.optim.Adam(loss.parameters(), 3e-4)
     for batch in Collector(env, actor, frames_per_batch=per_batch, total_frames=slots):
+        print(f"reward per slot and UAV: {batch['next', 'uav', 'reward'].mean():.3f}")
+        batch["next", "uav", "reward"] /= 100.0  # so that the critic's values are about 1
         with torch.no_grad():
             loss.value_estimator(batch, params=loss.critic_network_params)
         for rows in torch.cat([torch.randperm(len(batch)) for _ in range(4)]).split(250):
@@ -57,7 +60,6 @@ def train(scenario, slots, per_batch=2000, seed=0):
             torch.nn.utils.clip_grad_norm_(loss.parameters(), 1.0)
             optimizer.step()
             optimizer.zero_grad()
-        print(f"reward per slot and UAV: {batch['next', 'uav', 'reward'].mean():.3f}")
     return policy
 
 
