@@ -33,7 +33,7 @@ class HarvestMultiAgentEnv(MultiAgentEnv):
         self.env = parallel_env(**config)
         self.agents = self.possible_agents = self.env.possible_agents
         self.observation_spaces = {
-            agent: spaces.Dict(_renamed(dict(space)))
+            agent: spaces.Dict(_renamed(space))
             for agent, space in self.env.observation_spaces.items()
         }
         self.action_spaces = self.env.action_spaces
@@ -54,7 +54,7 @@ class HarvestMultiAgentEnv(MultiAgentEnv):
         return seen, rewards, terminated, truncated, infos
 
 
-def _renamed(observation: dict[str, Any]) -> dict[str, Any]:
+def _renamed(observation: Any) -> dict[str, Any]:
     return {
         "observations": observation["observation"],
         "action_mask": observation["action_mask"],

@@ -21,7 +21,7 @@ SHORT = {"flying_time": [7, 11], "max_slots": 9, "zone": [0, 0, 2, 2]}
 
 
 def missions(design, count, seed=0):
-    """All slots of some missions with random legal actions: what ``reset`` and ``step`` returned."""
+    """All slots of some missions with random legal actions: what the environment returned."""
     env = HarvestMultiAgentEnv({"scenario": dess.load_scenario("paper", **design)})
     draw, flown = np.random.default_rng(seed), []
     for number in range(count):
