@@ -70,7 +70,7 @@ class Vector:
 
         Where ``uavs[r]`` is -1, they are zeros.
         """
-        out = np.zeros((len(missions), *self.shapes[0]), np.float32)
+        out = np.empty((len(missions), *self.shapes[0]), np.float32)
         tables = self._home, self._nearness, self._around
         _encode(states, missions, uavs, self.layout.grid, self.layout.nodes, *tables, out)
         return (out,)
@@ -106,10 +106,11 @@ def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around,
     near, free = np.empty(_WIDTH, np.float32), np.empty(_WIDTH, np.float32)
     before, total = -1, 0.0
     for row in range(len(rows_mission)):
-        b, i = rows_mission[row], rows_uav[row]
+        b, i, line = rows_mission[row], rows_uav[row], out[row]
+        line[:] = 0.0
         if i < 0:
             continue
-        mission, team, data, line = states.missions[b], states.uavs[b], states.residual[b], out[row]
+        mission, team, data = states.missions[b], states.uavs[b], states.residual[b]
         if b != before:  # the UAVs of a mission share what follows from its data
             before, total = b, 0.0
             for k in range(count):
