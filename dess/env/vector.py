@@ -21,6 +21,8 @@ from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import ACTION_NAMES, TRUNCATED, State
 from dess.view import View, acting_rows
 
+_MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
+
 
 def vector_env(
     scenario: Scenario | ScenarioSpace,
@@ -28,6 +30,7 @@ def vector_env(
     seed: int = 0,
     observation: str = "vector",
     guarded: bool = False,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
 ) -> "HarvestVectorEnv":
     """An environment of many missions that advance together, with a row for each UAV.
 
@@ -39,11 +42,13 @@ def vector_env(
             ``state``, the components of ``dess.observations.components.component_names``.
         guarded: Whether the masks leave out what the return guard does not allow, as for the
             shipped learner.
+        autoreset_mode: Whether the mission after one that has ended starts in the ``SameStep`` or
+            in the ``NextStep``. Gymnasium's wrappers of observations need ``NextStep``.
 
     Raises:
-        InputError: If the seed, the number of missions or the observation is not allowed.
+        InputError: If one of the arguments is not allowed.
     """
-    return HarvestVectorEnv(scenario, num_envs, seed, observation, guarded)
+    return HarvestVectorEnv(scenario, num_envs, seed, observation, guarded, autoreset_mode)
 
 
 def make_vec(num_envs: int, scenario: str | Scenario | ScenarioSpace, **options: Any) -> VectorEnv:
@@ -60,16 +65,18 @@ class HarvestVectorEnv(VectorEnv):
     zeros with a mask of Hover alone, and their actions are ignored.
 
     The episode of a row is its mission: ``terminated`` (quota filled or battery depleted) or
-    ``truncated`` (``max_slots`` reached) of all its UAVs come in the last slot of the mission. The
-    next mission starts in the same step (``metadata["autoreset_mode"]``), and its first
-    observations are returned. The last ones are in ``info["final_obs"]``.
+    ``truncated`` (``max_slots`` reached) of all its UAVs come in the last slot of the mission. By
+    default the next mission starts in the same step (``metadata["autoreset_mode"]``), and its first
+    observations are returned; the last ones are in ``info["final_obs"]``. With ``NextStep`` the
+    last ones are returned; in the step after that the actions of these rows are ignored, the next
+    mission starts, and its first observations are returned with reward 0.
 
     ``info`` has an array with R rows for each of: ``action_mask`` (R, 5) and ``active``, for the
     next step; ``replication`` of the mission in progress; and, after a step, the arrays of
     ``stepper.Outcome``, where ``acted`` tells which rows are transitions of a UAV. When missions
-    have ended, it has ``final_obs`` and ``final_info`` too, with ``_final_obs`` and
-    ``_final_info``, which tell their rows: the record of the mission (``record.MISSION_RECORD``),
-    and that of the UAV (``record.UAV_RECORD``) under ``uav``.
+    have ended, it has ``final_info``, the record of the mission (``record.MISSION_RECORD``) and
+    that of the UAV (``record.UAV_RECORD``) under ``uav``, and, with ``SameStep``, ``final_obs``;
+    ``_final_info`` and ``_final_obs`` tell their rows.
 
     Missions are numbered in the order in which they start: replications 0 to N - 1 at the first
     reset, then one after the other, in a lower environment first. So a seed gives the sequence of
@@ -83,9 +90,6 @@ class HarvestVectorEnv(VectorEnv):
         world: The nodes and the tables of the channel.
     """
 
-    autoreset_mode = AutoresetMode.SAME_STEP  # where TorchRL reads it, as in Gymnasium's own
-    metadata = {"autoreset_mode": autoreset_mode}
-
     def __init__(
         self,
         scenario: Scenario | ScenarioSpace,
@@ -93,9 +97,15 @@ class HarvestVectorEnv(VectorEnv):
         seed: int,
         observation: str,
         guarded: bool,
+        autoreset_mode: AutoresetMode | str,
     ):
+        if autoreset_mode not in [name for mode in _MODES for name in (mode, mode.value)]:
+            allowed = " or ".join(mode.value for mode in _MODES)
+            raise InputError(f"autoreset_mode: {autoreset_mode!r}; allowed: {allowed}")
         if not isinstance(num_envs, int) or num_envs < 1:
             raise InputError(f"num_envs: {num_envs!r} is not allowed; allowed: an integer >= 1")
+        self.autoreset_mode = AutoresetMode(autoreset_mode)  # where TorchRL reads it
+        self.metadata = {"autoreset_mode": self.autoreset_mode}
         self.missions = num_envs
         self._stepper = MissionStepper(scenario, num_envs, seed)
         self._observer = Observer(self._stepper.space, observation, guarded)
@@ -138,17 +148,21 @@ class HarvestVectorEnv(VectorEnv):
             InputError: If ``reset`` was not called first, or the actions are not allowed.
         """
         state, fleet = self.state, self.state.uavs.shape[1]
-        if not state.missions["active"].all():
+        if not state.missions["uavs"].all():
             raise InputError("step: no mission is in progress; call reset() first")
         checked = checked_actions(actions, (self.num_envs,))
+        starting = np.flatnonzero(state.missions["active"] == 0)  # only with NextStep
         outcome = self._stepper.step(checked.reshape(state.uavs.shape))
-        over = np.repeat(state.missions["active"] == 0, fleet)
+        ended = state.missions["active"] == 0
+        ended[starting] = False
+        over, shown, info = np.repeat(ended, fleet), outcome.acted.copy(), self._outcome(outcome)
+        if ended.any():
+            info |= self._final(np.flatnonzero(ended), over, shown)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            starting = np.flatnonzero(ended)
+        self._stepper.launch(starting)
+        shown[starting] = state.uavs["active"][starting]
         truncated = over & (outcome.end.ravel() == TRUNCATED)
-        info = self._outcome(outcome)
-        shown = outcome.acted.copy()
-        if over.any():
-            info |= self._final(over, shown)
-            shown[over[::fleet]] = state.uavs["active"][over[::fleet]]
         observations = self._observe(shown)
         rewards = outcome.reward.ravel()
         return observations, rewards, over & ~truncated, truncated, info | self._present()
@@ -175,21 +189,17 @@ class HarvestVectorEnv(VectorEnv):
             del info[name]
         return {name: part.reshape(self.num_envs, *part.shape[2:]) for name, part in info.items()}
 
-    def _final(self, over: np.ndarray, shown: np.ndarray) -> dict[str, Any]:
-        """The last observations and the records of the missions that are over; starts the next."""
-        done = np.flatnonzero(over[:: self.state.uavs.shape[1]])
-        ended = State(*(part[done] for part in self.state))
-        last, _ = self._observer.observe_all(ended, shown[done])
-        observations = np.empty(self.num_envs, object)
-        observations[over] = np.fromiter(_rows(last), object, int(over.sum()))
-        records = self._by_row(over, self._stepper.records(done))
-        self._stepper.launch(done)
-        return {
-            "final_obs": observations,
-            "_final_obs": over,
-            "final_info": records,
-            "_final_info": over,
-        }
+    def _final(self, ended: np.ndarray, over: np.ndarray, shown: np.ndarray) -> dict[str, Any]:
+        """The records of the missions that have ended, and their last observations if needed."""
+        records = self._by_row(over, self._stepper.records(ended))
+        info: dict[str, Any] = {"final_info": records, "_final_info": over}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            last = State(*(part[ended] for part in self.state))
+            rows, _ = self._observer.observe_all(last, shown[ended])
+            observations = np.empty(self.num_envs, object)
+            observations[over] = np.fromiter(_rows(rows), object, int(over.sum()))
+            info |= {"final_obs": observations, "_final_obs": over}
+        return info
 
     def _by_row(self, over: np.ndarray, records: Records) -> dict[str, Any]:
         """The records of the missions that are over as arrays, with zeros in the other rows."""

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import torch
 from gymnasium.spaces import flatten
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
@@ -205,9 +206,11 @@ def test_gymnasium_makes_it_from_a_name_with_options() -> None:
 # --- Gymnasium's own wrappers ---
 
 
-def quick(observation: str = "vector") -> HarvestVectorEnv:
+def quick(
+    observation: str = "vector", mode: AutoresetMode = AutoresetMode.SAME_STEP
+) -> HarvestVectorEnv:
     """Four environments of quick missions."""
-    return dess.vector_env(QUICK, 4, seed=3, observation=observation)
+    return dess.vector_env(QUICK, 4, 3, observation, autoreset_mode=mode)
 
 
 def test_the_returns_that_gymnasium_counts_are_those_of_the_records() -> None:
@@ -226,6 +229,81 @@ def test_the_returns_that_gymnasium_counts_are_those_of_the_records() -> None:
     assert ended >= 4 * FLEET
 
 
+NEXT_STEP = AutoresetMode.NEXT_STEP
+
+
+def test_the_next_mission_can_start_in_the_next_step() -> None:
+    env = dess.vector_env(QUICK, 4, seed=3, autoreset_mode="NextStep")
+    plain = dess.vector_env(QUICK, 1, seed=3)
+    assert env.metadata["autoreset_mode"] is NEXT_STEP
+    rows, info = env.reset()
+    expected, _ = plain.reset()
+    waited = 0
+    for _ in range(60):  # of the first environment, until its second mission
+        actions = arbitrary_actions(env)
+        rows, rewards, terminated, truncated, info = env.step(actions)
+        over = terminated | truncated
+        if waited:
+            assert not over[:FLEET].any() and not rewards[:FLEET].any()
+            assert not info["acted"][:FLEET].any() and info["active"][:FLEET].any()
+            break
+        *_, gained, ended, cut, last = plain.step(actions[:FLEET])
+        assert np.array_equal(rewards[:FLEET], gained)
+        assert np.array_equal(over[:FLEET], ended | cut)
+        if over[:FLEET].any():
+            waited += 1
+            assert np.array_equal(rows[:FLEET], np.stack(last["final_obs"]))
+            assert env.action_masks()[:FLEET].sum() == FLEET
+            slots = info["final_info"]["slots"][:FLEET], last["final_info"]["slots"]
+            assert np.array_equal(*slots)
+    assert waited and "final_obs" not in info
+
+
+def test_it_refuses_other_modes_of_reset() -> None:
+    for mode in ("Disabled", AutoresetMode.DISABLED, "soon"):
+        with pytest.raises(InputError, match="autoreset_mode.*SameStep or NextStep"):
+            dess.vector_env(QUICK, 2, autoreset_mode=mode)
+
+
+@pytest.mark.parametrize(
+    ("wrapped", "expected"),
+    [
+        (lambda env: wrappers.TransformObservation(env, lambda x: 2 * x), lambda x: 2 * x),
+        (wrappers.FlattenObservation, lambda x: x),
+        (lambda env: wrappers.DtypeObservation(env, np.float64), lambda x: x),
+        (lambda env: wrappers.ReshapeObservation(env, (1, 242)), lambda x: x[:, None]),
+        (lambda env: wrappers.ClipReward(env, 0.0, 1.0), lambda x: x),
+        (wrappers.NormalizeReward, lambda x: x),
+    ],
+)
+def test_wrappers_of_gymnasium_run_on_it(wrapped: Any, expected: Any) -> None:
+    env, plain = wrapped(quick(mode=NEXT_STEP)), quick(mode=NEXT_STEP)
+    assert np.array_equal(env.reset()[0], expected(plain.reset()[0]))
+    for _ in range(60):
+        actions = arbitrary_actions(plain)
+        rows, *_ = env.step(actions)
+        assert np.array_equal(rows, expected(plain.step(actions)[0]))
+
+
+def test_observations_are_normalised() -> None:
+    env = wrappers.NormalizeObservation(quick(mode=NEXT_STEP))
+    rows = [env.reset()[0]] + [env.step(arbitrary_actions(env.unwrapped))[0] for _ in range(60)]
+    assert np.isfinite(rows).all()
+    assert np.abs(np.concatenate(rows[-30:]).mean(0)).max() < 1.0
+
+
+@pytest.mark.parametrize("observation", ["maps", "nodes"])
+def test_dictionaries_are_flattened(observation: str) -> None:
+    plain = quick(observation, NEXT_STEP)
+    env = wrappers.FlattenObservation(quick(observation, NEXT_STEP))
+    rows, expected = env.reset()[0], plain.reset()[0]
+    for _ in range(60):
+        space = plain.single_observation_space
+        assert np.array_equal(rows[4], flatten(space, row_of(expected, 4)))
+        actions = arbitrary_actions(plain)
+        rows, expected = env.step(actions)[0], plain.step(actions)[0]
+
+
 def test_infos_become_a_list() -> None:
     env, plain = wrappers.DictInfoToList(quick()), quick()
     _, infos = env.reset()
@@ -242,6 +320,20 @@ def test_infos_become_a_list() -> None:
         *_, infos = env.step(actions)
         *_, expected = plain.step(actions)
     assert ended > 0
+
+
+def test_arrays_become_tensors() -> None:
+    pytest.importorskip("array_api_compat")  # which this wrapper needs
+    env, plain = wrappers.NumpyToTorch(quick(mode=NEXT_STEP)), quick(mode=NEXT_STEP)
+    rows, info = env.reset()
+    plain.reset()
+    for _ in range(60):
+        assert isinstance(rows, torch.Tensor) and isinstance(info["action_mask"], torch.Tensor)
+        actions = arbitrary_actions(plain)
+        rows, rewards, *_, info = env.step(torch.from_numpy(actions))
+        expected, gained, *_ = plain.step(actions)
+        assert np.array_equal(rows.numpy(), expected)
+        assert np.array_equal(rewards.numpy(), gained)
 
 
 def test_bad_input_is_refused_with_one_line() -> None:
