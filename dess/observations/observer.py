@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from dess.code.kernels import kernel
 from dess.errors import InputError, one_of, shown
 from dess.observations.components import Components, component_bounds
 from dess.observations.maps import Maps
@@ -16,14 +17,13 @@ from dess.observations.nodes import Nodes
 from dess.observations.states import compact_states, layout_of, masks
 from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace
-from dess.state import ACTION_NAMES, HOVER, State
+from dess.state import HOVER, State
 from dess.view import legal_actions
 
 # The encoders that learners use, by the kind of observation, and the names of their arrays.
 ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
 _PARTS = {"nodes": ("vector", "nodes"), "maps": ("local", "global", "battery")}
 KINDS = (*ENCODERS, "state")
-_ONLY_HOVER = np.arange(len(ACTION_NAMES)) == HOVER
 
 # One array, or one for each name.
 Observation = np.ndarray | dict[str, np.ndarray]
@@ -94,8 +94,28 @@ class Observer:
         Returns:
             As ``observe``, with B x I rows.
         """
-        count, fleet = shown.shape
-        uavs = np.where(shown, np.arange(fleet), -1).ravel()
-        observations, allowed = self.observe(state, np.repeat(np.arange(count), fleet), uavs)
-        allowed[~(shown & state.uavs["active"]).ravel()] = _ONLY_HOVER
+        missions, uavs = _rows(shown)
+        observations, allowed = self.observe(state, missions, uavs)
+        _only_hover(state.uavs, missions, uavs, allowed)
         return observations, allowed
+
+
+@kernel
+def _rows(shown):
+    """The missions and UAV indices of all UAVs; -1 for the UAVs that are not shown."""
+    missions, uavs = np.empty(shown.size, np.int64), np.empty(shown.size, np.int64)
+    fleet = shown.shape[1]
+    for row in range(shown.size):
+        b, i = row // fleet, row % fleet
+        missions[row], uavs[row] = b, i if shown[b, i] else -1
+    return missions, uavs
+
+
+@kernel
+def _only_hover(uavs, rows_mission, rows_uav, allowed):
+    """Allow nothing but Hover where no UAV is shown, and where it is not active."""
+    for row in range(len(allowed)):
+        i = rows_uav[row]
+        if i < 0 or not uavs[rows_mission[row], i].active:
+            allowed[row] = False
+            allowed[row, HOVER] = True

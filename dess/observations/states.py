@@ -125,10 +125,14 @@ def _fill(missions, uavs, residual, guarded, out):
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
     """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
-    return unpacked(states.uavs[missions, uavs, MASK])
+    allowed = np.empty((len(missions), 5), np.bool_)
+    _unpack(states.uavs, missions, uavs, allowed)
+    return allowed
 
 
-def unpacked(bits: np.ndarray) -> np.ndarray:
-    """The (R, 5) masks of (R,) numbers of column ``MASK``."""
-    columns = bits.astype(np.uint8)[:, None]
-    return np.unpackbits(columns, axis=1, count=5, bitorder="little").view(np.bool_)
+@kernel
+def _unpack(uavs, rows_mission, rows_uav, allowed):
+    for row in range(len(allowed)):
+        bits = uavs[rows_mission[row], rows_uav[row], MASK]
+        for action in range(5):
+            allowed[row, action] = bits >> action & 1
