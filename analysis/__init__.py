@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from analysis.execution.evaluation import evaluate as evaluate
     from analysis.execution.runner import run_study as run_study
+    from analysis.questions.learning.runs import marl_eval_data as marl_eval_data
+    from analysis.questions.learning.runs import rliable_scores as rliable_scores
     from analysis.results.resimulate import resimulate as resimulate
     from analysis.results.tables import Results as Results
     from analysis.results.tables import load_results as load_results
@@ -32,6 +34,8 @@ _HOME = {
     "Results": "results.tables",
     "load_results": "results.tables",
     "resimulate": "results.resimulate",
+    "rliable_scores": "questions.learning.runs",
+    "marl_eval_data": "questions.learning.runs",
     "summary": "stats.intervals",
     "distribution": "stats.distribution",
     "bootstrap_interval": "stats.bootstrap",

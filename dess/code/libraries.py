@@ -24,7 +24,7 @@ EXTRAS = {
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
-    "examples": ("rliable", "sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),
+    "examples": ("sb3_contrib", "stable_baselines3", "supersuit", "torchrl"),
 }
 _TITLES = {
     "torch": "PyTorch",
