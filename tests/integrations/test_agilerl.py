@@ -1,0 +1,121 @@
+"""AgileRL: its MADDPG on ``parallel_env`` with masks in the infos, in one process.
+
+``PzDummyVecEnv`` starts the next mission by itself, but hands over the infos of the last slot: so
+in the first slot of a mission AgileRL knows only Hover to be allowed.
+"""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dess
+from dess.env.parallel import HarvestEnv
+from dess.state import HOVER
+
+agilerl = pytest.importorskip("agilerl")
+
+from agilerl.vector import PzDummyVecEnv  # noqa: E402
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "agilerl_maddpg.py"
+# Batteries of 7 to 11 % and 9 slots, so that UAVs end apart; the border of the grid forbids moves.
+SHORT = {"flying_time": [7, 11], "max_slots": 9, "zone": [0, 0, 2, 2]}
+UAVS = ["uav_0", "uav_1", "uav_2"]
+
+
+def harvest(**design) -> HarvestEnv:
+    """The environment in the form that AgileRL reads."""
+    return dess.parallel_env(dess.load_scenario("paper", **design), mask="info", ended="stay")
+
+
+def flown(env, slots, seed=1):
+    """Slots with random legal actions: what the environment returned, and the actions."""
+    draw, (observations, infos) = np.random.default_rng(seed), env.reset(seed=seed)
+    for _ in range(slots):
+        allowed = {uav: np.flatnonzero(infos[uav]["action_mask"]) for uav in UAVS}
+        actions = {uav: draw.choice(own, 1) for uav, own in allowed.items()}
+        observations, rewards, terminated, truncated, infos = env.step(actions)
+        yield observations, rewards, terminated, truncated, infos
+
+
+@pytest.fixture(scope="module")
+def training():
+    """The population that the example trains, and the actions in training with their masks."""
+    chosen, reset, step = [], HarvestEnv.reset, HarvestEnv.step
+
+    def watched_reset(env, *arguments, **options):
+        observations, env.infos = reset(env, *arguments, **options)
+        return observations, env.infos
+
+    def watched_step(env, actions):
+        chosen.extend((env.infos[uav]["action_mask"], actions[uav]) for uav in actions)
+        *others, env.infos = step(env, actions)
+        return *others, env.infos
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(HarvestEnv, "reset", watched_reset)
+        patch.setattr(HarvestEnv, "step", watched_step)
+        population = runpy.run_path(str(EXAMPLE))["train"](harvest(**SHORT), steps=256)
+    return population, chosen
+
+
+@pytest.mark.parametrize("design", [{}, {"uavs": 3}])
+def test_reset(design):
+    env = harvest(**design)
+    observations, infos = PzDummyVecEnv(env).reset(seed=1)
+    own, _ = env.reset(seed=1)
+    assert list(observations) == list(infos) == UAVS
+    assert all(np.array_equal(observations[uav], own[uav][None]) for uav in UAVS)
+    assert all(infos[uav]["action_mask"].shape == (5,) for uav in UAVS)
+
+
+def test_step():
+    for _, rewards, *_, infos in flown(PzDummyVecEnv(harvest(**SHORT)), 40):
+        for uav in UAVS:
+            assert rewards[uav] == pytest.approx(infos[uav]["reward_terms"].sum())
+
+
+def test_mask_is_respected(training):
+    masks, actions = (np.array(part) for part in zip(*training[1], strict=True))
+    assert (masks[:, :HOVER] == 0).any() and len(set(actions.tolist())) > 1
+    assert np.all(masks[np.arange(len(masks)), actions] == 1)
+
+
+def test_agents_that_end():
+    waits = 0
+    for observations, rewards, terminated, truncated, infos in flown(
+        PzDummyVecEnv(harvest(uavs=3, flying_time=[5, 30], max_slots=25)), 300
+    ):
+        over = [bool(terminated[uav][0] or truncated[uav][0]) for uav in UAVS]
+        assert len(set(over)) == 1
+        ended = [uav for uav in UAVS if not infos[uav]["active"] and not over[0]]
+        waits += len(ended)
+        assert not any(observations[uav].any() for uav in ended if not rewards[uav][0])
+        assert all(np.flatnonzero(infos[uav]["action_mask"]) == [HOVER] for uav in ended)
+    assert waits
+
+
+def test_smaller_fleets(training):
+    env = harvest(**SHORT)
+    fleets = [sum(info["active"] for info in env.reset()[1].values()) for _ in range(20)]
+    assert set(fleets) == {1, 2, 3}
+    agent = training[0][0]
+    assert agent.agent_ids == UAVS and list(agent.actors) == ["uav"]
+
+
+def test_training_step(training):
+    population, chosen = training
+    assert len(population) == 2 and len(chosen) >= 3 * 256
+    assert all(np.isfinite(agent.fitness).all() and agent.fitness for agent in population)
+    actor = population[0].actors["uav"]
+    assert any(state for state in population[0].actor_optimizers["uav"].state.values())
+    assert all(value.isfinite().all() for value in actor.state_dict().values())
+
+
+def test_seeds_repeat_episodes():
+    def rewards(seed):
+        env = PzDummyVecEnv(harvest(**SHORT))
+        return [[slot[1][uav].item() for uav in UAVS] for slot in flown(env, 30, seed)]
+
+    assert rewards(5) == rewards(5) != rewards(6)
