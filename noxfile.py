@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+from functools import cache
 from pathlib import Path
 
 import nox
@@ -29,6 +30,7 @@ SIDE_BY_SIDE = ("-n", "2", "--dist", "loadfile", "--no-loadscope-reorder")
 RESULTS, REPORTS = Path("results"), Path("build/reports")
 # The tests of a library, and the pins of one that cannot be installed with those of the project.
 LIBRARIES, PINS = Path("tests/integrations"), Path("examples/requirements")
+FORCED = {"pufferlib"}  # asks for libraries that it does not need; its pins are all that it needs
 
 
 def install(session: nox.Session, extras: str = "") -> None:
@@ -109,7 +111,9 @@ def integrations(session: nox.Session) -> None:
     reports, full = Path("build/integrations"), not session.posargs
     shutil.rmtree(reports, ignore_errors=True)
     for name in session.posargs or names:
-        python, tests = environment_of(session, name), LIBRARIES / f"test_{name}.py"
+        own = (PINS / f"{name}.txt").exists()
+        python = environment_of(session, name if own else "together")
+        tests = LIBRARIES / f"test_{name}.py"
         report = f"--junitxml={reports / name}.xml"
         codes = range(6) if full else [0]  # the matrix shows what failed
         run(session, python, "pytest", "-q", str(tests), report, success_codes=codes)
@@ -117,13 +121,15 @@ def integrations(session: nox.Session) -> None:
         run(session, sys.executable, "tests.integrations.matrix", str(reports))
 
 
+@cache
 def environment_of(session: nox.Session, name: str) -> str:
-    """The Python of a virtual environment with a library, shared by all that have no own pins."""
-    own = PINS / f"{name}.txt"
-    folder = Path(".nox", "integrations", name if own.exists() else "together")
+    """The Python of a virtual environment: of a library with pins of its own, or of all others."""
+    own, folder = PINS / f"{name}.txt", Path(".nox", "integrations", name)
     python = str(folder.resolve() / "bin" / "python")
     wanted = ["-e", ".[examples]", "-c", "constraints.txt"]
-    if own.exists():  # its pins replace those of the project
+    if name in FORCED:
+        wanted[1] = ".[learning]"
+    elif own.exists():  # its pins replace those of the project
         pins = Path("constraints.txt").read_text("utf-8").splitlines()
         replaced = {line.split("==")[0] for line in own.read_text("utf-8").splitlines()}
         kept = [line for line in pins if line.split("==")[0] not in replaced]
@@ -133,6 +139,8 @@ def environment_of(session: nox.Session, name: str) -> str:
     if not Path(python).exists():
         run(session, sys.executable, "venv", str(folder))
     run(session, python, "pip", "install", "-q", "pytest", "hypothesis", *wanted)
+    if name in FORCED:
+        run(session, python, "pip", "install", "-q", "--no-deps", "-r", str(own))
     return python
 
 
