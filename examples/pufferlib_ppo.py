@@ -1,27 +1,18 @@
-"""Train PPO's loss on PufferLib's native environment, with PufferLib's policy and sampling."""
+"""Train PPO's loss on PufferLib's native environment, with its policy and sampling."""
 
 import argparse
 
 import torch
 from pufferlib.cleanrl import Policy
-from pufferlib.models import Default
 
 import dess
-from dess.integrations.pufferlib import HarvestPufferEnv
-
-
-class Masked(Default):
-    """PufferLib's default policy; the end of an observation is the mask of the actions."""
-
-    def forward(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        logits, values = super().forward(observations)
-        return logits.masked_fill(observations[:, -5:] == 0, -1e9), values.squeeze(-1)
+from dess.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy
 
 
 def train(env: HarvestPufferEnv, steps: int, seed: int = 0, gamma: float = 0.99) -> Policy:
     """The policy after about ``steps`` rows: batches of 16 slots, four passes over each."""
     torch.manual_seed(seed)
-    policy = Policy(Masked(env))
+    policy = Policy(MaskedPolicy(env))
     adam = torch.optim.Adam(policy.parameters(), lr=1e-3)
     env.reset(seed)
     for _ in range(max(1, steps // (16 * env.num_agents))):

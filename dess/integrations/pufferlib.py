@@ -1,13 +1,16 @@
-"""PufferLib: many missions as one native ``PufferEnv``, whose arrays are written in place.
+"""PufferLib: many missions as one native ``PufferEnv``, and its policy with masked actions.
 
 env = HarvestPufferEnv(scenario, num_envs=64)
+policy = MaskedPolicy(env)
 """
 
 from typing import Any
 
 import numpy as np
 import pufferlib
+import torch
 from gymnasium import spaces
+from pufferlib.models import Default
 
 from dess.env.vector import vector_env
 from dess.scenario import Scenario, ScenarioSpace
@@ -67,6 +70,15 @@ class HarvestPufferEnv(pufferlib.PufferEnv):
     def _write(self, observations: Any, info: dict[str, Any]) -> None:
         self.observations[:, :-5], self.observations[:, -5:] = observations, info["action_mask"]
         self.masks[:] = info["active"]
+
+
+class MaskedPolicy(Default):
+    """PufferLib's default policy; the end of an observation is the mask of the actions."""
+
+    def forward(self, observations: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """The logits, very low for what is not allowed, and the values of the rows."""
+        logits, values = super().forward(observations)
+        return logits.masked_fill(observations[:, -5:] == 0, -1e9), values.squeeze(-1)
 
 
 def _ended(info: dict[str, Any]) -> list[dict[str, Any]]:

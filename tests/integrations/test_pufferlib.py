@@ -14,7 +14,7 @@ pytest.importorskip("pufferlib")
 torch = pytest.importorskip("torch")
 vector = pytest.importorskip("pufferlib.vector")
 
-from dess.integrations.pufferlib import HarvestPufferEnv  # noqa: E402
+from dess.integrations.pufferlib import HarvestPufferEnv, MaskedPolicy  # noqa: E402
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "pufferlib_ppo.py"
 # Batteries of 7 to 11 % and 9 slots, so that UAVs end apart; the border of the grid forbids moves.
@@ -47,7 +47,7 @@ def training():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(HarvestPufferEnv, "step", watched)
         torch.manual_seed(0)
-        first = names["Policy"](names["Masked"](harvest()))
+        first = names["Policy"](MaskedPolicy(harvest()))
         return names["train"](harvest(), steps=1000), first, chosen
 
 
