@@ -148,7 +148,7 @@ class HarvestVectorEnv(VectorEnv):
             InputError: If ``reset`` was not called first, or the actions are not allowed.
         """
         state, fleet = self.state, self.state.uavs.shape[1]
-        if not state.missions["uavs"].all():
+        if not self._stepper.replication:  # none has been launched
             raise InputError("step: no mission is in progress; call reset() first")
         checked = checked_actions(actions, (self.num_envs,))
         starting = np.flatnonzero(state.missions["active"] == 0)  # only with NextStep

@@ -51,7 +51,8 @@ class Nodes:
 @kernel
 def _encode(states, rows_mission, rows_uav, nodes, nearness, around, home, out):
     count = len(nodes)
-    least = np.empty(count, np.int64)
+    least = np.empty(count, np.float32)
+    columns, rows = nodes[:, 0].astype(np.float32), nodes[:, 1].astype(np.float32)
     for row in range(len(rows_mission)):
         team = states.uavs[rows_mission[row]]
         data = states.residual[rows_mission[row]]
@@ -59,12 +60,12 @@ def _encode(states, rows_mission, rows_uav, nodes, nearness, around, home, out):
         if i < 0:
             continue
         me = team[i]
-        nearest_teammates(team, i, nodes, least)
+        nearest_teammates(team, i, columns, rows, least)
         for k in range(count):
             line = out[row, k]
             dx, dy = nodes[k, 0] - me[X], nodes[k, 1] - me[Y]
             slots = abs(dx) + abs(dy)
-            lead = least[k] - slots
+            lead = np.int64(least[k]) - slots
             units = data[k] / DATA_UNIT
             line[0] = units
             line[1] = units * nearness[0, slots]

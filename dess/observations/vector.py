@@ -101,7 +101,8 @@ def _around(slots: np.ndarray) -> np.ndarray:
 @kernel
 def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around, out):
     count = len(nodes)
-    least = np.empty(count, np.int64)
+    least = np.empty(count, np.float32)
+    columns, rows = nodes[:, 0].astype(np.float32), nodes[:, 1].astype(np.float32)
     units = np.empty(count)
     near, free = np.empty(_WIDTH, np.float32), np.empty(_WIDTH, np.float32)
     before, total = -1, 0.0
@@ -122,13 +123,13 @@ def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around,
         line[at + x] = 1.0
         line[at + grid + y] = 1.0
         at += 2 * grid
-        nearest_teammates(team, i, nodes, least)
+        nearest_teammates(team, i, columns, rows, least)
         near[:] = 0.0
         free[:] = 0.0
         for k in range(count):
             dx, dy = nodes[k, 0] - x, nodes[k, 1] - y
             slots = abs(dx) + abs(dy)
-            lead = least[k] - slots
+            lead = np.int64(least[k]) - slots
             line[at + k] = units[k]
             line[at + count + k] = units[k] * nearness[slots]
             line[at + 2 * count + k] = _LEADS[min(max(lead, -_LEAD), _LEAD) + _LEAD]
@@ -180,14 +181,17 @@ def spare_slots(me, home, slots):
 
 
 @inlined
-def nearest_teammates(team, i, nodes, least):
-    """Write the slots from each node to the flying teammate of UAV ``i`` that is nearest to it."""
+def nearest_teammates(team, i, columns, rows, least):
+    """Write the slots from each node to the flying teammate of UAV ``i`` that is nearest to it.
+
+    All are float32, in which these numbers are exact: so a vector register holds eight nodes.
+    """
     least[:] = 10_000
     for j in range(len(team)):
         if j != i and team[j, ACTIVE] and not team[j, CHARGING]:
-            x, y = np.int64(team[j, X]), np.int64(team[j, Y])
-            for k in range(len(nodes)):
-                least[k] = min(least[k], abs(nodes[k, 0] - x) + abs(nodes[k, 1] - y))
+            x, y = np.float32(team[j, X]), np.float32(team[j, Y])
+            for k in range(len(least)):
+                least[k] = min(least[k], abs(columns[k] - x) + abs(rows[k] - y))
 
 
 @inlined
