@@ -126,6 +126,8 @@ def environment_of(session: nox.Session, name: str) -> str:
     """The Python of a virtual environment: of a library with pins of its own, or of all others."""
     own, folder = PINS / f"{name}.txt", Path(".nox", "integrations", name)
     python = str(folder.resolve() / "bin" / "python")
+    if not Path(python).exists():
+        run(session, sys.executable, "venv", str(folder))
     wanted = ["-e", ".[examples]", "-c", "constraints.txt"]
     if name in FORCED:
         wanted[1] = ".[learning]"
@@ -133,11 +135,9 @@ def environment_of(session: nox.Session, name: str) -> str:
         pins = Path("constraints.txt").read_text("utf-8").splitlines()
         replaced = {line.split("==")[0] for line in own.read_text("utf-8").splitlines()}
         kept = [line for line in pins if line.split("==")[0] not in replaced]
-        constraints = Path(session.create_tmp(), f"{name}.txt")
+        constraints = folder / "constraints.txt"
         constraints.write_text("\n".join(kept), "utf-8")
         wanted = ["-e", ".", "-r", str(own), "-c", str(constraints)]
-    if not Path(python).exists():
-        run(session, sys.executable, "venv", str(folder))
     run(session, python, "pip", "install", "-q", "pytest", "hypothesis", *wanted)
     if name in FORCED:
         run(session, python, "pip", "install", "-q", "--no-deps", "-r", str(own))

@@ -28,7 +28,7 @@ def suite(**outcomes: str) -> ElementTree.Element:
 def pins(path: Path) -> dict[str, str]:
     """The exact versions in a file, by the canonical names of the distributions."""
     lines = [line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")]
-    pairs = [re.fullmatch(r"([\w.-]+)(?:\[\w,]+\])?==([^\s=*]+)", line) for line in lines]
+    pairs = [re.fullmatch(r"([\w.-]+)(?:\[[\w,]+\])?==([^\s=*]+)", line) for line in lines]
     assert all(pairs), path
     return {canonicalize_name(pair[1]): pair[2] for pair in pairs if pair}
 
