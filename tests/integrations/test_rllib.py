@@ -53,6 +53,7 @@ def training():
         patch.setattr(HarvestMultiAgentEnv, "reset", watched_reset)
         patch.setattr(HarvestMultiAgentEnv, "step", watched_step)
         learner = runpy.run_path(str(EXAMPLE))["learner"]("paper", batch=200, **SHORT)
+        actions.clear()  # RLlib has tried the environment with any actions
         before = learner.get_module("uav").get_state()
         result = learner.train()
         yield learner, before, learner.get_module("uav").get_state(), actions, result
