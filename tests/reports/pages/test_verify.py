@@ -225,7 +225,7 @@ def test_what_the_results_were_made_with_is_compared_with_what_is_here(results: 
     changes = {"code": code, "policies": [other, *evidence.policies[1:]]}
     found = check_records(evidence.model_copy(update=changes), ALL, 0)
     assert found.notes == [
-        "made by other code of dess.rules, dess.observations.guard",
+        "made by other code of dess.observations.guard, dess.rules",
         "made by other weights of random",
     ]
     assert found.differing == []
