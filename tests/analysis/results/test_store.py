@@ -159,7 +159,7 @@ def test_other_code_is_refused_by_its_modules(out, tmp_path):
     _simulated_by_other_code(out, "dess.rules", "dess.observations.guard")
     before = files_of(out)
     line = (
-        "made by other code of dess.rules, dess.observations.guard; allowed: .*, or --accept-code"
+        "made by other code of dess.observations.guard, dess.rules; allowed: .*, or --accept-code"
     )
     with pytest.raises(InputError, match=line):
         run_study(small_study(tmp_path), out)
