@@ -157,7 +157,7 @@ ADDRESSES = {
     "inproc://": "cannot be reached",
     "tls://127.0.0.1:80": "TLS expects",
     "tcp://[::1:4": "ipv6 needs brackets",
-    "tcp://127.0.0.1:99999": "Timed out trying to connect",
+    "tcp://127.0.0.1:99999": "cannot be reached",
     "silent": "no scheduler answers within",
     "worker": "is a Worker; allowed: tcp://HOST:PORT of a scheduler",
 }
