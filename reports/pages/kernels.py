@@ -80,7 +80,7 @@ class Kernels:
                 with temporary_folder(Path(gettempdir()), HOME) as home:
                     client = self._client(report, reports, home)
                     self._clients.append(client)
-                    _run(client, _environment(home))
+                    _run(client, home)
                 return
             except CellExecutionError as error:
                 if error.ename == InputError.__name__:
@@ -125,9 +125,19 @@ def _cell(report: Report) -> str:
     return f"report {report.name}: cell {number + 1} of {len(report.cells)} ({first_line})"
 
 
-def _run(client: NotebookClient, environment: dict[str, str]) -> None:
+def _run(client: NotebookClient, home: Path) -> None:
+    """Run a notebook; what the kernel itself reports goes to a file, not to the user's terminal.
+
+    Raises:
+        RuntimeError: If the kernel does not start or dies, with the last line that it reported.
+    """
+    log = home / "kernel.log"
     try:
-        client.execute(env=environment, cleanup_kc=True)
+        with open(log, "wb") as stream:
+            client.execute(env=_environment(home), cleanup_kc=True, stdout=stream, stderr=stream)
+    except RuntimeError as error:
+        reported = log.read_text("utf-8", "replace").strip().splitlines()
+        raise RuntimeError(": ".join([str(error), *reported[-1:]])) from error
     finally:  # nbclient leaves its exit handler behind when a kernel dies at its start
         atexit.unregister(client._cleanup_kernel)
 

@@ -454,6 +454,16 @@ def test_a_kernel_that_dies_in_a_cell_is_not_started_again(results: Path, tmp_pa
         render(["mission"], results, tmp_path, notebooks=notebooks)
 
 
+def test_what_a_kernel_reports_is_part_of_the_failure(
+    results: Path, tmp_path: Path, capfd: pytest.CaptureFixture
+) -> None:
+    source = FAILING.replace("raise", r"import os; os.write(2, b'one\nmemory\n'); os._exit(1) #")
+    notebooks = write_notebooks(tmp_path / "notebooks", mission=source)
+    with pytest.raises(ReportError, match="Kernel died: memory; partial page"):
+        render(["mission"], results, tmp_path, notebooks=notebooks)
+    assert capfd.readouterr().err == ""
+
+
 def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
     results: Path, tmp_path: Path
 ) -> None:
