@@ -68,13 +68,16 @@ class View:
 
 @kernel
 def legal_actions(missions, uavs, rows_mission, rows_uav):
-    """(R, 5) mask of the actions that stay on the grid; only Hover for a charging UAV."""
+    """(R, 5) mask of the actions that stay on the grid.
+
+    Only Hover is allowed for a UAV that charges or is not active, and where its index is -1.
+    """
     legal = np.zeros((len(rows_mission), 5), np.bool_)
     for row in range(len(rows_mission)):
-        b = rows_mission[row]
-        u = uavs[b, rows_uav[row]]
+        b, i = rows_mission[row], rows_uav[row]
+        u = uavs[b, i]
         legal[row, HOVER] = True
-        if not u.charging:
+        if i >= 0 and u.active and not u.charging:
             for action in range(4):
                 x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
                 legal[row, action] = on_grid(missions[b], x, y)

@@ -7,14 +7,12 @@ while env.agents:
     observations, rewards, terminated, truncated, infos = env.step(actions)
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from itertools import compress
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector.utils import batch_space, iterate
 from pettingzoo import ParallelEnv
 
 from dess.env.render import Window, draw
@@ -22,7 +20,7 @@ from dess.env.stepper import MissionStepper, Outcome, checked_actions, empty_out
 from dess.errors import InputError, one_of
 from dess.errors import shown as quoted
 from dess.observations.components import Components, component_bounds
-from dess.observations.observer import Observer
+from dess.observations.observer import Observer, rows_of
 from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES, HOVER, TRUNCATED
@@ -112,7 +110,6 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         fleet = self._stepper.space.uavs[1]
         self.possible_agents = [f"uav_{i}" for i in range(fleet)]
         space = self._observer.space
-        self._rows_space = batch_space(space, fleet)
         if not self._mask_in_info:
             allowed = spaces.MultiBinary(len(ACTION_NAMES))
             space = spaces.Dict({"observation": space, "action_mask": allowed})
@@ -164,12 +161,14 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         """
         if not self.agents and not actions:
             return {}, {}, {}, {}, {}
-        pilots = list(compress(self.possible_agents, self._flying))
-        if not pilots:
+        if not self._flying:
             raise InputError("step: no episode is in progress; call reset() first")
-        if not actions.keys() >= set(pilots) or not actions.keys() <= set(self.agents):
+        if not self._flying.keys() <= actions.keys() <= self._here.keys():
+            pilots = list(self._flying)
             raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {pilots}")
-        chosen = [actions[agent] if flies else HOVER for agent, flies in self._each(self._flying)]
+        chosen = [HOVER] * len(self.possible_agents)
+        for agent, i in self._flying.items():
+            chosen[i] = actions[agent]
         outcome = self._stepper.step(checked_actions([chosen], (1, len(chosen))))
         observations, infos = self._seen(outcome, outcome.acted)
         rewards = self._of_agents(outcome.reward[0].tolist())
@@ -215,17 +214,15 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
 
     def _gather(self) -> None:
         """Set the agents of the next step: those who fly, or all until the mission is over."""
-        self._flying = self._stepper.state.uavs["active"][0].tolist()
-        self._here = [any(self._flying)] * len(self._flying) if self._stay else self._flying
-        self.agents = list(compress(self.possible_agents, self._here))
+        active = self._stepper.state.uavs["active"][0].tolist()
+        uavs = {agent: i for i, agent in enumerate(self.possible_agents)}
+        self._flying = {agent: i for agent, i in uavs.items() if active[i]}
+        self._here = uavs if self._stay and self._flying else self._flying
+        self.agents = list(self._here)
 
-    def _each(self, values: Iterable[Any]) -> Iterator[tuple[str, Any]]:
-        """All possible agents, each with its value."""
-        return zip(self.possible_agents, values, strict=True)
-
-    def _of_agents(self, values: Iterable[Any]) -> dict[str, Any]:
-        """The values of those who are agents in this step."""
-        return dict(compress(self._each(values), self._here))
+    def _of_agents(self, values: Sequence[Any]) -> dict[str, Any]:
+        """The values, one for each UAV, of those who are agents in this step."""
+        return {agent: values[i] for agent, i in self._here.items()}
 
     def _ends(self, outcome: Outcome) -> tuple[list[bool], list[bool]]:
         """Who is terminated, and who is truncated."""
@@ -240,17 +237,16 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         state = self._stepper.state
         rows, masks = self._observer.observe_all(state, shown)
         masks = masks.view(np.int8)
-        observed = iterate(self._rows_space, rows)
-        if not self._mask_in_info:
-            observed = (
+        observed, infos = rows_of(rows), list(_infos(outcome, state.uavs["active"][0]))
+        if self._mask_in_info:
+            for info, mask in zip(infos, masks, strict=True):
+                info["action_mask"] = mask
+        else:
+            observed = [
                 {"observation": own, "action_mask": mask}
                 for own, mask in zip(observed, masks, strict=True)
-            )
-        infos = self._of_agents(_infos(outcome, state.uavs["active"][0]))
-        if self._mask_in_info:
-            for agent, mask in self._of_agents(masks).items():
-                infos[agent]["action_mask"] = mask
-        return self._of_agents(observed), infos
+            ]
+        return self._of_agents(observed), self._of_agents(infos)
 
 
 def _check(name: str, value: str, allowed: tuple[str, ...]) -> None:

@@ -5,7 +5,6 @@ observations, info = env.reset()
 observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) actions
 """
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 from dess.env.stepper import MissionStepper, Outcome, checked_actions
 from dess.errors import InputError
-from dess.observations.observer import Observation, Observer
+from dess.observations.observer import Observation, Observer, rows_of
 from dess.record import Records
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import ACTION_NAMES, TRUNCATED, State
@@ -197,7 +196,7 @@ class HarvestVectorEnv(VectorEnv):
             last = State(*(part[ended] for part in self.state))
             rows, _ = self._observer.observe_all(last, shown[ended])
             observations = np.empty(self.num_envs, object)
-            observations[over] = np.fromiter(_rows(rows), object, int(over.sum()))
+            observations[over] = np.fromiter(rows_of(rows), object, int(over.sum()))
             info |= {"final_obs": observations, "_final_obs": over}
         return info
 
@@ -217,12 +216,3 @@ class HarvestVectorEnv(VectorEnv):
             "active": self.state.uavs["active"].ravel(),
             "replication": np.repeat(self.state.missions["replication"], fleet),
         }
-
-
-def _rows(observations: Observation) -> Iterator[Any]:
-    """The rows of observations, one by one."""
-    if not isinstance(observations, dict):
-        return iter(observations)
-    names = tuple(observations)
-    rows = zip(*observations.values(), strict=True)
-    return (dict(zip(names, row, strict=True)) for row in rows)

@@ -17,7 +17,7 @@ from dess.observations.nodes import Nodes
 from dess.observations.states import compact_states, layout_of, masks
 from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace
-from dess.state import HOVER, State
+from dess.state import State
 from dess.view import legal_actions
 
 # The encoders that learners use, by the kind of observation, and the names of their arrays.
@@ -70,7 +70,7 @@ class Observer:
 
         Returns:
             The observations, arrays with R rows, and the (R, 5) masks of the allowed actions as
-            booleans. Only Hover is allowed for a UAV that charges or is not active.
+            booleans. Only Hover is allowed for a UAV that charges or is not active, and for -1.
         """
         if self.kind == "state":
             parts = self._encoder.encode(state, missions, uavs)
@@ -94,10 +94,7 @@ class Observer:
         Returns:
             As ``observe``, with B x I rows.
         """
-        missions, uavs = _rows(shown)
-        observations, allowed = self.observe(state, missions, uavs)
-        _only_hover(state.uavs, missions, uavs, allowed)
-        return observations, allowed
+        return self.observe(state, *_rows(shown))
 
 
 @kernel
@@ -111,11 +108,10 @@ def _rows(shown):
     return missions, uavs
 
 
-@kernel
-def _only_hover(uavs, rows_mission, rows_uav, allowed):
-    """Allow nothing but Hover where no UAV is shown, and where it is not active."""
-    for row in range(len(allowed)):
-        i = rows_uav[row]
-        if i < 0 or not uavs[rows_mission[row], i].active:
-            allowed[row] = False
-            allowed[row, HOVER] = True
+def rows_of(observations: Observation) -> list[Any]:
+    """The observations of one UAV after the other."""
+    if not isinstance(observations, dict):
+        return list(observations)
+    names = tuple(observations)
+    rows = zip(*observations.values(), strict=True)
+    return [dict(zip(names, row, strict=True)) for row in rows]

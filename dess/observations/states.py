@@ -124,7 +124,10 @@ def _fill(missions, uavs, residual, guarded, out):
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:
-    """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``."""
+    """The (R, 5) mask of the allowed actions of UAV ``uavs[r]`` in state ``missions[r]``.
+
+    Where ``uavs[r]`` is -1, only Hover is allowed.
+    """
     allowed = np.empty((len(missions), 5), np.bool_)
     _unpack(states.uavs, missions, uavs, allowed)
     return allowed
@@ -133,6 +136,7 @@ def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.n
 @kernel
 def _unpack(uavs, rows_mission, rows_uav, allowed):
     for row in range(len(allowed)):
-        bits = uavs[rows_mission[row], rows_uav[row], MASK]
+        i = rows_uav[row]
+        bits = uavs[rows_mission[row], i, MASK] if i >= 0 else 1 << HOVER
         for action in range(5):
             allowed[row, action] = bits >> action & 1
