@@ -4,9 +4,10 @@ import re
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic_core import to_jsonable_python
 
 from dess.errors import form_of, kind_of
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
 
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
@@ -114,16 +115,21 @@ class Field(NamedTuple):
 
 def fields(space: ScenarioSpace) -> list[Field]:
     """Every field of a scenario, in the order of the model."""
-    values, default = space.model_dump(mode="json"), ScenarioSpace.of().model_dump(mode="json")
+    default = ScenarioSpace.of()
     return [
-        Field(name, *_meaning(name), _allowed(space, name), _single(default[name]), _single(value))
-        for name, value in values.items()
+        Field(
+            name,
+            *_meaning(name),
+            _allowed(space, name),
+            *(_single(to_jsonable_python(side.value(name))) for side in (default, space)),
+        )
+        for name in fields_of(ScenarioSpace)
     ]
 
 
 def _meaning(name: str) -> tuple[str, str]:
     """What a field is, and its unit, from its description ``meaning [unit] (symbol): form``."""
-    description = ScenarioSpace.model_fields[name].description or ""
+    description = fields_of(ScenarioSpace)[name].description or ""
     meaning = description.partition(": ")[0]
     unit = re.search(r" \[([^\],]+)\]", meaning)
     return (meaning.replace(unit[0], ""), unit[1]) if unit else (meaning, "")
@@ -132,7 +138,7 @@ def _meaning(name: str) -> tuple[str, str]:
 def _allowed(space: ScenarioSpace, name: str) -> str:
     """The allowed values in words, such as ``an integer 1..16 or [low, high]``."""
     if name not in (*SAMPLED, "pads"):
-        return form_of(ScenarioSpace.model_fields[name])
+        return form_of(fields_of(ScenarioSpace)[name])
     low, high = space.limits(name)
     kind = kind_of(Scenario.model_fields[name])
     return f"{kind} {low:g}..{high:g}" + (" or [low, high]" if name in SAMPLED else "")

@@ -32,17 +32,20 @@ def needed_draws(
         state.missions[:] = constants_of(scenario)
         state.missions["seed"], state.missions["replication"] = seed, replication
         mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
-        rules.launch(mission, ranges_of(scenario), uavs, residual)
+        sensors = state.sensors[0]
+        rules.launch(mission, ranges_of(scenario), uavs, residual, sensors)
         scratch = empty_scratch(len(uavs), len(residual))
         counts = _count(
-            mission, uavs, residual, actions[replication], *world_of(scenario), *scratch
+            mission, uavs, residual, sensors, actions[replication], *world_of(scenario), *scratch
         )  # fmt: skip
         blocks, deviates = blocks + counts[0], deviates + counts[1]
     return blocks, deviates
 
 
 @kernel
-def _count(mission, uavs, residual, actions, nodes, mean_snr, order, means, batches, search):
+def _count(
+    mission, uavs, residual, sensors, actions, nodes, mean_snr, order, means, batches, search
+):  # fmt: skip
     """Simulate one mission and count."""
     arrivals = np.empty(len(nodes), np.int64)
     reach = mission.shadowing_deviation * streams.MAX_NORMAL
@@ -57,8 +60,9 @@ def _count(mission, uavs, residual, actions, nodes, mean_snr, order, means, batc
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
             rules.communicate(
-                mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
-            )
+                mission, uavs, residual, sensors,
+                nodes, mean_snr, order, means, batches, search, n,
+            )  # fmt: skip
             for i in range(mission.uavs):
                 if not uavs[i].active or uavs[i].charging or uavs[i].served < 0:
                     continue

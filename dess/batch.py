@@ -20,7 +20,7 @@ import numpy as np
 from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.record import Records, empty_records, write_record
+from dess.record import Records, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
     check_seed,
@@ -81,7 +81,11 @@ def simulate_batch(
     kinds = np.array([row[id(space)] for space in scenario], np.int64)
     spaces = spaces_of([*distinct.values()])
     team = team_of(policy, spaces)
-    records = empty_records(len(numbers), max((space.uavs[1] for space in spaces), default=0))
+    fleet, is_extended = (
+        max((s.uavs[1] for s in spaces), default=0),
+        any(s.is_extended for s in spaces),
+    )
+    records = empty_records(len(numbers), fleet, is_extended)
     stop = Event()
 
     def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:
@@ -173,7 +177,7 @@ def _next_mission(b, job_of, queue, source, state):
     job_of[b] = job
     state.missions[b] = constants[which[job]]
     mission.replication = numbers[job]
-    rules.launch(mission, ranges[which[job]], state.uavs[b], state.residual[b])
+    rules.launch(mission, ranges[which[job]], state.uavs[b], state.residual[b], state.sensors[b])
 
 
 @kernel
@@ -181,17 +185,20 @@ def _advance(job_of, queue, source, state, world, scratch, records):
     """Advance every mission by one slot; a mission that ends is recorded and replaced."""
     nodes, mean_snr, order, means = world
     batches, search = scratch
-    missions, uavs, residual = state
+    missions, uavs, residual, sensors = state
     arrivals = np.empty(len(nodes), np.int64)
     for b in range(len(missions)):
         if job_of[b] < 0:
             continue
         mission, team, data = missions[b], uavs[b], residual[b]
         rules.advance(
-            mission, team, data, arrivals, nodes, mean_snr, order, means, batches, search
+            mission, team, data, sensors[b], arrivals,
+            nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]
             write_record(mission, team, data, records.missions[job], records.uavs[job])
+            if mission.is_extended:
+                write_operations(mission, team, sensors[b], records.operations[job])
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

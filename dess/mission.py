@@ -28,7 +28,7 @@ import simpy
 
 from dess import rules
 from dess.channel import empty_scratch, world_of
-from dess.record import EventLog, MissionRecord, empty_records, write_record
+from dess.record import EventLog, MissionRecord, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
     BATTERY,
@@ -108,7 +108,8 @@ class MissionModel:
         self.state.missions["replication"] = replication
         self.mission = self.state.missions[0]
         self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
-        rules.launch(self.mission, ranges_of(scenario), self.uavs, self.residual)
+        self.sensors = self.state.sensors[0]
+        rules.launch(self.mission, ranges_of(scenario), self.uavs, self.residual, self.sensors)
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
         self.zone = ChargingZone(self.env, int(self.mission["pads"]), log)
@@ -122,9 +123,14 @@ class MissionModel:
             self.env.process(self._uav(i))
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
-        records = empty_records(1, len(self.fleet))
+        is_extended = bool(self.mission["is_extended"])
+        records = empty_records(1, len(self.fleet), is_extended)
         write_record(self.mission, self.uavs, self.residual, records.missions[0], records.uavs[0])
-        return MissionRecord(records.missions[0], records.uavs[0], self.log)
+        operations = None
+        if is_extended:
+            operations = records.operations[0]
+            write_operations(self.mission, self.uavs, self.sensors, operations)
+        return MissionRecord(records.missions[0], records.uavs[0], self.log, operations)
 
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
@@ -144,7 +150,9 @@ class MissionModel:
             self._log_moves()
             for n in range(1, m + 1):
                 yield env.timeout(start + n / m - env.now)
-                rules.communicate(mission, uavs, self.residual, *self.world, *self.scratch, n)
+                rules.communicate(
+                    mission, uavs, self.residual, self.sensors, *self.world, *self.scratch, n
+                )
                 self._log_communications(start, n, m)
             rules.arrive(mission, self.residual, self.arrivals)
             self._log_arrivals()

@@ -44,6 +44,26 @@ UAV_RECORD = np.dtype(
     ]
 )
 
+# What extended scenarios measure beyond the paper's metrics; nan where a scenario does not measure
+# it. Times are in mission slots, data in data units.
+OPERATIONS = np.dtype(
+    [
+        ("age", np.float64),  # age of information, mean over time and nodes
+        ("peak_age", np.float64),  # mean of the ages just before newer data were collected
+        ("age_p99", np.float64),  # 99th percentile of the age over time and nodes
+        ("latency", np.float64),  # mean time from the generation to the delivery of a packet
+        ("latency_p99", np.float64),
+        ("generated", np.float64),  # packets
+        ("delivered", np.float64),  # packets
+        ("lost", np.float64),  # data lost by full buffers and failures
+        ("queue", np.float64),  # UAVs that wait for a pad, mean over time
+        ("waiting", np.float64),  # mean time from the request for a pad to its grant or withdrawal
+        ("utilisation", np.float64),  # mean share of the pads in use
+        ("failures", np.float64),  # of UAVs
+        ("slots_grounded", np.float64),  # of UAVs under repair
+    ]
+)
+
 # Columns of the event log, and the types of their arrays.
 _EVENT_COLUMNS = {
     "time": np.float64,
@@ -70,10 +90,17 @@ EVENT_NAMES = (
 
 
 class Records(NamedTuple):
-    """The records of N missions: ``missions`` (N,) and ``uavs`` (N, I)."""
+    """The records of N missions with up to I UAVs.
+
+    Attributes:
+        missions: (N,) ``MISSION_RECORD``.
+        uavs: (N, I) ``UAV_RECORD``.
+        operations: (N,) ``OPERATIONS`` if one of the scenarios is extended, otherwise (0,).
+    """
 
     missions: np.ndarray
     uavs: np.ndarray
+    operations: np.ndarray = np.zeros(0, OPERATIONS)
 
 
 @kernel
@@ -115,9 +142,17 @@ def write_record(mission, uavs, residual, record, uav_records):
     record.collection_ratio_and_communication = record.collection_ratio * record.success
 
 
-def empty_records(missions: int, uavs: int) -> Records:
-    """Zeroed records of that many missions and UAVs per mission."""
-    return Records(np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD))
+@kernel
+def write_operations(mission, uavs, sensors, out):
+    """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
+
+
+def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Records:
+    """Zeroed records of that many missions and UAVs per mission; ``operations`` are nan."""
+    operations = np.full(missions if is_extended else 0, np.nan, OPERATIONS)
+    return Records(
+        np.zeros(missions, MISSION_RECORD), np.zeros((missions, uavs), UAV_RECORD), operations
+    )
 
 
 @dataclass
@@ -174,15 +209,19 @@ class MissionRecord:
         metrics: ``MISSION_RECORD`` scalar.
         uavs: (I,) ``UAV_RECORD`` array.
         events: The event log, or None.
+        operations: ``OPERATIONS`` scalar of an extended scenario, or None.
     """
 
     metrics: np.void
     uavs: np.ndarray
     events: EventLog | None = None
+    operations: np.void | None = None
 
     def __getattr__(self, name: str) -> Any:
         if name in (MISSION_RECORD.names or ()):
             return self.metrics[name].item()
+        if name in (OPERATIONS.names or ()) and self.operations is not None:
+            return self.operations[name].item()
         raise AttributeError(name)
 
     def uav_rows(self) -> list[dict[str, Any]]:

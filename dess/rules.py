@@ -60,7 +60,7 @@ def zone_number(mission, x, y):
 
 
 @kernel
-def launch(mission, ranges, uavs, residual):
+def launch(mission, ranges, uavs, residual, sensors):
     """Start a mission: draw its parameters, start cells and initial data.
 
     Args:
@@ -68,6 +68,7 @@ def launch(mission, ranges, uavs, residual):
         ranges: (4, 2) ranges of the sampled parameters.
         uavs: (I,) ``UAV`` records, overwritten.
         residual: (K,) residual data [data units], overwritten.
+        sensors: (K,) ``SENSOR`` records, overwritten.
     """
     draw_parameters(mission, ranges)
     mission.slot = 0
@@ -83,6 +84,8 @@ def launch(mission, ranges, uavs, residual):
             )
         residual[k] = mission.initial_low + spread * streams.uniform(words[k % 4])
         mission.initial += residual[k]
+        sensors[k].silent_until = 0
+        sensors[k].emptied = 0.0
 
 
 @kernel
@@ -242,13 +245,13 @@ def spend(mission, uavs):
 
 @inlined
 def communicate(
-    mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
+    mission, uavs, residual, sensors, nodes, mean_snr, order, means, batches, search, n
 ):  # fmt: skip
     """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
     among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
-    UAV are set. The arguments after ``residual`` are the arrays of ``World`` and ``Scratch``.
+    UAV are set. The arguments after ``sensors`` are the arrays of ``World`` and ``Scratch``.
     """
     for i in range(mission.uavs):
         u = uavs[i]
@@ -343,7 +346,7 @@ def settle(mission, uavs):
 
 @kernel
 def advance(
-    mission, uavs, residual, arrivals, nodes, mean_snr, order, means, batches, search
+    mission, uavs, residual, sensors, arrivals, nodes, mean_snr, order, means, batches, search
 ):  # fmt: skip
     """Run one mission slot with the actions in ``uavs``, in the order of Section III-C."""
     resolve(mission, uavs)
@@ -351,7 +354,7 @@ def advance(
     spend(mission, uavs)
     for n in range(1, mission.communication_slots + 1):
         communicate(
-            mission, uavs, residual, nodes, mean_snr, order, means, batches, search, n
+            mission, uavs, residual, sensors, nodes, mean_snr, order, means, batches, search, n
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)

@@ -14,14 +14,24 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    SerializerFunctionWrapHandler,
     ValidationError,
     field_validator,
+    model_serializer,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.sea import Cell, nodes_in
+from dess.sections.age import Age
+from dess.sections.arrivals import Arrivals
+from dess.sections.charging import Charging
+from dess.sections.failures import Failures
+from dess.sections.fleet import UavType
+from dess.sections.section import Integer, Number, Section, tuples
+from dess.sections.wind import Wind
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
@@ -31,16 +41,15 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 
+# The fields that go beyond the paper.
+EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
+
 # Largest amount of initial data of a node [data units].
 _MOST_DATA = 10**9
 
 # Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
 _CHANNEL_LIMIT = 2**30
 
-# A strict integer: 2.0, true and "2" are refused.
-Integer = Annotated[int, Field(strict=True)]
-# A finite number, integer or not.
-Number = Annotated[float, Field(allow_inf_nan=False)]
 # A reward per event. Sums of many of them are still finite, and so are their squares.
 Reward = Annotated[float, Field(ge=-(10**9), le=10**9, allow_inf_nan=False)]
 
@@ -129,15 +138,33 @@ class _Constants(BaseModel):
     reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
     reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
 
-    @field_validator("nodes", "zone", mode="before")
+    # Beyond the paper; off by default
+    arrivals: Arrivals = Arrivals.off()
+    age: Age = Age.off()
+    charging: Charging = Charging.off()
+    failures: Failures = Failures.off()
+    wind: Wind = Wind.off()
+    fleet: tuple[UavType, ...] = Field(
+        (),
+        max_length=64,
+        description="types of UAVs: a table for each; UAV i has type i modulo their number",
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the sections that are off: so scenarios without them are stored as before."""
+        values = handler(self)
+        return {n: v for n, v in values.items() if n not in EXTENSIONS or self._has(n)}
+
+    @field_validator("nodes", "zone", "fleet", mode="before")
     @classmethod
     def _lists_to_tuples(cls, value: Any) -> Any:
-        return _tuples(value)
+        return tuples(value)
 
     @field_validator("initial_data", mode="before")
     @classmethod
     def _number_to_range(cls, value: Any) -> Any:
-        return (value, value) if _is_number(value) else _tuples(value)
+        return (value, value) if _is_number(value) else tuples(value)
 
     @model_validator(mode="after")
     def _fits_the_grid(self) -> Self:
@@ -183,6 +210,26 @@ class _Constants(BaseModel):
         """Number of charging pads: ``pads``, or as many as the zone has cells."""
         return self.zone_cells if self.pads is None else self.pads
 
+    @property
+    def is_extended(self) -> bool:
+        """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
+        return any(self._has(name) for name in EXTENSIONS)
+
+    def _has(self, extension: str) -> bool:
+        """Whether an extension is on."""
+        value = getattr(self, extension)
+        return value.is_on if isinstance(value, Section) else bool(value)
+
+    @property
+    def needs_events(self) -> bool:
+        """Whether only the SimPy engine can simulate the scenario."""
+        return self.arrivals.process != "slotted"
+
+    def value(self, field: str) -> Any:
+        """The value of a field; ``failures.uav_rate`` is the field of a section."""
+        section, _, name = field.rpartition(".")
+        return getattr(getattr(self, section) if section else self, name)
+
     def to_toml(self) -> str:
         """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
@@ -216,7 +263,7 @@ class Scenario(_Constants):
         Raises:
             InputError: For unknown keys, wrong types and values out of range.
         """
-        return _validated(cls, values, "scenario")
+        return _validated(cls, _merged({}, values), "scenario")
 
 
 IntegerRange = tuple[Integer, Integer]
@@ -245,7 +292,7 @@ class ScenarioSpace(_Constants):
     @classmethod
     def _integer_to_range(cls, value: Any) -> Any:
         is_integer = isinstance(value, int) and not isinstance(value, bool)
-        return (value, value) if is_integer else _tuples(value)
+        return (value, value) if is_integer else tuples(value)
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -258,13 +305,14 @@ class ScenarioSpace(_Constants):
     ) -> "ScenarioSpace":
         """A space of the given values, on top of a scenario or space (default: the paper's)."""
         base = scenario.model_dump() if scenario is not None else {}
-        return _validated(cls, base | values, "scenario")
+        return _validated(cls, _merged(base, values), "scenario")
 
     @property
     def numeric(self) -> list[str]:
         """The fields that hold a number, or a range of numbers."""
         others = (*SAMPLED, "initial_data", "pads")
-        return [name for name, value in self if name in others or _is_number(value)]
+        names = fields_of(ScenarioSpace)
+        return [name for name in names if name in others or _is_number(self.value(name))]
 
     def limits(self, field: str) -> tuple[float, float]:
         """The least and the largest value that a numeric field may have, infinite without a limit.
@@ -283,7 +331,7 @@ class ScenarioSpace(_Constants):
             raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
         if field in bounded:
             return bounded[field]
-        metadata = ScenarioSpace.model_fields[field].metadata
+        metadata = fields_of(ScenarioSpace)[field].metadata
         least = [getattr(m, kind) for m in metadata for kind in ("ge", "gt") if hasattr(m, kind)]
         most = [getattr(m, kind) for m in metadata for kind in ("le", "lt") if hasattr(m, kind)]
         return max(least, default=-inf), min(most, default=inf)
@@ -307,12 +355,42 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     """
     where, read = _SCENARIOS.load(name_or_path)
     read.pop("description", None)
-    values = read | overrides
+    values = _merged(read, overrides)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
         without = _validated(ScenarioSpace, values | {"nodes": [[0, 0]]}, where)
         path = _SCENARIOS.folder_of(name_or_path) / read["nodes"]
         values["nodes"] = nodes_in(path, without.grid, without.cell_size)
     return _validated(ScenarioSpace, values, where)
+
+
+def fields_of(model: type[_Constants]) -> dict[str, FieldInfo]:
+    """The fields of a kind of scenario; those of sections are named as ``failures.uav_rate``."""
+    found: dict[str, FieldInfo] = {}
+    for name, field in model.model_fields.items():
+        kind = field.annotation
+        if isinstance(kind, type) and issubclass(kind, Section):
+            found |= {f"{name}.{part}": inner for part, inner in kind.model_fields.items()}
+        else:
+            found[name] = field
+    return found
+
+
+def _merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section."""
+    merged = dict(base)
+    for name, value in values.items():
+        section, _, part = name.partition(".")
+        table = {part: value} if part else value
+        before = merged.get(section)
+        if (
+            section in EXTENSIONS
+            and isinstance(table, dict)
+            and (before is None or isinstance(before, dict))
+        ):
+            merged[section] = (before or {}) | table
+        else:
+            merged[name] = value
+    return merged
 
 
 def scenario_names() -> list[str]:
@@ -334,11 +412,6 @@ def _validated(model: type[BaseModel], values: dict[str, Any], where: str) -> An
         return model.model_validate(values)
     except ValidationError as error:
         raise InputError(validation_line(error, where, model)) from None
-
-
-def _tuples(value: Any) -> Any:
-    """Convert the lists that TOML gives to tuples, nested lists included."""
-    return tuple(_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _is_number(value: Any) -> bool:

@@ -40,6 +40,7 @@ MISSION = np.dtype(
         ("zone_height", np.int64),
         ("pads", np.int64),
         ("forbid_swaps", np.int64),
+        ("is_extended", np.int64),  # whether a section of the scenario is on
         # time
         ("communication_slots", np.int64),
         ("max_slots", np.int64),
@@ -104,18 +105,38 @@ UAV = np.dtype(
 )
 
 
+# One sensor node, beyond its residual data; used in extended scenarios only.
+SENSOR = np.dtype(
+    [
+        ("silent_until", np.int64),  # slot from which it answers again
+        ("emptied", np.float64),  # when its newest data were collected [slots]
+    ]
+)
+
+
 class State(NamedTuple):
-    """The state of B missions: ``missions`` (B,), ``uavs`` (B, I), ``residual`` (B, K)."""
+    """The state of B missions with up to I UAVs and K nodes.
+
+    Attributes:
+        missions: (B,) ``MISSION`` records.
+        uavs: (B, I) ``UAV`` records.
+        residual: (B, K) residual data [data units].
+        sensors: (B, K) ``SENSOR`` records.
+    """
 
     missions: np.ndarray
     uavs: np.ndarray
     residual: np.ndarray
+    sensors: np.ndarray
 
 
 def empty_state(missions: int, uavs: int, nodes: int) -> State:
     """A state filled with zeros, for that many missions, UAVs per mission and nodes."""
     return State(
-        np.zeros(missions, MISSION), np.zeros((missions, uavs), UAV), np.zeros((missions, nodes))
+        np.zeros(missions, MISSION),
+        np.zeros((missions, uavs), UAV),
+        np.zeros((missions, nodes)),
+        np.zeros((missions, nodes), SENSOR),
     )
 
 
@@ -128,7 +149,7 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
     for field in MISSION.fields or ():
         if field in SAMPLED:
             mission[field] = getattr(scenario, field)[0]
-        elif field != "nodes" and field in type(scenario).model_fields:
+        elif field != "nodes" and hasattr(scenario, field):
             name = "charging_pads" if field == "pads" else field
             mission[field] = getattr(scenario, name)
     mission["nodes"] = len(scenario.nodes)

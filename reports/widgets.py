@@ -214,7 +214,7 @@ def _following(slider: widgets.Widget) -> Callable[[Any], None]:
 
 def _value(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
-    return space.charging_pads if field == "pads" else getattr(space, field)
+    return space.charging_pads if field == "pads" else space.value(field)
 
 
 def _ends(value: Any) -> Iterator[float]:

@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from analysis.study.stopping import StrictTable, of_its_kind
 from dess import InputError
-from dess.scenario import Integer, Scenario
+from dess.scenario import Integer, Scenario, fields_of
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
@@ -28,9 +28,7 @@ MAX_SIZE = 2**20
 
 # Fields whose values are integers. A name that is not a field is refused when the study is loaded.
 INTEGERS = {
-    name
-    for name, field in Scenario.model_fields.items()
-    if field.annotation in (int, Integer | None)
+    name for name, field in fields_of(Scenario).items() if field.annotation in (int, Integer | None)
 }
 
 

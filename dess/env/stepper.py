@@ -13,7 +13,7 @@ from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.record import Records, empty_records, write_record
+from dess.record import Records, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
     ACTION_NAMES,
@@ -142,7 +142,8 @@ class MissionStepper:
 
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
-        records = empty_records(len(environments), self.state.uavs.shape[1])
+        fleet, is_extended = self.state.uavs.shape[1], self.space.is_extended
+        records = empty_records(len(environments), fleet, is_extended)
         _record(environments, self.state, records)
         return records
 
@@ -155,7 +156,7 @@ def _launch(environments, first, constants, ranges, state):
         state.missions[b] = constants[0]
         mission = state.missions[b]
         mission.replication = first + n
-        rules.launch(mission, ranges, state.uavs[b], state.residual[b])
+        rules.launch(mission, ranges, state.uavs[b], state.residual[b], state.sensors[b])
 
 
 @kernel
@@ -167,6 +168,10 @@ def _record(environments, state, records):
             state.missions[b], state.uavs[b], state.residual[b],
             records.missions[row], records.uavs[row],
         )  # fmt: skip
+        if state.missions[b].is_extended:
+            write_operations(
+                state.missions[b], state.uavs[b], state.sensors[b], records.operations[row]
+            )
 
 
 @kernel
@@ -185,7 +190,7 @@ def _step(state, world, scratch, actions, out):
             out.acted[b, i] = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
-            mission, uavs, state.residual[b], arrivals,
+            mission, uavs, state.residual[b], state.sensors[b], arrivals,
             nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
         out.team_collected[b] = mission.slot_collected

@@ -37,9 +37,9 @@ def configs(start: str) -> list[str]:
 
 def fields(start: str) -> list[str]:
     """Fields of a scenario, as ``--set`` takes them."""
-    from dess import ScenarioSpace
+    from dess.scenario import ScenarioSpace, fields_of
 
-    return [f"{name}=" for name in _beginning(ScenarioSpace.model_fields, start)]
+    return [f"{name}=" for name in _beginning(fields_of(ScenarioSpace), start)]
 
 
 def _beginning(names: Iterable[str], start: str) -> list[str]:

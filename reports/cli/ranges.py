@@ -46,13 +46,13 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
         InputError: If the text has another form, or a range is none.
     """
     from analysis.sweeps.values import distinct
-    from dess import ScenarioSpace
+    from dess.scenario import ScenarioSpace, fields_of
 
     field, equals, values = text.partition("=")
     field = field.strip()
-    if equals and field not in ScenarioSpace.model_fields:
-        allowed = one_of(field, ScenarioSpace.model_fields)
-        raise InputError(f"--set: {field}: unknown key{allowed}")
+    fields = fields_of(ScenarioSpace)
+    if equals and field not in fields:
+        raise InputError(f"--set: {field}: unknown key{one_of(field, fields)}")
     if found := _RANGE.fullmatch(values.strip()):
         return field, distinct(field, _range(field, text, **found.groupdict()))
     try:

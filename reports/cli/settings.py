@@ -87,12 +87,13 @@ def check_words(field: str, value: str) -> None:
     Raises:
         InputError: If the scenario has such a field, and if it has not.
     """
-    from dess import ScenarioSpace
     from dess.errors import form_of, kind_of
+    from dess.scenario import ScenarioSpace, fields_of
 
-    if field not in ScenarioSpace.model_fields:
-        raise InputError(f"{SET}: {field}: unknown key{one_of(field, ScenarioSpace.model_fields)}")
-    known = ScenarioSpace.model_fields[field]
+    fields = fields_of(ScenarioSpace)
+    if field not in fields:
+        raise InputError(f"{SET}: {field}: unknown key{one_of(field, fields)}")
+    known = fields[field]
     problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
     raise InputError(f"{SET}: {field}: {shown(value)} {problem}; allowed: {form_of(known)}")
 

@@ -21,7 +21,7 @@ from analysis import numbers
 from analysis.numbers import level
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
 from policies.registry import descriptions
 from reports.pages.html import Marked, code, marked, text
 from reports.pages.template import template
@@ -114,14 +114,19 @@ def _policies(manifests: Iterable[Manifest]) -> list[tuple[str, str]]:
 
 
 def _parameters(space: ScenarioSpace) -> pd.DataFrame:
-    fields = {**ScenarioSpace.model_fields, **Scenario.model_fields}
-    rows = [(f"{field}: {fields[field].description}", _value(space, field)) for field in fields]
+    fields = {**fields_of(ScenarioSpace), **fields_of(Scenario)}
+    stored = space.model_dump()  # without the sections that are off
+    rows = [
+        (f"{field}: {known.description}", _value(space, field))
+        for field, known in fields.items()
+        if field.partition(".")[0] in stored
+    ]
     return pd.DataFrame(rows, columns=["Input parameter [unit]", "Value"])
 
 
 def _value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
-    value: Any = space.charging_pads if field == "pads" else getattr(space, field)
+    value: Any = space.charging_pads if field == "pads" else space.value(field)
     if field == "nodes":
         return _cells(value)
     if field in SAMPLED or field == "initial_data":

@@ -30,7 +30,7 @@ from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess import simulate_batch
 from dess.errors import InputError, one_of, validation_line
-from dess.scenario import SAMPLED, ScenarioSpace, load_scenario
+from dess.scenario import SAMPLED, ScenarioSpace, fields_of, load_scenario
 from policies import load_team
 
 NAME = "what-if"
@@ -208,13 +208,13 @@ def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterabl
                 "allowed: another value"
             )
     if not changed:
-        allowed = ", ".join(ScenarioSpace.model_fields)
+        allowed = ", ".join(fields_of(ScenarioSpace))
         raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
 
 
 def _meaning(field: str) -> str:
     """The first part of a field's description, without details."""
-    description = ScenarioSpace.model_fields[field].description or ""
+    description = fields_of(ScenarioSpace)[field].description or ""
     return description.partition(";")[0].partition(":")[0]
 
 
@@ -225,5 +225,5 @@ def _assignments(values: Mapping[str, Any]) -> list[str]:
 
 def _value(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
-    value = getattr(space, field)
+    value = space.value(field)
     return space.charging_pads if field == "pads" else value

@@ -1,0 +1,42 @@
+"""The base of all sections, and the types of their fields."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+# A strict integer: 2.0, true and "2" are refused.
+Integer = Annotated[int, Field(strict=True)]
+# A finite number, integer or not.
+Number = Annotated[float, Field(allow_inf_nan=False)]
+# A probability that something happens in a mission slot.
+Probability = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+# A mean duration; 0 has a meaning of its own, which the description tells.
+Slots = Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False)]
+
+
+def tuples(value: Any) -> Any:
+    """Convert the lists that TOML gives to tuples, nested lists included."""
+    return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value
+
+
+class Section(BaseModel):
+    """A section of a scenario, frozen and validated; off if all fields have their defaults."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _lists_to_tuples(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        return {name: tuples(value) for name, value in values.items()}
+
+    @property
+    def is_on(self) -> bool:
+        """Whether a field differs from its default."""
+        return self != self.off()
+
+    @classmethod
+    def off(cls) -> Self:
+        """The section with all fields at their defaults."""
+        return cls.model_validate({})
