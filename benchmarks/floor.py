@@ -32,11 +32,12 @@ def needed_draws(
         state.missions[:] = constants_of(scenario)
         state.missions["seed"], state.missions["replication"] = seed, replication
         mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
-        sensors = state.sensors[0]
-        rules.launch(mission, ranges_of(scenario), uavs, residual, sensors)
+        sensors, teeth = state.sensors[0], state.teeth[0]
+        rules.launch(mission, ranges_of(scenario), uavs, residual, sensors, teeth)
         scratch = empty_scratch(len(uavs), len(residual))
         counts = _count(
-            mission, uavs, residual, sensors, actions[replication], *world_of(scenario), *scratch
+            mission, uavs, residual, sensors, teeth, actions[replication],
+            *world_of(scenario), *scratch,
         )  # fmt: skip
         blocks, deviates = blocks + counts[0], deviates + counts[1]
     return blocks, deviates
@@ -44,7 +45,7 @@ def needed_draws(
 
 @kernel
 def _count(
-    mission, uavs, residual, sensors, actions, nodes, mean_snr, order, means, batches, search
+    mission, uavs, residual, sensors, teeth, actions, nodes, mean_snr, order, means, batches, search
 ):  # fmt: skip
     """Simulate one mission and count."""
     arrivals = np.empty(len(nodes), np.int64)
@@ -60,7 +61,7 @@ def _count(
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
             rules.communicate(
-                mission, uavs, residual, sensors,
+                mission, uavs, residual, sensors, teeth,
                 nodes, mean_snr, order, means, batches, search, n,
             )  # fmt: skip
             for i in range(mission.uavs):

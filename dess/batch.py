@@ -28,6 +28,7 @@ from dess.state import (
     empty_state,
     ranges_of,
     spaces_of,
+    teeth_lengths,
 )
 from dess.view import decide, team_of
 
@@ -141,12 +142,12 @@ class _Batch:
         self.constants = np.concatenate([constants_of(space) for space in spaces])
         self.constants["seed"] = seed
         self.ranges = np.stack([ranges_of(space) for space in spaces])
-        self.uavs = int(self.ranges[:, 0, 1].max())
+        self.uavs, self.lengths = int(self.ranges[:, 0, 1].max()), teeth_lengths(spaces)
 
     def run(self, jobs, which, numbers, records, progress, stop) -> None:
         """Simulate the missions ``jobs`` and write their records, until ``stop`` is set."""
         size, nodes = min(self.batch_size, len(jobs)), len(self.world.nodes)
-        state = empty_state(size, self.uavs, nodes)
+        state = empty_state(size, self.uavs, nodes, self.lengths)
         scratch = empty_scratch(self.uavs, nodes)
         job_of = np.full(size, -1)
         queue = np.array([0, 0])  # next job, jobs done
@@ -177,7 +178,10 @@ def _next_mission(b, job_of, queue, source, state):
     job_of[b] = job
     state.missions[b] = constants[which[job]]
     mission.replication = numbers[job]
-    rules.launch(mission, ranges[which[job]], state.uavs[b], state.residual[b], state.sensors[b])
+    rules.launch(
+        mission, ranges[which[job]],
+        state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
+    )  # fmt: skip
 
 
 @kernel
@@ -185,20 +189,20 @@ def _advance(job_of, queue, source, state, world, scratch, records):
     """Advance every mission by one slot; a mission that ends is recorded and replaced."""
     nodes, mean_snr, order, means = world
     batches, search = scratch
-    missions, uavs, residual, sensors = state
+    missions, uavs, residual, sensors, teeth = state
     arrivals = np.empty(len(nodes), np.int64)
     for b in range(len(missions)):
         if job_of[b] < 0:
             continue
         mission, team, data = missions[b], uavs[b], residual[b]
         rules.advance(
-            mission, team, data, sensors[b], arrivals,
+            mission, team, data, sensors[b], teeth[b], arrivals,
             nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]
             write_record(mission, team, data, records.missions[job], records.uavs[job])
             if mission.is_extended:
-                write_operations(mission, team, sensors[b], records.operations[job])
+                write_operations(mission, team, sensors[b], teeth[b], records.operations[job])
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

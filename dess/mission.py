@@ -38,6 +38,7 @@ from dess.state import (
     empty_state,
     ranges_of,
     spaces_of,
+    teeth_lengths,
 )
 from dess.view import decide, team_of
 
@@ -100,7 +101,9 @@ class MissionModel:
         log: EventLog | None,
     ):
         self.team, self.log, self.world = team, log, world_of(scenario)
-        self.state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
+        self.state = empty_state(
+            1, scenario.uavs[1], len(scenario.nodes), teeth_lengths([scenario])
+        )
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.arrivals = np.zeros(len(scenario.nodes), np.int64)
         self.state.missions[:] = constants_of(scenario)
@@ -108,8 +111,10 @@ class MissionModel:
         self.state.missions["replication"] = replication
         self.mission = self.state.missions[0]
         self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
-        self.sensors = self.state.sensors[0]
-        rules.launch(self.mission, ranges_of(scenario), self.uavs, self.residual, self.sensors)
+        self.sensors, self.teeth = self.state.sensors[0], self.state.teeth[0]
+        rules.launch(
+            self.mission, ranges_of(scenario), self.uavs, self.residual, self.sensors, self.teeth
+        )
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
         self.zone = ChargingZone(self.env, int(self.mission["pads"]), log)
@@ -129,7 +134,7 @@ class MissionModel:
         operations = None
         if is_extended:
             operations = records.operations[0]
-            write_operations(self.mission, self.uavs, self.sensors, operations)
+            write_operations(self.mission, self.uavs, self.sensors, self.teeth, operations)
         return MissionRecord(records.missions[0], records.uavs[0], self.log, operations)
 
     def _clock(self) -> Process:
@@ -151,8 +156,9 @@ class MissionModel:
             for n in range(1, m + 1):
                 yield env.timeout(start + n / m - env.now)
                 rules.communicate(
-                    mission, uavs, self.residual, self.sensors, *self.world, *self.scratch, n
-                )
+                    mission, uavs, self.residual, self.sensors, self.teeth,
+                    *self.world, *self.scratch, n,
+                )  # fmt: skip
                 self._log_communications(start, n, m)
             rules.arrive(mission, self.residual, self.arrivals)
             self._log_arrivals()

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.sections.age import write_age
 from dess.state import END_NAMES, QUOTA
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
@@ -143,8 +144,10 @@ def write_record(mission, uavs, residual, record, uav_records):
 
 
 @kernel
-def write_operations(mission, uavs, sensors, out):
+def write_operations(mission, uavs, sensors, teeth, out):
     """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
+    if mission.age_measured != 0:
+        write_age(mission, sensors, teeth, out)
 
 
 def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Records:

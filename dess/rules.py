@@ -18,6 +18,7 @@ import numpy as np
 
 from dess import channel, streams
 from dess.code.kernels import inlined, kernel
+from dess.sections import age
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -60,7 +61,7 @@ def zone_number(mission, x, y):
 
 
 @kernel
-def launch(mission, ranges, uavs, residual, sensors):
+def launch(mission, ranges, uavs, residual, sensors, teeth):
     """Start a mission: draw its parameters, start cells and initial data.
 
     Args:
@@ -69,11 +70,13 @@ def launch(mission, ranges, uavs, residual, sensors):
         uavs: (I,) ``UAV`` records, overwritten.
         residual: (K,) residual data [data units], overwritten.
         sensors: (K,) ``SENSOR`` records, overwritten.
+        teeth: (G,) number of the teeth of ages, overwritten.
     """
     draw_parameters(mission, ranges)
     mission.slot = 0
     mission.active = mission.uavs
-    mission.arrived = mission.collected = mission.slot_collected = 0.0
+    mission.arrived = mission.collected = mission.slot_collected = mission.newest = 0.0
+    teeth[:] = 0
     _launch_uavs(mission, uavs)
     mission.initial = 0.0
     spread = mission.initial_high - mission.initial_low
@@ -85,7 +88,7 @@ def launch(mission, ranges, uavs, residual, sensors):
         residual[k] = mission.initial_low + spread * streams.uniform(words[k % 4])
         mission.initial += residual[k]
         sensors[k].silent_until = 0
-        sensors[k].emptied = 0.0
+        sensors[k].newest = 0.0
 
 
 @kernel
@@ -245,13 +248,13 @@ def spend(mission, uavs):
 
 @inlined
 def communicate(
-    mission, uavs, residual, sensors, nodes, mean_snr, order, means, batches, search, n
+    mission, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n
 ):  # fmt: skip
     """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
     among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
-    UAV are set. The arguments after ``sensors`` are the arrays of ``World`` and ``Scratch``.
+    UAV are set. The arguments after ``teeth`` are the arrays of ``World`` and ``Scratch``.
     """
     for i in range(mission.uavs):
         u = uavs[i]
@@ -265,6 +268,8 @@ def communicate(
             continue
         amount = min(channel.rate(mission, snr), residual[node])
         residual[node] -= amount
+        if residual[node] == 0.0:
+            age.empty(mission, sensors[node], teeth, n)
         u.served = node
         u.amount = amount
         u.collected += amount
@@ -304,7 +309,8 @@ def reward_terms(mission, u, charged):
         charged: Whether the UAV charged in the slot.
 
     Returns:
-        The terms data, step, overruled, charging, quota and depleted, to be summed in this order.
+        The terms data, step, overruled, charging, quota, depleted and age, to be summed in this
+        order.
     """
     return (
         mission.reward_data * mission.slot_collected,
@@ -313,6 +319,7 @@ def reward_terms(mission, u, charged):
         mission.reward_charging if charged else 0.0,
         mission.reward_quota if u.end == QUOTA else 0.0,
         mission.reward_depleted if u.end == BATTERY else 0.0,
+        mission.age_reward * age.mean_age(mission),
     )
 
 
@@ -346,7 +353,8 @@ def settle(mission, uavs):
 
 @kernel
 def advance(
-    mission, uavs, residual, sensors, arrivals, nodes, mean_snr, order, means, batches, search
+    mission, uavs, residual, sensors, teeth, arrivals,
+    nodes, mean_snr, order, means, batches, search,
 ):  # fmt: skip
     """Run one mission slot with the actions in ``uavs``, in the order of Section III-C."""
     resolve(mission, uavs)
@@ -354,7 +362,8 @@ def advance(
     spend(mission, uavs)
     for n in range(1, mission.communication_slots + 1):
         communicate(
-            mission, uavs, residual, sensors, nodes, mean_snr, order, means, batches, search, n
+            mission, uavs, residual, sensors, teeth,
+            nodes, mean_snr, order, means, batches, search, n,
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)

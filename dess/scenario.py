@@ -25,7 +25,7 @@ from pydantic.fields import FieldInfo
 from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.sea import Cell, nodes_in
-from dess.sections.age import Age
+from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
 from dess.sections.failures import Failures
@@ -187,6 +187,11 @@ class _Constants(BaseModel):
             raise ValueError(
                 "grid, nodes, communication_slots: too many together; allowed: "
                 f"5 * grid^2 * nodes * communication_slots <= {_CHANNEL_LIMIT}"
+            )
+        if self.age.measured and self.max_slots * self.communication_slots > MOST_TEETH:
+            raise ValueError(
+                "age.measured: the mission has too many communication slots; allowed: "
+                f"max_slots * communication_slots <= {MOST_TEETH}"
             )
         if self.pads is not None and self.pads > self.zone_cells:
             raise ValueError(

@@ -5,7 +5,7 @@ state.missions[:] = constants_of(space)
 state.uavs[0, 0]["battery"], state.residual[0]
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import index
 from typing import NamedTuple
 
@@ -65,6 +65,9 @@ MISSION = np.dtype(
         ("reward_charging", np.float64),
         ("reward_quota", np.float64),
         ("reward_step", np.float64),
+        # sections
+        ("age_measured", np.int64),
+        ("age_reward", np.float64),
         # progress
         ("slot", np.int64),  # mission slots done
         ("active", np.int64),  # UAVs still active
@@ -72,6 +75,7 @@ MISSION = np.dtype(
         ("arrived", np.float64),
         ("collected", np.float64),
         ("slot_collected", np.float64),  # data units, in the present slot
+        ("newest", np.float64),  # sum of the nodes' ``newest`` [slots]
     ]
 )
 
@@ -105,11 +109,11 @@ UAV = np.dtype(
 )
 
 
-# One sensor node, beyond its residual data; used in extended scenarios only.
+# One sensor node, beyond its residual data.
 SENSOR = np.dtype(
     [
         ("silent_until", np.int64),  # slot from which it answers again
-        ("emptied", np.float64),  # when its newest data were collected [slots]
+        ("newest", np.float64),  # from when the newest data are that were collected [slots]
     ]
 )
 
@@ -122,22 +126,35 @@ class State(NamedTuple):
         uavs: (B, I) ``UAV`` records.
         residual: (B, K) residual data [data units].
         sensors: (B, K) ``SENSOR`` records.
+        teeth: (B, G) where ages are measured, the number of their teeth by length in communication
+            slots (``dess.sections.age``); otherwise (B, 0).
     """
 
     missions: np.ndarray
     uavs: np.ndarray
     residual: np.ndarray
     sensors: np.ndarray
+    teeth: np.ndarray
 
 
-def empty_state(missions: int, uavs: int, nodes: int) -> State:
-    """A state filled with zeros, for that many missions, UAVs per mission and nodes."""
+def empty_state(missions: int, uavs: int, nodes: int, lengths: int = 0) -> State:
+    """A state filled with zeros, for that many missions, UAVs per mission and nodes.
+
+    ``lengths`` is the number of lengths that the teeth of ages can have (``teeth_lengths``).
+    """
     return State(
         np.zeros(missions, MISSION),
         np.zeros((missions, uavs), UAV),
         np.zeros((missions, nodes)),
         np.zeros((missions, nodes), SENSOR),
+        np.zeros((missions, lengths), np.int32),
     )
+
+
+def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
+    """How many lengths the teeth of ages can have in missions of these scenarios."""
+    slots = (s.max_slots * s.communication_slots + 1 for s in spaces if s.age.measured)
+    return max(slots, default=0)
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
@@ -153,6 +170,8 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
             name = "charging_pads" if field == "pads" else field
             mission[field] = getattr(scenario, name)
     mission["nodes"] = len(scenario.nodes)
+    mission["age_measured"] = scenario.age.measured
+    mission["age_reward"] = scenario.age.reward
     for field, value in zip(
         ("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True
     ):

@@ -61,6 +61,15 @@ class View:
         return self.state.residual[self.mission]
 
     @cached_property
+    def age(self) -> np.ndarray:
+        """(R, K) age of information of the nodes [slots]: how old the newest collected data are.
+
+        In the slotted model this is the time since the node was last emptied.
+        """
+        newest = self.state.sensors["newest"][self.mission]
+        return self.constants["slot"][:, None] - newest
+
+    @cached_property
     def legal(self) -> np.ndarray:
         """(R, 5) mask of the legal actions: Hover, and the moves that stay on the grid."""
         return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)

@@ -74,6 +74,15 @@ def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
 
 
 @st.composite
+def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
+    """Spaces whose sections beyond the paper are on or off, those that both engines have."""
+    sections = {
+        "age": {"measured": draw(st.booleans()), "reward": draw(st.just(0.0) | _numbers(-2.0, 2.0))}
+    }
+    return draw(spaces(**(sections | fixed)))
+
+
+@st.composite
 def scenarios(draw: st.DrawFn, **fixed: Any) -> Scenario:
     """Single scenarios: a corner of a drawn space."""
     space = draw(spaces(**fixed))

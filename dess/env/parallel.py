@@ -75,7 +75,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
     action it is given is ignored.
 
     ``info`` holds numbers and arrays, per agent: ``active``, whether the UAV acts next;
-    ``reward_terms`` (6,), named by ``stepper.REWARD_TERMS``, of which the reward is the sum;
+    ``reward_terms`` (7,), named by ``stepper.REWARD_TERMS``, of which the reward is the sum;
     ``collected`` and ``team_collected`` (data units of the slot); ``end``, an index of
     ``state.END_NAMES``; ``overruled``; and with ``mask="info"`` the ``action_mask`` (5,).
     """

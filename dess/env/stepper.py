@@ -23,10 +23,11 @@ from dess.state import (
     empty_state,
     ranges_of,
     spaces_of,
+    teeth_lengths,
 )
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
-REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted")
+REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "age")
 
 
 class Outcome(NamedTuple):
@@ -35,7 +36,7 @@ class Outcome(NamedTuple):
     Attributes:
         acted: (N, I) whether the UAV was active in the slot.
         reward: (N, I) the reward of the slot; 0 for an inactive UAV.
-        reward_terms: (N, I, 6) the terms of the reward, in the order of ``REWARD_TERMS``.
+        reward_terms: (N, I, 7) the terms of the reward, in the order of ``REWARD_TERMS``.
         end: (N, I) how the UAV's mission ended, an index of ``state.END_NAMES``.
         terminated: (N, I) whether the UAV ended in this slot because its quota was filled or its
             battery depleted.
@@ -87,7 +88,8 @@ class MissionStepper:
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.world, self._ranges = world_of(self.space), ranges_of(self.space)
         self._constants = constants_of(self.space)
-        self.state, self._scratch = empty_state(num_envs, fleet, nodes), empty_scratch(fleet, nodes)
+        self.state = empty_state(num_envs, fleet, nodes, teeth_lengths([self.space]))
+        self._scratch = empty_scratch(fleet, nodes)
         self.start_at(seed, 0)
 
     @property
@@ -156,7 +158,9 @@ def _launch(environments, first, constants, ranges, state):
         state.missions[b] = constants[0]
         mission = state.missions[b]
         mission.replication = first + n
-        rules.launch(mission, ranges, state.uavs[b], state.residual[b], state.sensors[b])
+        rules.launch(
+            mission, ranges, state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b]
+        )
 
 
 @kernel
@@ -170,8 +174,9 @@ def _record(environments, state, records):
         )  # fmt: skip
         if state.missions[b].is_extended:
             write_operations(
-                state.missions[b], state.uavs[b], state.sensors[b], records.operations[row]
-            )
+                state.missions[b], state.uavs[b], state.sensors[b], state.teeth[b],
+                records.operations[row],
+            )  # fmt: skip
 
 
 @kernel
@@ -190,7 +195,7 @@ def _step(state, world, scratch, actions, out):
             out.acted[b, i] = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
-            mission, uavs, state.residual[b], state.sensors[b], arrivals,
+            mission, uavs, state.residual[b], state.sensors[b], state.teeth[b], arrivals,
             nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
         out.team_collected[b] = mission.slot_collected

@@ -20,6 +20,7 @@ from tests.drawn import (
     Fidget,
     Script,
     Wanderer,
+    extended_spaces,
     replications,
     seeds,
     spaces,
@@ -51,6 +52,10 @@ def _is(records: Records, job: int, single: MissionRecord) -> bool:
         records.missions[job].tobytes() == single.metrics.tobytes()
         and records.uavs[job, :fleet].tobytes() == single.uavs.tobytes()
         and absent.tobytes() == np.zeros_like(absent).tobytes()
+        and (
+            single.operations is None
+            or records.operations[job].tobytes() == single.operations.tobytes()
+        )
     )
 
 
@@ -58,7 +63,7 @@ def _equal(one: Records, other: Records) -> bool:
     return all(a.tobytes() == b.tobytes() for a, b in zip(one, other, strict=True))
 
 
-@given(spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4))
+@given(extended_spaces(), teams, seeds, st.lists(replications, min_size=1, max_size=4))
 def test_both_engines_give_the_same_record(
     space: ScenarioSpace, team: Sequence[Any], seed: int, numbers: list[int]
 ) -> None:

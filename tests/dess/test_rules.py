@@ -36,7 +36,12 @@ def _launched(scenario: Scenario, seed: int = 1, replication: int = 2) -> tuple[
     state.missions[:] = constants_of(space)
     state.missions["seed"], state.missions["replication"] = seed, replication
     rules.launch(
-        state.missions[0], ranges_of(space), state.uavs[0], state.residual[0], state.sensors[0]
+        state.missions[0],
+        ranges_of(space),
+        state.uavs[0],
+        state.residual[0],
+        state.sensors[0],
+        state.teeth[0],
     )
     return state, world_of(space), empty_scratch(space.uavs[1], len(space.nodes))
 
@@ -52,7 +57,9 @@ def test_uavs_start_on_distinct_cells_of_the_zone(
     state.missions[:] = constants_of(space)
     state.missions["seed"], state.missions["replication"] = seed, replication
     mission, uavs = state.missions[0], state.uavs[0]
-    rules.launch(mission, ranges_of(space), uavs, state.residual[0], state.sensors[0])
+    rules.launch(
+        mission, ranges_of(space), uavs, state.residual[0], state.sensors[0], state.teeth[0]
+    )
     fleet = uavs[: mission["uavs"]]
     x, y, width, height = space.zone
     starts = {(int(u["x"]), int(u["y"])) for u in fleet}
@@ -219,6 +226,7 @@ def _one_slot(u: dict[str, Any], **scenario: Any) -> Any:
         state.uavs[0],
         state.residual[0],
         state.sensors[0],
+        state.teeth[0],
         arrivals,
         *world,
         *scratch,
@@ -412,7 +420,9 @@ def _compare_with_reference(
     collected, decided = 0.0, []
     for n in range(1, scenario.communication_slots + 1):
         left = residual.copy()
-        rules.communicate(mission, team, residual, state.sensors[0], *world, *scratch, n)
+        rules.communicate(
+            mission, team, residual, state.sensors[0], state.teeth[0], *world, *scratch, n
+        )
         for i, u in enumerate(team):
             if not (left > 0).any():
                 assert u["served"] == -1
@@ -468,6 +478,7 @@ def test_ties_go_to_the_node_of_lowest_index() -> None:
             state.uavs[0],
             state.residual[0],
             state.sensors[0],
+            state.teeth[0],
             *world,
             *scratch,
             1,
@@ -479,6 +490,7 @@ def test_ties_go_to_the_node_of_lowest_index() -> None:
             state.uavs[0],
             state.residual[0],
             state.sensors[0],
+            state.teeth[0],
             *world,
             *scratch,
             2,
@@ -491,7 +503,14 @@ def test_charging_and_inactive_uavs_do_not_communicate() -> None:
     team = state.uavs[0]
     team["charging"][0], team["active"][1] = True, False
     rules.communicate(
-        state.missions[0], team, state.residual[0], state.sensors[0], *world, *scratch, 1
+        state.missions[0],
+        team,
+        state.residual[0],
+        state.sensors[0],
+        state.teeth[0],
+        *world,
+        *scratch,
+        1,
     )
     assert team["served"].tolist()[:2] == [-1, -1]
     assert team["communications"].tolist() == [0, 0, 1]
