@@ -1,12 +1,14 @@
 """The names of metrics and parameters, as code, figures and pages use them."""
 
 import re
+from collections.abc import Container
 from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic_core import to_jsonable_python
 
 from dess.errors import form_of, kind_of
+from dess.record import OPERATIONS
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
 
 SUCCESS, RATIO = "success", "collection_ratio"
@@ -27,12 +29,50 @@ SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"
 # Short names of metrics on the command line.
 ALIASES = {"ratio": RATIO, "product": PRODUCT}
 
+
+class Measure(NamedTuple):
+    """What pages call a column of ``OPERATIONS``, which only extended scenarios measure.
+
+    Attributes:
+        name: The name.
+        unit: The unit; empty for shares and counts.
+        less_is_better: Whether a lower value is better.
+    """
+
+    name: str
+    unit: str = ""
+    less_is_better: bool = True
+
+    @property
+    def label(self) -> str:
+        """The name with its unit."""
+        return f"{self.name} [{self.unit}]".removesuffix(" []")
+
+
+_SLOTS = "mission slots"
+AGE, UTILISATION = "age", "utilisation"
+MEASURES = {
+    AGE: Measure("Age of information", _SLOTS),
+    "peak_age": Measure("Peak age of information", _SLOTS),
+    "age_p99": Measure("99th percentile of the age", _SLOTS),
+    "latency": Measure("Latency", _SLOTS),
+    "latency_p99": Measure("99th percentile of the latency", _SLOTS),
+    "generated": Measure("Packets generated", less_is_better=False),
+    "delivered": Measure("Packets delivered", less_is_better=False),
+    "lost": Measure("Data lost", "data units"),
+    "queue": Measure("UAVs waiting for a pad"),
+    "waiting": Measure("Waiting time for a pad", _SLOTS),
+    UTILISATION: Measure("Utilisation of the pads", less_is_better=False),
+    "failures": Measure("Failures of UAVs"),
+    "slots_grounded": Measure("Time under repair", _SLOTS),
+}
+
 # All metrics of a mission: shares of missions, and means over missions.
 SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)
-BOUNDED = (RATIO, PRODUCT)  # those of the means whose values lie between 0 and 1
+BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those of the means whose values lie between 0 and 1
 COST = "cost"  # of a study with prices
-LESS_IS_BETTER = (COST,)
+LESS_IS_BETTER = (COST, *(name for name, of in MEASURES.items() if of.less_is_better))
 
 
 class Parameter(NamedTuple):
@@ -78,6 +118,14 @@ _OTHERS = {
     "nodes": Parameter("Sensor nodes", "Nodes"),
     "quota": Parameter("Communication quota", "Quota", "communication slots"),
     "arrival_rate": Parameter("Arrival rate", "Arrivals", "data units per node and slot"),
+    "arrivals.buffer": Parameter("Buffer of a node", "Buffer", "packets"),
+    "charging.order": Parameter("Order of the queue for pads", "Order"),
+    "charging.power": Parameter("Power limit of all pads", "Power", "% per slot"),
+    "failures.uav_rate": Parameter("Failure rate of a UAV", "Failures", "per mission slot"),
+    "failures.uav_repair": Parameter("Mean time of a repair", "Repair", "mission slots"),
+    "failures.pad_rate": Parameter("Failure rate of a pad", "Pad failures", "per mission slot"),
+    "failures.node_rate": Parameter("Failure rate of a node", "Node failures", "per mission slot"),
+    "wind.strength": Parameter("Wind", "Wind", "% battery per move"),
 }
 
 
@@ -152,7 +200,19 @@ def _single(value: Any) -> Any:
 
 def metric_name(metric: str) -> str:
     """The name of a metric on pages."""
+    if metric in MEASURES:
+        return MEASURES[metric].name
     return METRICS.get(metric, metric.replace("_", " ").capitalize())
+
+
+def measured_in(missions: Container[str]) -> list[str]:
+    """The metrics of extended scenarios that a table of missions, or a row of it, has."""
+    return [name for name in OPERATIONS.names or () if name in missions]
+
+
+def metrics_in(missions: Container[str]) -> list[str]:
+    """The metrics that a table of missions has: those of the paper, then what was measured."""
+    return [*SHARES, *MEANS, *measured_in(missions)]
 
 
 def value_text(value: object) -> str:

@@ -9,7 +9,7 @@ slot for all UAVs of the batch. Missions are independent, so their records depen
 order of the missions nor on how they are divided into batches.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 from threading import Event
@@ -20,6 +20,7 @@ import numpy as np
 from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
+from dess.errors import InputError
 from dess.record import Records, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
@@ -62,8 +63,8 @@ def simulate_batch(
         change them.
 
     Raises:
-        InputError: If the seed or a replication is out of range, or if the team has more policies
-            than the largest fleet has UAVs.
+        InputError: If the seed or a replication is out of range, if the team has more policies
+            than the largest fleet has UAVs, or if a scenario needs the SimPy engine.
         ValueError: If a policy does not return actions.
     """
     numbers = _numbers(replications)
@@ -81,6 +82,7 @@ def simulate_batch(
     row = {identity: number for number, identity in enumerate(distinct)}
     kinds = np.array([row[id(space)] for space in scenario], np.int64)
     spaces = spaces_of([*distinct.values()])
+    check_slotted(spaces)
     team = team_of(policy, spaces)
     fleet, is_extended = (
         max((s.uavs[1] for s in spaces), default=0),
@@ -110,6 +112,20 @@ def simulate_batch(
             finally:  # after an error or Ctrl-C, let the other threads stop too
                 stop.set()
     return records
+
+
+def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
+    """Refuse scenarios that only the SimPy engine can simulate.
+
+    Raises:
+        InputError: If there is one.
+    """
+    for space in spaces:
+        if space.needs_events:
+            raise InputError(
+                f"arrivals.process: {space.arrivals.process} needs the SimPy engine; "
+                "allowed: the engine events, or slotted"
+            )
 
 
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -226,6 +227,14 @@ class MissionRecord:
         if name in (OPERATIONS.names or ()) and self.operations is not None:
             return self.operations[name].item()
         raise AttributeError(name)
+
+    @property
+    def measured(self) -> dict[str, float]:
+        """What was measured beyond the paper's metrics, without the columns that are nan."""
+        if self.operations is None:
+            return {}
+        values = {name: self.operations[name].item() for name in OPERATIONS.names or ()}
+        return {name: value for name, value in values.items() if not isnan(value)}
 
     def uav_rows(self) -> list[dict[str, Any]]:
         """A row per UAV: communications, battery [%], charging slots and how its mission ended."""

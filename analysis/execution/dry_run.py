@@ -16,13 +16,14 @@ from analysis.execution.effort import (
     check_workers_memory,
     seconds_per_mission,
 )
+from analysis.execution.engines import simulate_missions
 from analysis.execution.reuse import sources
 from analysis.results.chunks import Chunk, check_parts, parts_of
 from analysis.results.store import MANIFEST, Store
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
 from analysis.study.study import MANY_POINTS, Study
-from dess import InputError, simulate_batch
+from dess import InputError
 from dess.scenario import ScenarioSpace
 from policies import load_team
 
@@ -183,7 +184,7 @@ def check_policies(study: Study) -> None:
     for policy in study.policies:
         try:
             team = load_team(policy, max(space.uavs[1] for space in places))
-            simulate_batch(places, team, study.seed, len(places))
+            simulate_missions(study.engine, places, team, study.seed, range(len(places)))
         except InputError:
             raise
         except Exception:  # the run will record it as a failure

@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from analysis import numbers
-from dess import InputError, simulate, simulate_batch
+from analysis.execution.engines import simulate_missions
+from dess import InputError
 from dess.code.memory import check_memory
 from dess.scenario import ScenarioSpace
 
@@ -68,12 +69,7 @@ def seconds_per_mission(
     def trial(missions: int) -> float:
         spaces = spaces_of(missions)
         begin = clock()
-        if engine == "batch":
-            fleet = max(space.uavs[1] for space in spaces)
-            simulate_batch(spaces, team[:fleet], TRIAL_SEED, missions)
-        else:
-            for replication, space in enumerate(spaces):
-                simulate(space, team[: space.uavs[1]], TRIAL_SEED, replication)
+        simulate_missions(engine, spaces, team, TRIAL_SEED, range(missions))
         return (clock() - begin) / missions
 
     trial(ONE)  # compiles

@@ -14,15 +14,15 @@ from analysis.execution.effort import (
     check_workers_memory,
     seconds_per_mission,
 )
+from analysis.execution.engines import CHUNK
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
-from analysis.execution.runner import CHUNK
 from analysis.execution.workers import Here, Pool
 from analysis.names import MEANS, SHARES
 from analysis.results.chunks import Part, split
 from analysis.results.manifest import Cell
 from analysis.stats.intervals import Moments
 from dess import InputError, simulate_batch
-from dess.record import MISSION_RECORD, UAV_RECORD, Records
+from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.streams import MAX_REPLICATION
@@ -63,7 +63,8 @@ class Means:
 
     Attributes:
         policy: The team.
-        moments: For each metric its moments, which have its mean and interval.
+        moments: For each metric its moments, which have its mean and interval. What an extended
+            scenario measures is among the metrics; missions without a value are left out.
         uav_slots: Mission slots in which a UAV was active, summed over the UAVs of all missions.
         seconds: Time of the simulation [s], without compilation and the start of workers.
     """
@@ -140,7 +141,7 @@ def means(
     sums, uav_slots, seconds = _Sums(), 0, 0.0
     pieces = _pieces_of(missions, _together(scenario))
     for piece in _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock):
-        sums.add(piece.records.missions)
+        sums.add(piece.records)
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
     return Means(team, sums.all(), uav_slots, seconds)
 
@@ -198,6 +199,7 @@ def _check(scenario: ScenarioSpace, team: str, missions: int, seed: int, workers
 def _together(scenario: ScenarioSpace) -> int:
     """Number of missions to simulate together: a power of two whose records fit in ``MEMORY``."""
     each = MISSION_RECORD.itemsize + scenario.uavs[1] * UAV_RECORD.itemsize
+    each += OPERATIONS.itemsize if scenario.is_extended else 0
     return 2 ** ((MEMORY // each).bit_length() - 1)
 
 
@@ -214,19 +216,25 @@ class _Sums:
         self._waiting: list[dict[str, np.ndarray]] = []  # values of at most BLOCK missions
         self._missions = 0
 
-    def add(self, missions: np.ndarray) -> None:
+    def add(self, records: Records) -> None:
         """Add missions, of which ``BLOCK`` is a multiple if others follow."""
-        self._waiting.append({metric: missions[metric].astype(float) for metric in METRICS})
+        missions, measured = records.missions, records.operations
+        values = {metric: missions[metric].astype(float) for metric in METRICS}
+        names = (OPERATIONS.names or ()) if len(measured) else ()
+        values |= {name: measured[name] for name in names}
+        self._waiting.append(values)
         self._missions += len(missions)
         if self._missions % BLOCK == 0:
             self.all()
 
     def all(self) -> dict[str, Moments]:
         """The moments of all missions so far; those that come later form a new block."""
-        for metric in METRICS if self._waiting else ():
-            new = Moments.of(np.concatenate([values[metric] for values in self._waiting]))
-            held = self._moments.get(metric)
-            self._moments[metric] = held.with_others(new) if held else new
+        for metric in self._waiting[0] if self._waiting else ():
+            found = np.concatenate([values[metric] for values in self._waiting])
+            found = found[~np.isnan(found)]  # nan: not measured
+            if len(found):
+                new, held = Moments.of(found), self._moments.get(metric)
+                self._moments[metric] = held.with_others(new) if held else new
         self._waiting.clear()
         return self._moments
 

@@ -7,11 +7,12 @@ from typing import Any, Self
 
 import numpy as np
 
+from analysis.execution.engines import simulate_missions
 from analysis.results.chunks import Chunk, Part
 from analysis.results.manifest import Cell
 from analysis.results.store import Store
-from dess import InputError, simulate, simulate_batch
-from dess.record import Records, empty_records
+from dess import InputError, simulate
+from dess.record import Records
 from dess.scenario import ScenarioSpace
 from policies import load_team
 
@@ -46,16 +47,7 @@ class MissionsJob:
         team = load_team(self.policy, max(space.uavs[1] for space in self.spaces))
         rows = [(space, r) for space, r, _ in self._missions()]
         spaces, replications = [list(column) for column in zip(*rows, strict=True)]
-        if self.engine == "batch":
-            return simulate_batch(spaces, team, self.seed, replications, progress=progress)
-        records = empty_records(len(rows), max(space.uavs[1] for space in self.spaces))
-        for row, (space, replication) in enumerate(rows):
-            record = simulate(space, team[: space.uavs[1]], self.seed, replication)
-            records.missions[row] = record.metrics
-            records.uavs[row, : len(record.uavs)] = record.uavs
-            if progress:
-                progress(1)
-        return records
+        return simulate_missions(self.engine, spaces, team, self.seed, replications, progress)
 
     def alone(self) -> Iterator["MissionsJob"]:
         """A job for each of the missions."""

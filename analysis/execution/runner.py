@@ -18,6 +18,7 @@ import numpy as np
 
 from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
+from analysis.execution.engines import CHUNK
 from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.reuse import sources
 from analysis.execution.workers import Here, Pool
@@ -28,10 +29,6 @@ from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
-
-# Missions of a chunk, by engine: enough to fill a batch, few enough to lose little when
-# interrupted.
-CHUNK = {"batch": 500, "events": 50}
 
 Counts = list[list[int]]  # missions of every team and design point
 

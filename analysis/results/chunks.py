@@ -135,8 +135,9 @@ def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
     Raises:
         InputError: If two tables have different rows for the same mission.
     """
-    rows = _wanted(parts).merge(_stacked(tables), on=["cell", "replication"], how="left")
-    return rows[["point", *(name for name in tables[0].column_names if name != "cell")]]
+    stacked = _stacked(tables)
+    rows = _wanted(parts).merge(stacked, on=["cell", "replication"], how="left")
+    return rows[["point", *(name for name in stacked if name != "cell")]]
 
 
 def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
@@ -152,8 +153,8 @@ def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
 
 
 def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
-    """The rows of all tables."""
-    frame = pa.concat_tables(tables).to_pandas().astype({"cell": str})
+    """The rows of all tables; nan in columns that only others of them have."""
+    frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
     if frame.duplicated(one).any():  # such as after files of two folders were merged
         frame = frame.drop_duplicates()

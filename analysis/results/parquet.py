@@ -23,7 +23,7 @@ from analysis.results.documents import Key, Replication
 from dess import InputError
 from dess.code.memory import check_memory
 from dess.files import read_bytes, replacing, writable
-from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, Records
+from dess.record import EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.state import END_NAMES
 from dess.streams import MAX_REPLICATION
 
@@ -46,6 +46,8 @@ def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
 
 # The columns of the tables; ``cell`` is the key of the team and the scenario.
 MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
+# With what extended scenarios measure; nan where a mission lacks it.
+EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_columns(OPERATIONS)])
 UAVS = pa.schema(
     [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
 )
@@ -73,6 +75,8 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
     keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
     cells = np.repeat(keys, lengths)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
+    if len(records.operations):
+        missions |= {n: records.operations[n] for n in OPERATIONS.names or ()}
     present = np.arange(records.uavs.shape[1]) < records.missions["uavs"][:, None]
     mission, uav = np.nonzero(present)
     uavs = {
@@ -82,18 +86,28 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
     }
     uavs |= {name: records.uavs[name][present] for name in UAV_RECORD.names or ()}
     uavs["end"] = np.array(END_NAMES)[uavs["end"]]
-    return Tables(_table(missions, MISSIONS, chunk), _table(uavs, UAVS, chunk))
+    return Tables(_missions_table(missions, chunk), _table(uavs, UAVS, chunk))
 
 
 def tables_with(chunk: Chunk, missions: pd.DataFrame, uavs: pd.DataFrame) -> Tables:
     """The tables of a chunk from the rows of its missions, as ``rows_of`` returns them."""
     keys = {part.cell.point: part.cell.key for part in chunk.parts}
-    tables = []
-    for rows, schema in ((missions, MISSIONS), (uavs, UAVS)):
-        columns = {name: rows[name].to_numpy() for name in schema.names if name != "cell"}
-        columns["cell"] = rows["point"].map(keys).to_numpy()
-        tables.append(_table(columns, schema, chunk))
-    return Tables(*tables)
+
+    def columns_of(rows: pd.DataFrame) -> dict[str, np.ndarray]:
+        columns = {str(name): rows[name].to_numpy() for name in rows if name != "point"}
+        return columns | {"cell": rows["point"].map(keys).to_numpy()}
+
+    return Tables(
+        _missions_table(columns_of(missions), chunk), _table(columns_of(uavs), UAVS, chunk)
+    )
+
+
+def _missions_table(columns: dict[str, np.ndarray], chunk: Chunk) -> pa.Table:
+    """The table of the missions of a chunk: an extended one, if anything beyond was measured."""
+    names = [name for name in OPERATIONS.names or () if name in columns]
+    if any(not np.isnan(columns[name]).all() for name in names):
+        return _table(columns, EXTENDED_MISSIONS, chunk)
+    return _table({n: v for n, v in columns.items() if n not in names}, MISSIONS, chunk)
 
 
 def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> pa.Table:
@@ -138,11 +152,14 @@ def check(tables: Tables, rows: Sequence[Row], seed: int) -> None:
 
 
 def _check_numbers(table: pa.Table) -> None:
-    """Check that the numbers are finite, and that none but a reward is below 0."""
+    """Check that the numbers are finite, or not measured, and none but a reward is below 0."""
     for name, column in zip(table.column_names, table.columns, strict=True):
         if column.null_count:
             raise ValueError(f"the records have no {name}")
-        if pa.types.is_floating(column.type) and not np.isfinite(column).all():
+        values = column.to_numpy() if pa.types.is_floating(column.type) else np.zeros(0)
+        if name in (OPERATIONS.names or ()):
+            values = values[~np.isnan(values)]
+        if not np.isfinite(values).all():
             raise ValueError(f"the records have a {name} that is not a number")
         is_number = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
         if is_number and name != "reward" and (column.to_numpy() < 0).any():
@@ -200,7 +217,8 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
 
     Args:
         path: The file.
-        schema: The schema; by default that of an event log, whose values are checked as well.
+        schema: The schema; by default that of an event log, whose values are checked as well. The
+            schema of missions stands for that of extended missions too.
 
     Raises:
         InputError: If it cannot be read, or takes more memory than there is.
@@ -215,6 +233,8 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     try:
         # Texts stay numbers until it is known that they are few: a long one may be in every row.
         file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=words)
+        if schema is MISSIONS and file.schema_arrow.names == EXTENDED_MISSIONS.names:
+            schema = EXTENDED_MISSIONS
         if file.schema_arrow.names != schema.names:
             return None
         _check_size(path, file.metadata)

@@ -5,11 +5,13 @@
 """
 
 from collections.abc import Mapping, Sequence
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from analysis.names import measured_in
 from analysis.results.tables import Results
 from dess import InputError, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
@@ -75,7 +77,8 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
     tables = (results.missions, results.checks, results.uavs)
     missions, checks, uavs = (_rows(table, mission) for table in tables)
     if missions or checks:
-        return _by_field((missions or checks)[0], uavs)
+        row = (missions or checks)[0]
+        return _by_field(row, uavs) | {m: row[m] for m in measured_in(row) if not isnan(row[m])}
     raise InputError(
         f"{results.store.folder}: no mission of {policy}, point {point}, replication "
         f"{replication}; allowed: a mission of the study"
@@ -85,12 +88,13 @@ def recorded(results: Results, policy: str, point: int, replication: int) -> dic
 def difference(record: MissionRecord, fields: Mapping[str, Any]) -> str:
     """The stored fields that differ, in any bit, from a record, in words; empty if none does."""
     uavs = pd.DataFrame(record.uavs).assign(end=[END_NAMES[end] for end in record.uavs["end"]])
-    simulated = _by_field(record.metrics, uavs.to_dict("records"))
-    changed = [name for name in fields if simulated.get(name) != fields[name]]
+    simulated = _by_field(record.metrics, uavs.to_dict("records")) | record.measured
+    names = [*fields, *(name for name in record.measured if name not in fields)]
+    changed = [name for name in names if simulated.get(name) != fields.get(name)]
     if not changed:
         return ""
     first, more = changed[0], f", and {len(changed) - 1} more" if changed[1:] else ""
-    return f"{first} is {fields[first]} and {simulated.get(first)} when simulated again{more}"
+    return f"{first} is {fields.get(first)} and {simulated.get(first)} when simulated again{more}"
 
 
 def _by_field(mission: Any, uavs: Sequence[Mapping[Any, Any]]) -> dict[str, Any]:

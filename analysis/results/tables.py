@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.names import SWEEP, SWEEPS
+from analysis.names import SWEEP, SWEEPS, measured_in
 from analysis.results import commands
 from analysis.results.chunks import check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
@@ -30,7 +30,8 @@ class Results:
         store: The results folder.
         missions: One row per mission: ``policy``, ``point`` (number of the design point), the
             fields that the design sets and that are not in the record, and the fields of
-            ``MISSION_RECORD``. Rows are in the order of the policies in the study, then of point
+            ``MISSION_RECORD``, then those of ``OPERATIONS`` that were measured, with nan where a
+            mission lacks one. Rows are in the order of the policies in the study, then of point
             and replication. If the study has prices, ``cost`` is the last column.
         uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
             the fields of ``UAV_RECORD``, with ``end`` as a name.
@@ -182,6 +183,7 @@ def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
 def _labelled(manifest: Manifest, missions: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The missions of all policies, with the fields that the design sets and no record has."""
     table = _of_policies(missions)
+    table = table.drop(columns=[m for m in measured_in(table) if table[m].isna().all()])
     for position, (field, values) in enumerate(_swept(manifest).items(), 2):
         table.insert(position, field, table["point"].map(dict(enumerate(values))))
     return table

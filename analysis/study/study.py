@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import (
     BeforeValidator,
@@ -19,6 +19,7 @@ from pydantic import (
 from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
+from analysis.study.engine import Engine, engine_of
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
@@ -82,7 +83,9 @@ class StudyData(StrictTable):
     )
     costs: Costs | None = Field(None, description="prices, for questions about costs")
     seed: Integer = Field(0, ge=0, le=MAX_SEED)
-    engine: Literal["batch", "events"] = "batch"
+    engine: Engine = Field(
+        "batch", description="by default batch, or events if a design point needs it"
+    )
     logged: Integer = Field(
         0, ge=0, le=MOST, description="first replications of every cell whose event log is kept"
     )
@@ -133,6 +136,7 @@ class Study(StudyData):
             self.points  # noqa: B018 - they are checked when they are made
         else:
             self.point(0)
+        self._choose_engine()
         if self.logged > self.first:
             raise ValueError(
                 f"logged: {self.logged} is more than the missions; allowed: 0..{self.first}"
@@ -140,6 +144,15 @@ class Study(StudyData):
         self._check_budget()
         self._check_teams()
         return self
+
+    def _choose_engine(self) -> None:
+        """Take the SimPy engine if the study does not say which and a design point needs it."""
+        spaces = [self.point(0).scenario]
+        if self.size <= MANY_POINTS:
+            spaces = [point.scenario for point in self.points]
+        asked = self.engine if "engine" in self.model_fields_set else None
+        # The model is frozen, and this is a part of its making.
+        self.__dict__["engine"] = engine_of(spaces, asked)
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:

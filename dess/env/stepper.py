@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess import rules
+from dess.batch import check_slotted
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
@@ -84,6 +85,7 @@ class MissionStepper:
 
     def __init__(self, scenario: Scenario | ScenarioSpace, num_envs: int, seed: int):
         self.space = spaces_of([scenario])[0]
+        check_slotted([self.space])
         self.indices = np.arange(num_envs)
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.world, self._ranges = world_of(self.space), ranges_of(self.space)

@@ -36,17 +36,22 @@ def evaluate(
     ] = 1000,
     seed: SeedOption = 0,
     engine: Annotated[
-        Literal["batch", "events"],
-        typer.Option(help="batch is faster; both engines give the same records."),
-    ] = "batch",
+        Literal["batch", "events"] | None,
+        typer.Option(
+            help="batch is faster, and both engines give the same records; continuous arrivals "
+            "need events.  [default: batch, or events where it is needed]"
+        ),
+    ] = None,
     workers: WorkersOption = 1,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate many missions and print the means of their metrics with 95 % intervals."""
     from analysis.execution.evaluation import check_evaluation, means
+    from analysis.study.engine import engine_of
 
     space = load_space(scenario, settings)
+    engine = engine_of([space], engine)
     with console.compile_notice():
         check_evaluation(space, policy, missions, seed, engine, workers, yes)
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
@@ -77,7 +82,8 @@ def _print_rows(rows: list[dict[str, Any]]) -> None:
         cells = [[name, *(f"{x:.4f}" for x in value.values())] for name, value in metrics.items()]
         console.print_table([row["policy"], "mean", "low", "high"], cells)
         speed = row["uav_slots"] / row["seconds"]
+        engine = ", SimPy engine" if row["engine"] == "events" else ""
         console.say(
             f" {row['missions']} missions, {row['uav_slots']} UAV-slots in "
-            f"{row['seconds']:.2f} s: {speed:,.0f} UAV-slots/s"
+            f"{row['seconds']:.2f} s: {speed:,.0f} UAV-slots/s{engine}"
         )

@@ -128,7 +128,8 @@ def simulate(
                 writers[path](mission, temporary, path.suffix[1:])
     if as_json:
         metrics = {key: getattr(record, key) for key in METRICS}
-        print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()}, indent=2))
+        measured = {"operations": record.measured} if record.operations is not None else {}
+        print(json.dumps(asked.names | metrics | {"uavs": record.uav_rows()} | measured, indent=2))
     elif not is_binary:
         _print_mission(record)
 
@@ -258,9 +259,14 @@ def _animate(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _print_mission(record: "MissionRecord") -> None:
+    from analysis.names import MEASURES
+
     metrics = record.metrics
     rows = [[name, f"{metrics[name].item():g}"] for name in metrics.dtype.names or ()]
     console.print_table(["", "mission"], rows)
+    if measured := record.measured:
+        rows = [[MEASURES[name].label, f"{value:g}"] for name, value in measured.items()]
+        console.print_table(["", "beyond the paper"], rows)
     uavs = record.uav_rows()
     rows = [[str(number), *map(str, row.values())] for number, row in enumerate(uavs)]
     console.print_table(["UAV", *uavs[0]], rows)

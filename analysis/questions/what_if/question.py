@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from analysis import numbers
 from analysis.execution.dry_run import check_effort
+from analysis.execution.engines import simulate_missions
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
 from analysis.results.chunks import short_hash
@@ -28,7 +29,6 @@ from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.study import Study
-from dess import simulate_batch
 from dess.errors import InputError, one_of, validation_line
 from dess.scenario import SAMPLED, ScenarioSpace, fields_of, load_scenario
 from policies import load_team
@@ -134,7 +134,7 @@ def ask(
     for policy in study.policies:
         for point in study.points:
             team = load_team(policy, point.scenario.uavs[1])
-            simulate_batch(point.scenario, team, study.seed, 1)
+            simulate_missions(study.engine, [point.scenario], team, study.seed, [0])
     out = Path(folder) / NAME / key_of(study)
     others = sorted(p.parent for p in out.parent.glob(f"*/{MANIFEST}") if p.parent != out)
     check_effort(study, out, workers, reuse=others, yes=yes)
