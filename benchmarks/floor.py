@@ -12,7 +12,7 @@ from dess import channel, rules, streams
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.scenario import ScenarioSpace
-from dess.state import constants_of, empty_state, ranges_of
+from dess.state import constants_of, empty_state, ranges_of, types_of
 
 
 def needed_draws(
@@ -33,7 +33,9 @@ def needed_draws(
         state.missions["seed"], state.missions["replication"] = seed, replication
         mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
         sensors, teeth = state.sensors[0], state.teeth[0]
-        rules.launch(mission, ranges_of(scenario), uavs, residual, sensors, teeth)
+        rules.launch(
+            mission, ranges_of(scenario), types_of(scenario), uavs, residual, sensors, teeth
+        )
         scratch = empty_scratch(len(uavs), len(residual))
         counts = _count(
             mission, uavs, residual, sensors, teeth, actions[replication],

@@ -30,6 +30,7 @@ from dess.state import (
     ranges_of,
     spaces_of,
     teeth_lengths,
+    types_of,
 )
 from dess.view import decide, team_of
 
@@ -144,7 +145,8 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
     def key(index: int) -> tuple:
         s = spaces[index]
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
-        return (s.grid, s.communication_slots, channel, s.nodes)
+        speeds = tuple(kind.slots_per_cell for kind in s.fleet)
+        return (s.grid, s.communication_slots, channel, s.nodes, speeds)
 
     ordered = sorted(range(len(spaces)), key=key)
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
@@ -159,6 +161,7 @@ class _Batch:
         self.constants["seed"] = seed
         self.ranges = np.stack([ranges_of(space) for space in spaces])
         self.uavs, self.lengths = int(self.ranges[:, 0, 1].max()), teeth_lengths(spaces)
+        self.types = np.stack([types_of(space, self.uavs) for space in spaces])
 
     def run(self, jobs, which, numbers, records, progress, stop) -> None:
         """Simulate the missions ``jobs`` and write their records, until ``stop`` is set."""
@@ -167,7 +170,7 @@ class _Batch:
         scratch = empty_scratch(self.uavs, nodes)
         job_of = np.full(size, -1)
         queue = np.array([0, 0])  # next job, jobs done
-        source = (self.constants, self.ranges, which, numbers, jobs)
+        source = (self.constants, self.ranges, self.types, which, numbers, jobs)
         for b in range(size):
             _next_mission(b, job_of, queue, source, state)
         # Reporting holds Python's global lock, so about a hundred reports are made in all.
@@ -183,7 +186,7 @@ class _Batch:
 @kernel
 def _next_mission(b, job_of, queue, source, state):
     """Start the next job in place ``b``; if no job is left, the place stays empty."""
-    constants, ranges, which, numbers, jobs = source
+    constants, ranges, types, which, numbers, jobs = source
     mission = state.missions[b]
     if queue[0] == len(jobs):
         job_of[b] = -1
@@ -195,7 +198,7 @@ def _next_mission(b, job_of, queue, source, state):
     state.missions[b] = constants[which[job]]
     mission.replication = numbers[job]
     rules.launch(
-        mission, ranges[which[job]],
+        mission, ranges[which[job]], types[which[job]],
         state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
     )  # fmt: skip
 

@@ -16,6 +16,7 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import inlined, kernel
 from dess.scenario import ScenarioSpace
+from dess.sections import fleet
 from dess.state import STEP_X, STEP_Y
 
 GROUP = 4  # communication slots whose shadowing one Philox block holds
@@ -45,13 +46,14 @@ class World(NamedTuple):
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
-        mean_snr: (M, m * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
-            and ``b / m`` cells along the other. These are all relative positions from which a UAV
-            can serve a node.
+        mean_snr: (M, F * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
+            and ``b / F`` cells along the other. These are all relative positions from which a UAV
+            can serve a node. F is m, or a multiple of it if a move may take several slots.
         order: (5 * M * M, K + 1) for each step, the nodes in descending order of their highest
-            mean SNR in the slot; the last column tells whether the row is filled.
+            mean SNR in the slot; the last column tells whether the row is filled. If a move may
+            take several slots, there are such rows for each leg (``fleet.leg``).
         means: (5 * M * M, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
-            communication slot.
+            communication slot; rows as in ``order``.
     """
 
     nodes: np.ndarray
@@ -96,13 +98,15 @@ def world_of(scenario: ScenarioSpace) -> World:
 @lru_cache(maxsize=8)
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, grid = scenario.communication_slots, scenario.grid
+    places = m * fleet.places_per_slot(scenario.fleet)
     coarse = np.arange(grid)[:, None]
-    fine = np.arange(m * (grid - 1) + 1)[None, :] / m
+    fine = np.arange(places * (grid - 1) + 1)[None, :] / places
     horizontal = scenario.cell_size * np.hypot(coarse, fine)
     distance = np.hypot(horizontal, scenario.altitude)
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
     mean_snr = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
-    nodes, steps = np.array(scenario.nodes, np.int64), 5 * grid * grid
+    nodes = np.array(scenario.nodes, np.int64)
+    steps = 5 * grid * grid * fleet.legs(scenario.fleet)
     # The operating system allocates memory page by page as the rows are filled.
     order = np.zeros((steps, len(nodes) + 1), np.int16)
     return World(nodes, mean_snr, order, np.zeros((steps, len(nodes), m)))
@@ -112,14 +116,17 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
 def _fill_row(u, row, nodes, mean_snr, order, means):
     """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR."""
     count, m = means.shape[1:]
+    places = (mean_snr.shape[1] - 1) // (mean_snr.shape[0] - 1)  # per cell
+    part = places // (m * u.slots_per_cell)  # places that the UAV flies per communication slot
     step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
     value = np.empty((count, m))
     high = np.full(count, -math.inf)
     for k in range(count):
         dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
-        fine, coarse = (m * dx, dy) if along_x else (m * dy, dx)
-        for n in range(m):  # the UAV has still (m - 1 - n) / m of the step before it
-            value[k, n] = mean_snr[abs(coarse), abs(fine - (m - 1 - n) * step)]
+        fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
+        for n in range(m):  # the UAV has still this part of the step before it
+            ahead = (u.slots_left * m + m - 1 - n) * part
+            value[k, n] = mean_snr[abs(coarse), abs(fine - ahead * step)]
             high[k] = max(high[k], value[k, n])
     ranking = np.argsort(-high, kind="mergesort")
     for rank in range(count):
@@ -131,7 +138,7 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
 @inlined
 def open_group(mission, i, u, nodes, mean_snr, order, means, search):
     """Begin a group of communication slots for UAV ``i``, without drawing any shadowing."""
-    row = (u.executed * mission.grid + u.y) * mission.grid + u.x
+    row = ((fleet.leg(u) * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
     search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
     if order[row, mission.nodes] == 0:
         _fill_row(u, row, nodes, mean_snr, order, means)

@@ -30,6 +30,7 @@ from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.record import EventLog, MissionRecord, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sections import fleet
 from dess.state import (
     BATTERY,
     QUOTA,
@@ -39,6 +40,7 @@ from dess.state import (
     ranges_of,
     spaces_of,
     teeth_lengths,
+    types_of,
 )
 from dess.view import decide, team_of
 
@@ -113,8 +115,9 @@ class MissionModel:
         self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
         self.sensors, self.teeth = self.state.sensors[0], self.state.teeth[0]
         rules.launch(
-            self.mission, ranges_of(scenario), self.uavs, self.residual, self.sensors, self.teeth
-        )
+            self.mission, ranges_of(scenario), types_of(scenario),
+            self.uavs, self.residual, self.sensors, self.teeth,
+        )  # fmt: skip
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
         self.zone = ChargingZone(self.env, int(self.mission["pads"]), log)
@@ -247,8 +250,9 @@ class MissionModel:
         for i in self.fleet:
             u = self.uavs[i]
             if u["active"] and u["served"] >= 0:
-                x = u["from_x"] + (u["x"] - u["from_x"]) * n / m
-                y = u["from_y"] + (u["y"] - u["from_y"]) * n / m
+                flown = fleet.share_flown(self.mission, u, n)
+                x = u["from_x"] + (u["x"] - u["from_x"]) * flown
+                y = u["from_y"] + (u["y"] - u["from_y"]) * flown
                 self.log.add(start + n / m, "communication", i, u["served"], u["amount"], x, y)
 
     def _log_arrivals(self) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from dess import channel, streams
 from dess.code.kernels import inlined, kernel
-from dess.sections import age
+from dess.sections import age, fleet, wind
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -61,12 +61,13 @@ def zone_number(mission, x, y):
 
 
 @kernel
-def launch(mission, ranges, uavs, residual, sensors, teeth):
+def launch(mission, ranges, types, uavs, residual, sensors, teeth):
     """Start a mission: draw its parameters, start cells and initial data.
 
     Args:
         mission: ``MISSION`` record with its seed, replication and constants set.
         ranges: (4, 2) ranges of the sampled parameters.
+        types: (I,) ``UAV_TYPE`` records.
         uavs: (I,) ``UAV`` records, overwritten.
         residual: (K,) residual data [data units], overwritten.
         sensors: (K,) ``SENSOR`` records, overwritten.
@@ -77,7 +78,7 @@ def launch(mission, ranges, uavs, residual, sensors, teeth):
     mission.active = mission.uavs
     mission.arrived = mission.collected = mission.slot_collected = mission.newest = 0.0
     teeth[:] = 0
-    _launch_uavs(mission, uavs)
+    _launch_uavs(mission, types, uavs)
     mission.initial = 0.0
     spread = mission.initial_high - mission.initial_low
     for k in range(mission.nodes):
@@ -92,16 +93,20 @@ def launch(mission, ranges, uavs, residual, sensors, teeth):
 
 
 @kernel
-def _launch_uavs(mission, uavs):
+def _launch_uavs(mission, types, uavs):
     """Draw distinct start cells in the zone, without replacement."""
     cells = mission.zone_width * mission.zone_height
     free_cells = np.arange(cells)  # entries 0 to i - 1 are the cells already drawn
     for i in range(len(uavs)):
-        u = uavs[i]
+        u, kind = uavs[i], types[i]
+        u.quota, u.slots_per_cell, u.rate = kind.quota, kind.slots_per_cell, kind.rate
+        u.slots_left = 0
         u.active = i < mission.uavs
         u.end = ACTIVE
         u.latch = u.charging = u.overruled = False
-        u.battery = mission.flying_time if u.active else 0
+        u.battery = 0
+        if u.active:
+            u.battery = kind.flying_time if kind.flying_time > 0 else mission.flying_time
         u.communications = u.slots_flying = u.slots_charging = u.slots_waiting = 0
         u.action = u.executed = HOVER
         u.pad_request = u.served = -1
@@ -131,11 +136,14 @@ def resolve(mission, uavs):
 
     A move off the grid becomes Hover, and so does a move into a cell that another active UAV will
     occupy. A cancelled move can block the move of another UAV, so the check is repeated until no
-    move is cancelled. The result does not depend on the numbering of the UAVs.
+    move is cancelled. The result does not depend on the numbering of the UAVs. A UAV in the middle
+    of a move flies on; the cell that it flies to is its own.
     """
     count = mission.uavs
     for i in range(count):
         u = uavs[i]
+        if u.active and fleet.continue_move(u):
+            continue
         u.from_x, u.from_y = u.x, u.y
         u.overruled = False
         if not u.active:
@@ -143,6 +151,7 @@ def resolve(mission, uavs):
         if u.charging:
             u.action = HOVER
         u.executed = u.action
+        u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
         u.x += STEP_X[u.action]
         u.y += STEP_Y[u.action]
         if not on_grid(mission, u.x, u.y):
@@ -155,7 +164,7 @@ def resolve(mission, uavs):
         # Mark all collisions first, then cancel, so that the order of the UAVs does not matter.
         for i in range(count):
             u = uavs[i]
-            if u.active and u.executed != HOVER:
+            if u.active and u.executed != HOVER and fleet.begins_move(u):
                 for j in range(count):
                     if j != i and uavs[j].active and _collide(mission, u, uavs[j]):
                         u.overruled = True
@@ -185,6 +194,7 @@ def _collide(mission, u, other):
 def _cancel(u):
     u.x, u.y = u.from_x, u.from_y
     u.executed = HOVER
+    u.slots_left = 0
     u.overruled = True
 
 
@@ -240,10 +250,20 @@ def spend(mission, uavs):
             u.slots_charging += 1
         else:
             u.battery -= mission.flight_cost
+            if mission.wind_most > 0:
+                _spend_against_wind(mission, u)
             u.slots_flying += 1
             if u.pad_request >= 0:
                 u.slots_waiting += 1
     mission.slot_collected = 0.0
+
+
+@inlined
+def _spend_against_wind(mission, u):
+    """Take the surcharge of a move, in its first slot; a battery is never below 0."""
+    if fleet.begins_move(u):
+        extra = wind.move_surcharge(mission, u.x - u.from_x, u.y - u.from_y, u.x, u.y)
+        u.battery = max(u.battery - mission.flight_cost * extra, 0)
 
 
 @inlined
@@ -266,7 +286,7 @@ def communicate(
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
-        amount = min(channel.rate(mission, snr), residual[node])
+        amount = min(channel.rate(mission, snr) * u.rate, residual[node])
         residual[node] -= amount
         if residual[node] == 0.0:
             age.empty(mission, sensors[node], teeth, n)
@@ -333,7 +353,7 @@ def settle(mission, uavs):
         u.reward = 0.0
         if not u.active:
             continue
-        if u.communications >= mission.quota:
+        if u.communications >= u.quota:
             u.end = QUOTA
         elif u.battery <= 0:
             u.end = BATTERY

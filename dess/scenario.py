@@ -29,7 +29,7 @@ from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
 from dess.sections.failures import Failures
-from dess.sections.fleet import UavType
+from dess.sections.fleet import UavType, legs, places_per_slot
 from dess.sections.section import Integer, Number, Section, tuples
 from dess.sections.wind import Wind
 
@@ -183,7 +183,13 @@ class _Constants(BaseModel):
             twice = next(node for node in self.nodes if self.nodes.count(node) > 1)
             raise ValueError(f"nodes: {list(twice)} is listed twice; allowed: distinct cells")
         steps = 5 * self.grid**2 * len(self.nodes) * self.communication_slots
-        if steps > _CHANNEL_LIMIT:
+        places = self.grid**2 * self.communication_slots * places_per_slot(self.fleet)
+        if max(steps * legs(self.fleet), places) > _CHANNEL_LIMIT:
+            if self.fleet and steps <= _CHANNEL_LIMIT:
+                raise ValueError(
+                    "fleet: slots_per_cell of the types need too large a table of the channel; "
+                    "allowed: smaller or fewer different ones"
+                )
             raise ValueError(
                 "grid, nodes, communication_slots: too many together; allowed: "
                 f"5 * grid^2 * nodes * communication_slots <= {_CHANNEL_LIMIT}"

@@ -15,6 +15,7 @@ from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.sections import fleet, wind
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
 ACTION_NAMES = ("north", "east", "south", "west", "hover")
@@ -55,6 +56,13 @@ MISSION = np.dtype(
         # channel and data
         ("communication_slot_length", np.float64),
         ("shadowing_deviation", np.float64),
+        # wind: its mean and its deviation from cell to cell, as pushes [% of battery per cell]
+        ("wind_x", np.float64),
+        ("wind_y", np.float64),
+        ("wind_gusts", np.float64),
+        ("wind_seed", np.uint64),
+        ("wind_most", np.int64),  # the largest surcharge of a move [%], 0 without wind
+        ("slowest", np.int64),  # the most slots that a UAV of the fleet takes for a cell
         ("initial_low", np.float64),
         ("initial_high", np.float64),
         ("arrival_rate", np.float64),
@@ -88,6 +96,9 @@ UAV = np.dtype(
         ("from_y", np.int64),
         ("battery", np.int64),
         ("communications", np.int64),  # communication slots counted toward the quota
+        ("quota", np.int64),
+        ("slots_per_cell", np.int64),  # that a move takes
+        ("slots_left", np.int64),  # of its move, after the present one
         ("action", np.int64),  # chosen by the policy
         ("executed", np.int64),  # what the safety controller made of it
         ("end", np.int64),
@@ -100,6 +111,7 @@ UAV = np.dtype(
         ("latch", np.bool_),  # charging latch iota
         ("charging", np.bool_),  # holds a pad
         ("overruled", np.bool_),
+        ("rate", np.float64),  # factor of the rate at which it collects data
         ("amount", np.float64),  # collected in the present communication slot
         ("collected", np.float64),  # in the mission
         ("reward", np.float64),  # of the present slot
@@ -179,12 +191,20 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
     mission["initial_low"], mission["initial_high"] = scenario.initial_data
     mission["communication_slot_length"] = scenario.slot_length / scenario.communication_slots
     mission["shadowing_deviation"] = np.sqrt(scenario.shadowing_variance)
+    for name, constant in wind.constants(scenario.wind, scenario.grid).items():
+        mission[name] = constant
+    mission["slowest"] = fleet.slowest(scenario.fleet)
     return mission
 
 
 def ranges_of(scenario: ScenarioSpace) -> np.ndarray:
     """The (4, 2) low and high ends of the sampled parameters, in the order of ``SAMPLED``."""
     return np.array([getattr(scenario, name) for name in SAMPLED], np.int64)
+
+
+def types_of(scenario: ScenarioSpace, uavs: int | None = None) -> np.ndarray:
+    """(I,) ``UAV_TYPE`` records; without ``uavs``, as many as the largest fleet of the scenario."""
+    return fleet.types_of(scenario.fleet, scenario.quota, uavs or scenario.uavs[1])
 
 
 @kernel

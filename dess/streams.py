@@ -26,6 +26,7 @@ INITIAL_DATA = 2  # initial data per node
 SHADOWING = 3  # shadow fading per UAV, node and communication slot
 ARRIVAL = 4  # new data per node and mission slot
 POLICY = 5  # a policy's own randomness
+WIND = 6  # gusts per cell; the seed is that of the wind
 
 MAX_SEED = 2**64 - 1
 MAX_REPLICATION = 2**32 - 1

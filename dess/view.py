@@ -79,14 +79,15 @@ class View:
 def legal_actions(missions, uavs, rows_mission, rows_uav):
     """(R, 5) mask of the actions that stay on the grid.
 
-    Only Hover is allowed for a UAV that charges or is not active, and where its index is -1.
+    Only Hover is allowed for a UAV that charges, is not active or is in the middle of a move, and
+    where its index is -1.
     """
     legal = np.zeros((len(rows_mission), 5), np.bool_)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         u = uavs[b, i]
         legal[row, HOVER] = True
-        if i >= 0 and u.active and not u.charging:
+        if i >= 0 and u.active and not u.charging and u.slots_left == 0:
             for action in range(4):
                 x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
                 legal[row, action] = on_grid(missions[b], x, y)
@@ -97,8 +98,9 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
 def acting_rows(missions, uavs, policies, number):
     """The (R,) missions and (R,) UAV indices of the UAVs for which one policy must act.
 
-    These UAVs are active and not charging. In a team of ``policies`` policies, UAV i follows policy
-    number ``i % policies``; the function selects the UAVs that follow policy ``number``.
+    These UAVs are active, not charging and not in the middle of a move. In a team of ``policies``
+    policies, UAV i follows policy number ``i % policies``; the function selects the UAVs that
+    follow policy ``number``.
     """
     rows_mission = np.empty(uavs.size, np.int64)
     rows_uav = np.empty(uavs.size, np.int64)
@@ -106,7 +108,8 @@ def acting_rows(missions, uavs, policies, number):
     for b in range(len(missions)):
         if missions[b].active > 0:
             for i in range(number, missions[b].uavs, policies):
-                if uavs[b, i].active and not uavs[b, i].charging:
+                u = uavs[b, i]
+                if u.active and not u.charging and u.slots_left == 0:
                     rows_mission[count] = b
                     rows_uav[count] = i
                     count += 1

@@ -25,6 +25,7 @@ from dess.state import (
     ranges_of,
     spaces_of,
     teeth_lengths,
+    types_of,
 )
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
@@ -89,7 +90,7 @@ class MissionStepper:
         self.indices = np.arange(num_envs)
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.world, self._ranges = world_of(self.space), ranges_of(self.space)
-        self._constants = constants_of(self.space)
+        self._constants, self._types = constants_of(self.space), types_of(self.space)
         self.state = empty_state(num_envs, fleet, nodes, teeth_lengths([self.space]))
         self._scratch = empty_scratch(fleet, nodes)
         self.start_at(seed, 0)
@@ -131,7 +132,7 @@ class MissionStepper:
     def launch(self, environments: np.ndarray) -> None:
         """Start the next replications in these environments, in this order."""
         check_seed(self.seed, self._next + len(environments) - 1)
-        _launch(environments, self._next, self._constants, self._ranges, self.state)
+        _launch(environments, self._next, self._constants, self._ranges, self._types, self.state)
         self._next += len(environments)
 
     def step(self, actions: np.ndarray) -> Outcome:
@@ -153,7 +154,7 @@ class MissionStepper:
 
 
 @kernel
-def _launch(environments, first, constants, ranges, state):
+def _launch(environments, first, constants, ranges, types, state):
     """Start the replications from ``first`` on in these environments."""
     for n in range(len(environments)):
         b = environments[n]
@@ -161,8 +162,9 @@ def _launch(environments, first, constants, ranges, state):
         mission = state.missions[b]
         mission.replication = first + n
         rules.launch(
-            mission, ranges, state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b]
-        )
+            mission, ranges, types,
+            state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
+        )  # fmt: skip
 
 
 @kernel

@@ -93,7 +93,7 @@ def _encode_uav(mission, uavs, i, residual, out):
     out[1] = u.x * cell
     out[2] = u.y * cell
     out[3] = u.battery / 100.0
-    out[4] = _quota_share(mission, u)
+    out[4] = _quota_share(u)
     out[5] = u.latch
     out[6] = u.charging
     out[7] = u.pad_request >= 0 and not u.charging
@@ -116,15 +116,15 @@ def _encode_uav(mission, uavs, i, residual, out):
             out[at + 1] = (mate.x - u.x) * cell
             out[at + 2] = (mate.y - u.y) * cell
             out[at + 3] = mate.battery / 100.0
-            out[at + 4] = _quota_share(mission, mate)
+            out[at + 4] = _quota_share(mate)
             out[at + 5] = mate.charging
         at += 6
 
 
 @kernel
-def _quota_share(mission, u):
+def _quota_share(u):
     """Communications as a share of the quota, at most 1; the last slot may exceed the quota."""
-    return min(u.communications / mission.quota, 1.0)
+    return min(u.communications / u.quota, 1.0)
 
 
 @kernel

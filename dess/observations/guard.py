@@ -26,7 +26,7 @@ SCARCE_SLOTS = 6
 def slots_needed(mission, u):
     """Flying slots until the quota of UAV ``u`` is filled, if it collects data in all of them."""
     m = mission.communication_slots
-    return (mission.quota - u.communications + m - 1) // m
+    return (u.quota - u.communications + m - 1) // m
 
 
 @inlined

@@ -1,7 +1,16 @@
-"""Types of UAVs, for fleets whose UAVs differ."""
+"""Types of UAVs, for fleets whose UAVs differ.
 
+A UAV that takes s mission slots for a move holds the cell that it flies to from the first of them
+on. Until it is there, it has nothing to decide.
+"""
+
+from collections.abc import Sequence
+from math import lcm
+
+import numpy as np
 from pydantic import Field
 
+from dess.code.kernels import inlined
 from dess.sections.section import Integer, Number, Section
 
 
@@ -23,3 +32,85 @@ class UavType(Section):
     rate: Number = Field(
         1.0, ge=0.001, le=1000, description="factor of the rate at which the UAV collects data"
     )
+
+
+Fleet = Sequence[UavType]
+
+# What ``rules.launch`` needs to know of a UAV. The fields are those of ``UavType``; a flying time
+# of 0 is that of the mission.
+UAV_TYPE = np.dtype(
+    [
+        ("flying_time", np.int64),
+        ("slots_per_cell", np.int64),
+        ("quota", np.int64),
+        ("rate", np.float64),
+    ]
+)
+
+
+def type_of(fleet: Fleet, uav: int) -> UavType:
+    """The type of a UAV by its index."""
+    return fleet[uav % len(fleet)] if fleet else UavType.off()
+
+
+def types_of(fleet: Fleet, quota: int, uavs: int) -> np.ndarray:
+    """(I,) ``UAV_TYPE`` records.
+
+    Args:
+        fleet: The types of a scenario.
+        quota: Its quota, for types without one.
+        uavs: The number of UAVs (I).
+    """
+    kinds = [type_of(fleet, i) for i in range(uavs)]
+    rows = [(k.flying_time or 0, k.slots_per_cell, k.quota or quota, k.rate) for k in kinds]
+    return np.array(rows, UAV_TYPE)
+
+
+def slowest(fleet: Fleet) -> int:
+    """The most slots that a UAV takes for a cell."""
+    return max((kind.slots_per_cell for kind in fleet), default=1)
+
+
+def legs(fleet: Fleet) -> int:
+    """The number of different legs: the mission slots of a move, for each speed up to the slowest.
+
+    A move that takes s slots has s legs (``leg``).
+    """
+    return slowest(fleet) * (slowest(fleet) + 1) // 2
+
+
+def places_per_slot(fleet: Fleet) -> int:
+    """The least number L so that each UAV flies a whole number of (1/L) cells in a mission slot."""
+    return lcm(*(kind.slots_per_cell for kind in fleet))
+
+
+@inlined
+def leg(u):
+    """The number of a UAV's leg in the present slot, from 0 on; the only one of s = 1 is 0."""
+    s = u.slots_per_cell
+    return s * (s - 1) // 2 + s - 1 - u.slots_left
+
+
+@inlined
+def continue_move(u):
+    """Whether a UAV is in the middle of a move; if so, let it fly on for one slot."""
+    if u.slots_left == 0:
+        return False
+    u.slots_left -= 1
+    u.action = u.executed
+    u.overruled = False
+    return True
+
+
+@inlined
+def begins_move(u):
+    """Whether a UAV that moves begins its move in the present slot."""
+    return u.slots_left == u.slots_per_cell - 1
+
+
+@inlined
+def share_flown(mission, u, n):
+    """The share of its move that a UAV has flown at communication slot ``n`` = 1..m."""
+    m = mission.communication_slots
+    s = u.slots_per_cell
+    return ((s - 1 - u.slots_left) * m + n) / (s * m)

@@ -1,7 +1,17 @@
-"""Wind: moves against it cost more battery."""
+"""Wind: moves against it cost more battery.
 
+The wind in a cell is the mean wind plus a gust. Its components are pushes: what the battery loses
+when the UAV moves one cell against them [%].
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
 from pydantic import Field
 
+from dess import streams
+from dess.code.kernels import inlined, kernel
 from dess.sections.section import Integer, Number, Section
 
 
@@ -15,9 +25,85 @@ class Wind(Section):
         description="battery that a move against the mean wind costs more [%]; 0 for none",
     )
     direction: Number = Field(
-        0.0, ge=0, le=360, description="where the mean wind comes from [degrees from north]"
+        0.0,
+        ge=0,
+        le=360,
+        description="where the mean wind comes from [degrees from north, clockwise]",
     )
     gusts: Number = Field(
         0.0, ge=0, le=10, description="standard deviation of the wind from cell to cell [%]"
     )
     seed: Integer = Field(0, ge=0, le=2**32 - 1, description="seed of the field of wind")
+
+    def push(self) -> tuple[float, float]:
+        """The mean wind [% per cell] towards east and towards south."""
+        towards = math.radians(self.direction)
+        return -self.strength * math.sin(towards), self.strength * math.cos(towards)
+
+
+@inlined
+def surcharge(gusts, seed, grid, wind_x, wind_y, step_x, step_y, x, y):
+    """The battery [%] that a move into cell ``x, y`` costs beyond that in still air.
+
+    Batteries are integers, so a fraction is rounded up or down by a draw per cell; its expected
+    value is the fraction. A tail wind saves nothing.
+
+    Args:
+        gusts: Standard deviation of the wind from cell to cell [% per cell].
+        seed: Seed of the field.
+        grid: Cells along one side.
+        wind_x, wind_y: The mean wind [% per cell].
+        step_x, step_y: The step of the move [cells]; the surcharge of no step is 0.
+        x, y: The cell that the move leads to.
+    """
+    words = streams.block(seed, 0, streams.WIND, 0, 0, y * grid + x)
+    east = wind_x + gusts * streams.normal(words[0])
+    south = wind_y + gusts * streams.normal(words[1])
+    against = -(east * step_x + south * step_y)
+    if against <= 0.0:
+        return 0
+    return int(math.floor(against + streams.uniform(words[2 if step_y == 0 else 3])))
+
+
+@inlined
+def move_surcharge(mission, step_x, step_y, x, y):
+    """The surcharge [%] of a move of a mission; see ``surcharge``."""
+    if mission.wind_most == 0 or (step_x == 0 and step_y == 0):
+        return 0
+    return surcharge(
+        mission.wind_gusts, mission.wind_seed, mission.grid,
+        mission.wind_x, mission.wind_y, step_x, step_y, x, y,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=16)
+def surcharges(wind: Wind, grid: int) -> np.ndarray:
+    """(4, M, M) surcharges [%] of the moves north, east, south and west into cell ``y, x``."""
+    table = np.zeros((4, grid, grid), np.int64)
+    if wind.is_on:
+        _fill(wind.gusts, wind.seed, *wind.push(), table)
+    table.flags.writeable = False
+    return table
+
+
+@kernel
+def _fill(gusts, seed, wind_x, wind_y, table):
+    grid = table.shape[1]
+    for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+        for y in range(grid):
+            for x in range(grid):
+                table[action, y, x] = surcharge(
+                    gusts, seed, grid, wind_x, wind_y, step_x, step_y, x, y
+                )
+
+
+def constants(wind: Wind, grid: int) -> dict[str, float]:
+    """The fields of ``MISSION`` that describe the wind."""
+    wind_x, wind_y = wind.push()
+    return {
+        "wind_x": wind_x,
+        "wind_y": wind_y,
+        "wind_gusts": wind.gusts,
+        "wind_seed": wind.seed,
+        "wind_most": surcharges(wind, grid).max(),
+    }

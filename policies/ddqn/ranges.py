@@ -19,7 +19,7 @@ from dess.observations.states import (
     Y,
 )
 from dess.scenario import SAMPLED, ScenarioSpace
-from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of
+from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of, types_of
 
 # What a mission has of its own; all other fields are constants of the scenario.
 _PROGRESS = ("replication", "slot", "active", "initial", "arrived", "collected", "slot_collected")
@@ -52,7 +52,13 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
         _require(uavs, name, -1, edge)
         _require(uavs[is_there], name, 0, edge)
     _require(uavs, "battery", 0, 100)
-    _require(uavs, "communications", 0, space.quota + space.communication_slots)
+    types = np.broadcast_to(types_of(space, uavs.shape[1]), uavs.shape)
+    for name in ("quota", "slots_per_cell", "rate"):
+        if (uavs[name] != types[name])[is_there].any():
+            raise ValueError(f"uavs: {name} is not that of the scenario")
+    _require(uavs, "communications", 0, int(types["quota"].max()) + space.communication_slots)
+    if not ((uavs["slots_left"] >= 0) & (uavs["slots_left"] < uavs["slots_per_cell"])).all():
+        raise ValueError("uavs: slots_left is out of range")
     for name in ("action", "executed"):
         _require(uavs, name, 0, len(ACTION_NAMES) - 1)
     _require(uavs, "end", 0, len(END_NAMES) - 1)

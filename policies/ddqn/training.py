@@ -335,7 +335,7 @@ def _lower_batteries(missions, uavs, residual, environments, draws):
         for i in range(mission.uavs):
             u = uavs[environments[n], i]
             u.battery = battery
-            u.communications = min(slots_flown * mission.communication_slots, mission.quota - 1)
+            u.communications = min(slots_flown * mission.communication_slots, u.quota - 1)
             u.latch = True
         for k in range(mission.nodes):
             if draws[n, 2 + k] < draws[n, 1]:

@@ -23,6 +23,7 @@ from dess.state import (
     constants_of,
     empty_state,
     ranges_of,
+    types_of,
 )
 from tests.drawn import EAST, NORTH, SOUTH, WEST, cells, replications, scenarios, seeds, spaces
 
@@ -38,6 +39,7 @@ def _launched(scenario: Scenario, seed: int = 1, replication: int = 2) -> tuple[
     rules.launch(
         state.missions[0],
         ranges_of(space),
+        types_of(space),
         state.uavs[0],
         state.residual[0],
         state.sensors[0],
@@ -58,7 +60,13 @@ def test_uavs_start_on_distinct_cells_of_the_zone(
     state.missions["seed"], state.missions["replication"] = seed, replication
     mission, uavs = state.missions[0], state.uavs[0]
     rules.launch(
-        mission, ranges_of(space), uavs, state.residual[0], state.sensors[0], state.teeth[0]
+        mission,
+        ranges_of(space),
+        types_of(space),
+        uavs,
+        state.residual[0],
+        state.sensors[0],
+        state.teeth[0],
     )
     fleet = uavs[: mission["uavs"]]
     x, y, width, height = space.zone
