@@ -8,6 +8,8 @@ import numpy as np
 
 from dess.code.kernels import kernel
 from dess.sections.age import write_age
+from dess.sections.charging import write_use
+from dess.sections.failures import write_failures
 from dess.state import END_NAMES, QUOTA
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
@@ -60,6 +62,7 @@ OPERATIONS = np.dtype(
         ("lost", np.float64),  # data lost by full buffers and failures
         ("queue", np.float64),  # UAVs that wait for a pad, mean over time
         ("waiting", np.float64),  # mean time from the request for a pad to its grant or withdrawal
+        ("pad_requests", np.float64),  # how often UAVs have asked for a pad
         ("utilisation", np.float64),  # mean share of the pads in use
         ("failures", np.float64),  # of UAVs
         ("slots_grounded", np.float64),  # of UAVs under repair
@@ -149,6 +152,10 @@ def write_operations(mission, uavs, sensors, teeth, out):
     """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
     if mission.age_measured != 0:
         write_age(mission, sensors, teeth, out)
+    if mission.has_charging:
+        write_use(mission, uavs, out)
+    if mission.has_failures:
+        write_failures(mission, out)
 
 
 def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Records:

@@ -10,6 +10,7 @@ The batch engine runs a slot in the order of Section III-C (see ``advance``):
     communicate(mission, uavs, ..., n)   # for each communication slot n = 1..m
     arrive(mission, residual, arrivals)  # new data
     settle(mission, uavs)                # rewards, operational status
+    strike(mission, uavs, ...)           # failures and repairs (dess.sections.failures)
 """
 
 import math
@@ -19,10 +20,13 @@ import numpy as np
 from dess import channel, streams
 from dess.code.kernels import inlined, kernel
 from dess.sections import age, fleet, wind
+from dess.sections.charging import is_before, request_pad, share_power
+from dess.sections.failures import strike, take_pad, working_pads
 from dess.state import (
     ACTIVE,
     BATTERY,
     HOVER,
+    LOST,
     QUOTA,
     STEP_X,
     STEP_Y,
@@ -78,6 +82,9 @@ def launch(mission, ranges, types, uavs, residual, sensors, teeth):
     mission.active = mission.uavs
     mission.arrived = mission.collected = mission.slot_collected = mission.newest = 0.0
     teeth[:] = 0
+    mission.lost = 0.0
+    mission.uav_failures = mission.slots_grounded = mission.pad_requests = 0
+    mission.pads_out[:] = 0
     _launch_uavs(mission, types, uavs)
     mission.initial = 0.0
     spread = mission.initial_high - mission.initial_low
@@ -88,8 +95,9 @@ def launch(mission, ranges, types, uavs, residual, sensors, teeth):
             )
         residual[k] = mission.initial_low + spread * streams.uniform(words[k % 4])
         mission.initial += residual[k]
-        sensors[k].silent_until = 0
         sensors[k].newest = 0.0
+        sensors[k].silent = False
+        sensors[k].hidden = 0.0
 
 
 @kernel
@@ -103,13 +111,13 @@ def _launch_uavs(mission, types, uavs):
         u.slots_left = 0
         u.active = i < mission.uavs
         u.end = ACTIVE
-        u.latch = u.charging = u.overruled = False
+        u.latch = u.charging = u.overruled = u.grounded = False
         u.battery = 0
         if u.active:
             u.battery = kind.flying_time if kind.flying_time > 0 else mission.flying_time
         u.communications = u.slots_flying = u.slots_charging = u.slots_waiting = 0
         u.action = u.executed = HOVER
-        u.pad_request = u.served = -1
+        u.pad_request = u.pad = u.served = -1
         u.amount = u.collected = u.reward = u.total_reward = 0.0
         u.x = u.y = u.from_x = u.from_y = -1
         if u.active:
@@ -148,7 +156,7 @@ def resolve(mission, uavs):
         u.overruled = False
         if not u.active:
             continue
-        if u.charging:
+        if u.charging or u.grounded:
             u.action = HOVER
         u.executed = u.action
         u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
@@ -199,24 +207,37 @@ def _cancel(u):
 
 
 @inlined
+def flies(u):
+    """Whether a UAV is in the air: it is active and neither charges nor is grounded."""
+    return u.active and not u.charging and not u.grounded
+
+
+@inlined
+def may_act(u):
+    """Whether a UAV is asked for an action: it flies, and is not in the middle of a move."""
+    return flies(u) and u.slots_left == 0
+
+
+@inlined
 def may_charge(mission, u):
     """Whether a UAV meets the charging condition (eq. 4).
 
-    The UAV is active, in the zone, has its charging latch set, and its policy chose Hover. A move
+    The UAV flies, is in the zone, has its charging latch set, and its policy chose Hover. A move
     that the safety controller turned into Hover does not start charging.
     """
-    return u.active and u.latch and u.action == HOVER and in_zone(mission, u.x, u.y)
+    is_ready = u.active and not u.grounded and u.latch
+    return is_ready and u.action == HOVER and in_zone(mission, u.x, u.y)
 
 
 @inlined
 def grant_pads(mission, uavs):
-    """Grant free charging pads, first come first served; on a tie the lower UAV index is first.
+    """Grant free charging pads in the order of ``is_before``; on a tie, in that of the indices.
 
     This is the compiled equivalent of the SimPy resource. A UAV that meets the charging condition
     requests a pad or stays in the queue. A UAV that no longer meets it leaves the queue. A UAV that
     has a pad keeps it until it is charged.
     """
-    free = mission.pads
+    free = working_pads(mission) if mission.has_failures else mission.pads
     waiting = 0
     for i in range(mission.uavs):
         u = uavs[i]
@@ -227,27 +248,34 @@ def grant_pads(mission, uavs):
         else:
             waiting += 1
             if u.pad_request < 0:
-                u.pad_request = mission.slot
+                request_pad(mission, u)
     for _ in range(min(free, waiting)):
         first = -1
         for i in range(mission.uavs):
             u = uavs[i]
             waits = u.pad_request >= 0 and not u.charging
-            if waits and (first < 0 or u.pad_request < uavs[first].pad_request):
+            if waits and (first < 0 or is_before(mission, u, uavs[first])):
                 first = i
+        if mission.has_failures:
+            take_pad(mission, uavs, uavs[first])
         uavs[first].charging = True
 
 
 @inlined
 def spend(mission, uavs):
-    """Update the batteries for one slot (eq. 8): charging UAVs gain, other active UAVs lose."""
+    """Update the batteries for one slot (eq. 8): charging UAVs gain, flying UAVs lose."""
+    if mission.power > 0:
+        share_power(mission, uavs)
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
             continue
         if u.charging:
-            u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
+            if mission.power == 0:
+                u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
             u.slots_charging += 1
+        elif u.grounded:
+            mission.slots_grounded += 1
         else:
             u.battery -= mission.flight_cost
             if mission.wind_most > 0:
@@ -279,7 +307,7 @@ def communicate(
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
-        if not u.active or u.charging:
+        if not flies(u):
             continue
         if (n - 1) % channel.GROUP == 0:
             channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)
@@ -387,3 +415,5 @@ def advance(
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)
+    if mission.has_failures:
+        strike(mission, uavs, residual, sensors, LOST)

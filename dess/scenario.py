@@ -28,7 +28,7 @@ from dess.sea import Cell, nodes_in
 from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
-from dess.sections.failures import Failures
+from dess.sections.failures import MOST_PADS, Failures
 from dess.sections.fleet import UavType, legs, places_per_slot
 from dess.sections.section import Integer, Number, Section, tuples
 from dess.sections.wind import Wind
@@ -202,6 +202,11 @@ class _Constants(BaseModel):
         if self.pads is not None and self.pads > self.zone_cells:
             raise ValueError(
                 f"pads: {self.pads} is more than the zone has cells; allowed: 1..{self.zone_cells}"
+            )
+        if self.failures.pad_rate > 0 and self.charging_pads > MOST_PADS:
+            raise ValueError(
+                f"pads: {self.charging_pads} are too many to fail; allowed: {MOST_PADS} at most "
+                "where failures.pad_rate is above 0"
             )
         low, high = self.initial_data
         if not 0 <= low <= high <= _MOST_DATA:

@@ -14,8 +14,10 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.scenario import SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import EXTENSIONS, SAMPLED, Scenario, ScenarioSpace
 from dess.sections import fleet, wind
+from dess.sections.failures import MOST_PADS
+from dess.sections.section import Section
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
 ACTION_NAMES = ("north", "east", "south", "west", "hover")
@@ -24,8 +26,8 @@ STEP_X = np.array([0, 1, 0, -1, 0])
 STEP_Y = np.array([-1, 0, 1, 0, 0])
 
 # How the mission of a UAV ended; ACTIVE while it has not ended.
-ACTIVE, QUOTA, BATTERY, TRUNCATED = range(4)
-END_NAMES = ("active", "quota", "battery", "truncated")
+ACTIVE, QUOTA, BATTERY, TRUNCATED, LOST = range(5)
+END_NAMES = ("active", "quota", "battery", "truncated", "lost")
 
 # One mission: the constants of its scenario, then its progress.
 MISSION = np.dtype(
@@ -53,6 +55,20 @@ MISSION = np.dtype(
         ("charge_rate", np.int64),
         ("flight_cost", np.int64),
         ("quota", np.int64),
+        # charging (dess.sections.charging)
+        ("has_charging", np.int64),
+        ("lowest_battery_first", np.int64),
+        ("power", np.int64),
+        # failures (dess.sections.failures): probabilities per slot
+        ("has_failures", np.int64),
+        ("uav_rate", np.float64),
+        ("uav_repair", np.float64),
+        ("uav_data_lost", np.int64),
+        ("pad_rate", np.float64),
+        ("pad_repair", np.float64),
+        ("node_rate", np.float64),
+        ("node_repair", np.float64),
+        ("node_data_lost", np.int64),
         # channel and data
         ("communication_slot_length", np.float64),
         ("shadowing_deviation", np.float64),
@@ -84,6 +100,11 @@ MISSION = np.dtype(
         ("collected", np.float64),
         ("slot_collected", np.float64),  # data units, in the present slot
         ("newest", np.float64),  # sum of the nodes' ``newest`` [slots]
+        ("lost", np.float64),  # data units, by failures and full buffers
+        ("uav_failures", np.int64),
+        ("slots_grounded", np.int64),  # of UAVs under repair
+        ("pad_requests", np.int64),  # how often UAVs have asked for a pad
+        ("pads_out", np.int8, MOST_PADS),  # 1 for a pad out of order
     ]
 )
 
@@ -103,6 +124,7 @@ UAV = np.dtype(
         ("executed", np.int64),  # what the safety controller made of it
         ("end", np.int64),
         ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 if none
+        ("pad", np.int64),  # index of the pad held, where pads may fail
         ("slots_flying", np.int64),
         ("slots_charging", np.int64),
         ("slots_waiting", np.int64),  # for a pad
@@ -110,6 +132,7 @@ UAV = np.dtype(
         ("active", np.bool_),
         ("latch", np.bool_),  # charging latch iota
         ("charging", np.bool_),  # holds a pad
+        ("grounded", np.bool_),  # under repair
         ("overruled", np.bool_),
         ("rate", np.float64),  # factor of the rate at which it collects data
         ("amount", np.float64),  # collected in the present communication slot
@@ -124,9 +147,11 @@ UAV = np.dtype(
 # One sensor node, beyond its residual data.
 SENSOR = np.dtype(
     [
-        ("silent_until", np.int64),  # slot from which it answers again
         ("newest", np.float64),  # from when the newest data are that were collected [slots]
-    ]
+        ("silent", np.bool_),
+        ("hidden", np.float64),  # its data while it is silent [data units]
+    ],
+    align=True,
 )
 
 
@@ -194,6 +219,10 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
     for name, constant in wind.constants(scenario.wind, scenario.grid).items():
         mission[name] = constant
     mission["slowest"] = fleet.slowest(scenario.fleet)
+    for section in (getattr(scenario, name) for name in EXTENSIONS):
+        if isinstance(section, Section):
+            for field, value in section.constants().items():
+                mission[field] = value
     return mission
 
 

@@ -27,6 +27,9 @@ SHADOWING = 3  # shadow fading per UAV, node and communication slot
 ARRIVAL = 4  # new data per node and mission slot
 POLICY = 5  # a policy's own randomness
 WIND = 6  # gusts per cell; the seed is that of the wind
+UAV_FAILURE = 10  # failures and repairs per UAV and mission slot
+PAD_FAILURE = 11  # the same per charging pad
+NODE_FAILURE = 12  # the same per node
 
 MAX_SEED = 2**64 - 1
 MAX_REPLICATION = 2**32 - 1

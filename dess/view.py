@@ -13,7 +13,7 @@ import numpy as np
 from dess.channel import World
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.rules import on_grid
+from dess.rules import may_act, on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
 
@@ -57,7 +57,7 @@ class View:
 
     @cached_property
     def residual(self) -> np.ndarray:
-        """(R, K) residual data of the nodes [data units]."""
+        """(R, K) residual data of the nodes [data units], 0 where a node is silent."""
         return self.state.residual[self.mission]
 
     @cached_property
@@ -70,6 +70,17 @@ class View:
         return self.constants["slot"][:, None] - newest
 
     @cached_property
+    def silent(self) -> np.ndarray:
+        """(R, K) whether the nodes are silent."""
+        return self.state.sensors["silent"][self.mission]
+
+    @cached_property
+    def pads_working(self) -> np.ndarray:
+        """(R,) charging pads that are not out of order."""
+        constants = self.constants
+        return constants["pads"] - constants["pads_out"].sum(1)
+
+    @cached_property
     def legal(self) -> np.ndarray:
         """(R, 5) mask of the legal actions: Hover, and the moves that stay on the grid."""
         return legal_actions(self.state.missions, self.state.uavs, self.mission, self.uav)
@@ -79,15 +90,14 @@ class View:
 def legal_actions(missions, uavs, rows_mission, rows_uav):
     """(R, 5) mask of the actions that stay on the grid.
 
-    Only Hover is allowed for a UAV that charges, is not active or is in the middle of a move, and
-    where its index is -1.
+    Only Hover is allowed for a UAV that is not asked for an action, and where its index is -1.
     """
     legal = np.zeros((len(rows_mission), 5), np.bool_)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         u = uavs[b, i]
         legal[row, HOVER] = True
-        if i >= 0 and u.active and not u.charging and u.slots_left == 0:
+        if i >= 0 and may_act(u):
             for action in range(4):
                 x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
                 legal[row, action] = on_grid(missions[b], x, y)
@@ -98,9 +108,9 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
 def acting_rows(missions, uavs, policies, number):
     """The (R,) missions and (R,) UAV indices of the UAVs for which one policy must act.
 
-    These UAVs are active, not charging and not in the middle of a move. In a team of ``policies``
-    policies, UAV i follows policy number ``i % policies``; the function selects the UAVs that
-    follow policy ``number``.
+    These UAVs are active, neither charge nor are grounded, and are not in the middle of a move. In
+    a team of ``policies`` policies, UAV i follows policy number ``i % policies``; the function
+    selects the UAVs that follow policy ``number``.
     """
     rows_mission = np.empty(uavs.size, np.int64)
     rows_uav = np.empty(uavs.size, np.int64)
@@ -108,8 +118,7 @@ def acting_rows(missions, uavs, policies, number):
     for b in range(len(missions)):
         if missions[b].active > 0:
             for i in range(number, missions[b].uavs, policies):
-                u = uavs[b, i]
-                if u.active and not u.charging and u.slots_left == 0:
+                if may_act(uavs[b, i]):
                     rows_mission[count] = b
                     rows_uav[count] = i
                     count += 1

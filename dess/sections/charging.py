@@ -1,17 +1,25 @@
 """The order in which UAVs are given charging pads, and the power that the pads share."""
 
-from typing import Literal
+from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field
 
+from dess.code.kernels import inlined
 from dess.sections.section import Integer, Section
 
 
 class Charging(Section):
-    """The charging pads beyond their number (``pads``) and their rate (``charge_rate``)."""
+    """The charging pads beyond their number (``pads``) and their rate (``charge_rate``).
+
+    With the section on, the records have the use of the pads, and the return guard allows for the
+    time that a UAV waits for a pad.
+    """
 
     order: Literal["first-come", "lowest-battery"] = Field(
-        "first-come", description="which waiting UAV is given the next free pad"
+        "first-come",
+        description="which waiting UAV is given the next free pad, and which charging UAV takes "
+        "its share of the power first",
     )
     power: Integer = Field(
         0,
@@ -22,3 +30,66 @@ class Charging(Section):
     measured: bool = Field(
         False, description="whether records have the queue, waiting time and use of the pads"
     )
+
+    def constants(self) -> dict[str, Any]:
+        """The fields of ``MISSION`` that the section sets."""
+        return {
+            "has_charging": self.is_on,
+            "lowest_battery_first": self.order == "lowest-battery",
+            "power": self.power,
+        }
+
+
+@inlined
+def is_before(mission, u, other):
+    """Whether ``u`` comes before ``other``, which has the lower index, for pads and power."""
+    if mission.lowest_battery_first and u.battery != other.battery:
+        return u.battery < other.battery
+    return u.pad_request < other.pad_request
+
+
+@inlined
+def request_pad(mission, u):
+    """Let a UAV ask for a pad in the present slot."""
+    u.pad_request = mission.slot
+    mission.pad_requests += 1
+
+
+@inlined
+def share_power(mission, uavs):
+    """Charge the UAVs on the pads with the limited power, one after the other.
+
+    Each takes what it can take (``charge_rate``, up to ``charge_complete``) of what is left.
+    """
+    left = mission.power
+    charged = np.zeros(len(uavs), np.bool_)
+    while left > 0:
+        first = -1
+        for i in range(mission.uavs):
+            waits = uavs[i].charging and not charged[i]
+            if waits and (first < 0 or is_before(mission, uavs[i], uavs[first])):
+                first = i
+        if first < 0:
+            return
+        u = uavs[first]
+        gain = min(mission.charge_rate, mission.charge_complete - u.battery, left)
+        u.battery += gain
+        left -= gain
+        charged[first] = True
+
+
+@inlined
+def write_use(mission, uavs, out):
+    """Write how the pads were used into an ``OPERATIONS`` record.
+
+    A UAV waits in a slot if it has asked for a pad and has none. The number of waiting UAVs changes
+    at the starts of slots only, so that the means over time are exact.
+    """
+    waited = charged = 0
+    for i in range(mission.uavs):
+        waited += uavs[i].slots_waiting
+        charged += uavs[i].slots_charging
+    out.pad_requests = mission.pad_requests
+    out.queue = waited / mission.slot
+    out.waiting = waited / mission.pad_requests if mission.pad_requests > 0 else 0.0
+    out.utilisation = charged / (mission.pads * mission.slot)

@@ -1,18 +1,26 @@
 """Failures at random times: UAVs that are lost or grounded, pads out of order, silent nodes."""
 
-from typing import Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from dess import streams
+from dess.code.kernels import inlined, kernel
 from dess.sections.section import Probability, Section, Slots
+
+MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
 
 
 class Failures(Section):
     """Rates of failures per mission slot, and mean durations of repairs."""
 
-    uav_rate: Probability = Field(0.0, description="probability that a UAV fails in a mission slot")
+    uav_rate: Probability = Field(
+        0.0, description="probability that a flying UAV fails in a mission slot"
+    )
     uav_repair: Slots = Field(
-        0.0, description="mean time until a failed UAV flies again [slots]; 0 if it is lost"
+        0.0,
+        description="mean time until a failed UAV flies again [slots]: at least 1, or 0 if it is "
+        "lost",
     )
     uav_data: Literal["kept", "lost"] = Field(
         "kept", description="whether the data that a lost UAV has collected count"
@@ -21,14 +29,159 @@ class Failures(Section):
         0.0, description="probability that a charging pad fails in a mission slot"
     )
     pad_repair: Slots = Field(
-        0.0, description="mean time until a failed pad works again [slots]; 0 if it never does"
+        0.0,
+        description="mean time until a failed pad works again [slots]: at least 1, or 0 if it "
+        "never does",
     )
     node_rate: Probability = Field(
         0.0, description="probability that a node falls silent in a mission slot"
     )
     node_repair: Slots = Field(
-        0.0, description="mean time until a silent node answers again [slots]; 0 if it never does"
+        0.0,
+        description="mean time until a silent node answers again [slots]: at least 1, or 0 if it "
+        "never does",
     )
     node_data: Literal["kept", "lost"] = Field(
-        "kept", description="whether the data that a node holds when it falls silent are kept"
+        "kept", description="whether the data of a node are kept while it is silent"
     )
+
+    @model_validator(mode="after")
+    def _repairs_take_a_slot(self) -> Self:
+        for name in ("uav_repair", "pad_repair", "node_repair"):
+            if 0 < getattr(self, name) < 1:
+                raise ValueError(
+                    f"{name}: {getattr(self, name)} is less than a slot; allowed: 0, or 1 and more"
+                )
+        return self
+
+    def constants(self) -> dict[str, Any]:
+        """The fields of ``MISSION`` that the section sets; repairs as probabilities per slot."""
+        kinds = ("uav", "pad", "node")
+        rates = {f"{kind}_rate": getattr(self, f"{kind}_rate") for kind in kinds}
+        means = {f"{kind}_repair": getattr(self, f"{kind}_repair") for kind in kinds}
+        return {
+            "has_failures": self.is_on,
+            **rates,
+            **{name: 1 / mean if mean else 0.0 for name, mean in means.items()},
+            "uav_data_lost": self.uav_data == "lost",
+            "node_data_lost": self.node_data == "lost",
+        }
+
+
+@kernel
+def strike(mission, uavs, residual, sensors, lost):
+    """Let UAVs, pads and nodes fail and be repaired at the end of a slot, after it is settled.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        residual: (K,) residual data that UAVs can collect [data units]; 0 at a silent node.
+        sensors: (K,) ``SENSOR`` records.
+        lost: How the mission of a lost UAV ended, ``state.LOST``.
+    """
+    for i in range(mission.uavs):
+        _strike_uav(mission, uavs[i], i, lost)
+    if mission.pad_rate > 0.0:
+        for j in range(mission.pads):
+            _strike_pad(mission, uavs, j)
+    if mission.node_rate > 0.0:
+        for k in range(mission.nodes):
+            _strike_node(mission, residual, sensors[k], k)
+            if mission.active == 0:  # the mission is over: what is hidden is left over
+                residual[k] += sensors[k].hidden
+                sensors[k].hidden = 0.0
+
+
+@inlined
+def _happens(mission, stream, index, probability):
+    """Whether what has this probability happens in the present slot."""
+    words = streams.block(mission.seed, mission.replication, stream, 0, mission.slot, index)
+    return streams.uniform(words[0]) < probability
+
+
+@inlined
+def _strike_uav(mission, u, i, lost):
+    """A UAV fails in the air, neither on a pad nor grounded; then it is grounded or lost.
+
+    In the middle of a move it comes down in the cell that it flies to.
+    """
+    if not u.active:
+        return
+    if u.grounded:
+        u.grounded = not _happens(mission, streams.UAV_FAILURE, i, mission.uav_repair)
+    elif not u.charging and _happens(mission, streams.UAV_FAILURE, i, mission.uav_rate):
+        mission.uav_failures += 1
+        u.pad_request = -1
+        u.slots_left = 0
+        u.grounded = mission.uav_repair > 0.0
+        if not u.grounded:
+            u.active = False
+            u.end = lost
+            mission.active -= 1
+            if mission.uav_data_lost:
+                mission.collected -= u.collected
+                mission.lost += u.collected
+                u.collected = 0.0
+
+
+@inlined
+def _strike_pad(mission, uavs, j):
+    """A UAV whose pad fails has to ask anew, but it keeps the time of its request."""
+    out = mission.pads_out[j]
+    probability = mission.pad_repair if out else mission.pad_rate
+    if not _happens(mission, streams.PAD_FAILURE, j, probability):
+        return
+    mission.pads_out[j] = 1 - out
+    for i in range(mission.uavs):
+        if uavs[i].charging and uavs[i].pad == j:
+            uavs[i].charging = False
+            mission.pad_requests += 1
+
+
+@inlined
+def _strike_node(mission, residual, sensor, k):
+    """The data of a silent node are hidden, or lost; so are the data that arrive meanwhile."""
+    probability = mission.node_repair if sensor.silent else mission.node_rate
+    if _happens(mission, streams.NODE_FAILURE, k, probability):
+        sensor.silent = not sensor.silent
+    if not sensor.silent:
+        residual[k] += sensor.hidden
+        sensor.hidden = 0.0
+        return
+    if mission.node_data_lost:
+        mission.lost += residual[k]
+    else:
+        sensor.hidden += residual[k]
+    residual[k] = 0.0
+
+
+@inlined
+def working_pads(mission):
+    """The number of charging pads that are not out of order."""
+    if mission.pad_rate == 0.0:
+        return mission.pads
+    working = mission.pads
+    for j in range(mission.pads):
+        working -= mission.pads_out[j]
+    return working
+
+
+@inlined
+def take_pad(mission, uavs, u):
+    """Give a UAV the first pad that works and that no UAV holds; ``charging`` is set after."""
+    for j in range(mission.pads):
+        free = mission.pads_out[j] == 0
+        for i in range(mission.uavs):
+            if uavs[i].charging and uavs[i].pad == j:
+                free = False
+        if free:
+            u.pad = j
+            return
+
+
+@inlined
+def write_failures(mission, out):
+    """Write what has failed into an ``OPERATIONS`` record."""
+    out.failures = mission.uav_failures
+    out.slots_grounded = mission.slots_grounded
+    out.lost = mission.lost

@@ -22,7 +22,10 @@ from dess.scenario import SAMPLED, ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of, types_of
 
 # What a mission has of its own; all other fields are constants of the scenario.
-_PROGRESS = ("replication", "slot", "active", "initial", "arrived", "collected", "slot_collected")
+_PROGRESS = (
+    *("replication", "slot", "active", "initial", "arrived", "collected", "slot_collected", "lost"),
+    *("uav_failures", "slots_grounded", "pad_requests", "pads_out", "newest"),
+)
 
 
 def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> None:
@@ -46,6 +49,7 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
         _require(missions, name, low, high)
     _require(missions, "replication", 0, stepper.replication - 1)
     _require(missions, "slot", 0, space.max_slots)
+    _require(missions, "pads_out", 0, 1)
     edge, slots = space.grid - 1, space.max_slots
     is_there = np.arange(uavs.shape[1]) < missions["uavs"][:, None]
     for name in ("x", "y", "from_x", "from_y"):
@@ -63,10 +67,11 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
         _require(uavs, name, 0, len(ACTION_NAMES) - 1)
     _require(uavs, "end", 0, len(END_NAMES) - 1)
     _require(uavs, "pad_request", -1, slots)
+    _require(uavs, "pad", -1, space.charging_pads - 1)
     _require(uavs, "served", -1, len(space.nodes) - 1)
     for name in ("slots_flying", "slots_charging", "slots_waiting"):
         _require(uavs, name, 0, slots)
-    for name in ("active", "latch", "charging", "overruled"):
+    for name in ("active", "latch", "charging", "grounded", "overruled"):
         _require(uavs.view(_as_bytes(uavs.dtype)), name, 0, 1)
     if (uavs["active"] & ~is_there).any() or (uavs["active"].sum(1) != missions["active"]).any():
         raise ValueError("missions: active UAVs that are not there")
