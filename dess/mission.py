@@ -2,22 +2,26 @@
 
 This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
 the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
-adds the arrivals at its end. One process per UAV requests a charging pad and gives it back. The
-charging zone is a ``simpy.Resource`` that logs its use.
+adds the arrivals at its end. The charging zone is a ``simpy.Resource``: a UAV that may charge
+requests a pad, and gives it back when it may not any more.
 
     record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
 
-Several things happen at the start of a slot, at the same simulation time. SimPy processes the
-events of one time in the order in which they were scheduled, so a timeout of zero
-(``_after_due_events``) resumes the clock only when everything already scheduled for this time is
-done. This fixes the order inside a slot, which ``docs/concepts/model.md`` also shows as a drawing:
+Several things happen at the start of a slot, at the same simulation time, in this order, which
+``docs/concepts/model.md`` also shows as a drawing:
 
-1. the UAVs that were charged in the slot before have given back their pads;
-2. the policies decide, the safety controller resolves the moves, and ``slot_opens`` resumes the
-   processes of the UAVs;
-3. the UAVs have requested pads, left the queue or given back their pads;
-4. pads that were given back are granted to the next UAVs in the queue, and charging starts.
+1. the policies decide, and the safety controller resolves the moves;
+2. in index order, UAVs that now may charge request a pad, and UAVs that may not any more (charged,
+   moved on or out of the mission) give back their pad or leave the queue;
+3. pads that were given back are granted to the next UAVs in the queue, and charging starts.
+
+SimPy processes the events of one time in the order in which they were scheduled, so a timeout of
+zero between 2 and 3 resumes the clock only when all pads given back have been granted. A slot in
+which no UAV requests a pad or gives one back has neither 2 nor 3.
+
+For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
+the compiled functions here take the arrays and hand their first records to the rules.
 """
 
 from collections.abc import Generator, Sequence
@@ -28,6 +32,7 @@ import simpy
 
 from dess import rules
 from dess.channel import empty_scratch, world_of
+from dess.code.kernels import kernel
 from dess.record import EventLog, MissionRecord, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
@@ -78,21 +83,8 @@ def simulate(
     return MissionModel(space, team_of(policy, [space]), seed, replication, log).run()
 
 
-class ChargingZone(simpy.Resource):
-    """The charging pads of the zone, granted first come first served, with a log of their use."""
-
-    def __init__(self, env: simpy.Environment, pads: int, log: EventLog | None):
-        super().__init__(env, capacity=pads)
-        self._log = log
-
-    def log_event(self, event: str, time: float, i: int, u: np.void) -> None:
-        """Log ``charge_request``, ``charge_start`` or ``charge_end`` of UAV ``i``."""
-        if self._log is not None:
-            self._log.add(time, event, i, -1, u["battery"], u["x"], u["y"])
-
-
 class MissionModel:
-    """The SimPy processes of one mission: a clock and one process per UAV."""
+    """The SimPy model of one mission: a clock, and a charging zone with its requests for pads."""
 
     def __init__(
         self,
@@ -120,15 +112,12 @@ class MissionModel:
         )  # fmt: skip
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
-        self.zone = ChargingZone(self.env, int(self.mission["pads"]), log)
-        self.pads: list[Any] = [None] * len(self.fleet)  # pending or granted requests
+        self.zone = simpy.Resource(self.env, int(self.mission["pads"]))
+        self.pads: list[Any] = [None] * len(self.fleet)  # requests, pending or granted
 
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
-        self.slot_opens, self.slot_ends = self.env.event(), self.env.event()
         self._log_state("mission_start")
-        for i in self.fleet:
-            self.env.process(self._uav(i))
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
         is_extended = bool(self.mission["is_extended"])
@@ -142,109 +131,77 @@ class MissionModel:
 
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
-        env, mission, uavs = self.env, self.mission, self.uavs
-        m = int(mission["communication_slots"])
-        while mission["active"] > 0:
-            start = int(mission["slot"])
-            yield _after_due_events(env)  # the UAVs have given back the pads of the last slot
+        env, missions, uavs, residual = self.env, *self.state[:3]
+        arrays = *self.state, *self.world, *self.scratch
+        m = int(self.mission["communication_slots"])
+        slot, active, in_zone = 0, len(self.fleet), 0
+        while active:
             decide(self.team, self.state, self.world)
-            rules.resolve(mission, uavs)
-            opened, self.slot_opens = self.slot_opens, env.event()
-            opened.succeed()
-            yield _after_due_events(env)  # the UAVs have asked for pads or given them back
-            yield _after_due_events(env)  # free pads are granted to the next in the queue
-            self._start_charging()
-            rules.spend(mission, uavs)
-            self._log_moves()
+            may_charge = _resolve(missions, uavs)
+            if may_charge != in_zone:
+                in_zone = may_charge
+                self._request_pads(slot, may_charge)
+                yield env.timeout(0)  # pads given back are granted to the next in the queue
+                self._start_charging(slot)
+            _spend(missions, uavs)
+            self._log_moves(slot)
             for n in range(1, m + 1):
-                yield env.timeout(start + n / m - env.now)
-                rules.communicate(
-                    mission, uavs, self.residual, self.sensors, self.teeth,
-                    *self.world, *self.scratch, n,
-                )  # fmt: skip
-                self._log_communications(start, n, m)
-            rules.arrive(mission, self.residual, self.arrivals)
-            self._log_arrivals()
-            self._settle()
-            ended, self.slot_ends = self.slot_ends, env.event()
-            ended.succeed()
-        yield _after_due_events(env)  # the last UAV has given back its pad
+                yield env.timeout(slot + n / m - env.now)
+                _communicate(*arrays, n)
+                self._log_communications(slot, n, m)
+            before = self.uavs.copy() if self.log is not None else None
+            active = _close(missions, uavs, residual, self.arrivals)
+            slot += 1
+            self._log_close(slot, before)
 
-    def _uav(self, i: int) -> Process:
-        """Ask for a pad when UAV ``i`` may charge; give it back when it is charged or leaves.
+    def _request_pads(self, slot: int, may_charge: int) -> None:
+        """Request pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
+        for i in self.fleet:
+            pad, u = self.pads[i], self.uavs[i]
+            if may_charge >> i & 1:
+                if pad is None:
+                    self.pads[i] = self.zone.request()
+                    u["pad_request"] = slot
+                    self._log_uav("charge_request", slot, i, u["battery"])
+            elif pad is not None:
+                self.pads[i] = None
+                u["pad_request"] = -1
+                pad.cancel()  # leaves the queue, if the pad has not been granted
+                self.zone.release(pad)
 
-        All UAVs wait for the same two events of a slot, so they act in index order.
-        """
-        u = self.uavs[i]
-        while u["active"]:
-            yield self.slot_opens
-            if not rules.may_charge(self.mission, u):
-                self._give_back(i)
-            elif self.pads[i] is None:
-                self.pads[i] = self.zone.request()
-                u["pad_request"] = self.mission["slot"]
-                self.zone.log_event("charge_request", float(self.mission["slot"]), i, u)
-            yield self.slot_ends
-            if u["pad_request"] < 0:  # charged, or out of the mission
-                self._give_back(i)
-
-    def _give_back(self, i: int) -> None:
-        """Release the pad of UAV ``i``, or leave the queue."""
-        pad, self.pads[i] = self.pads[i], None
-        if pad is None:
-            return
-        self.uavs[i]["pad_request"] = -1
-        if pad.triggered:
-            self.zone.release(pad)
-        else:
-            pad.cancel()
-
-    def _start_charging(self) -> None:
-        """Let the UAVs that have been granted a pad charge in this slot."""
+    def _start_charging(self, slot: int) -> None:
+        """Let the UAVs that have been granted a pad charge from this slot on."""
         for i in self.fleet:
             pad, u = self.pads[i], self.uavs[i]
             if pad is not None and pad.triggered and not u["charging"]:
                 u["charging"] = True
-                self.zone.log_event("charge_start", float(self.mission["slot"]), i, u)
+                self._log_uav("charge_start", slot, i, u["battery"])
 
-    def _settle(self) -> None:
-        """Close the slot; log the charging sessions and the UAVs that ended with it."""
-        before = self.uavs.copy() if self.log is not None else None
-        rules.settle(self.mission, self.uavs)
-        if before is None or self.log is None:
-            return
-        time = float(self.mission["slot"])
-        for i in self.fleet:
-            was, u = before[i], self.uavs[i]
-            if was["charging"] and not u["charging"]:
-                self.zone.log_event("charge_end", time, i, u)
-            if was["active"] and u["end"] == QUOTA:
-                self.log.add(time, "quota_filled", i, -1, u["communications"], u["x"], u["y"])
-            if was["active"] and u["end"] == BATTERY:
-                self.log.add(time, "battery_empty", i, -1, u["battery"], u["x"], u["y"])
+    def _log_uav(self, event: str, time: float, i: int, value: float) -> None:
+        if self.log is not None:
+            u = self.uavs[i]
+            self.log.add(float(time), event, i, -1, value, u["x"], u["y"])
 
     def _log_state(self, event: str) -> None:
         if self.log is None:
             return
         time = float(self.mission["slot"])
         for i in self.fleet:
-            u = self.uavs[i]
-            self.log.add(time, event, i, -1, u["battery"], u["x"], u["y"])
+            self._log_uav(event, time, i, self.uavs[i]["battery"])
         for k, (x, y) in enumerate(self.world.nodes):
             self.log.add(time, event, -1, k, self.residual[k], x, y)
 
-    def _log_moves(self) -> None:
+    def _log_moves(self, slot: int) -> None:
         if self.log is None:
             return
-        time = float(self.mission["slot"])
         for i in self.fleet:
             u = self.uavs[i]
             if u["active"]:
                 if u["overruled"]:
-                    self.log.add(time, "collision", i, -1, u["action"], u["x"], u["y"])
-                self.log.add(time, "move", i, -1, u["battery"], u["x"], u["y"])
+                    self._log_uav("collision", slot, i, u["action"])
+                self._log_uav("move", slot, i, u["battery"])
 
-    def _log_communications(self, start: int, n: int, m: int) -> None:
+    def _log_communications(self, slot: int, n: int, m: int) -> None:
         if self.log is None:
             return
         for i in self.fleet:
@@ -253,17 +210,55 @@ class MissionModel:
                 flown = fleet.share_flown(self.mission, u, n)
                 x = u["from_x"] + (u["x"] - u["from_x"]) * flown
                 y = u["from_y"] + (u["y"] - u["from_y"]) * flown
-                self.log.add(start + n / m, "communication", i, u["served"], u["amount"], x, y)
+                self.log.add(slot + n / m, "communication", i, u["served"], u["amount"], x, y)
 
-    def _log_arrivals(self) -> None:
-        if self.log is None or self.mission["arrival_rate"] == 0:
+    def _log_close(self, time: int, before: np.ndarray | None) -> None:
+        """Log new data, and the charging sessions and the UAVs that ended with a slot."""
+        if self.log is None or before is None:
             return
-        time = float(self.mission["slot"] + 1)
-        for k in np.nonzero(self.arrivals)[0].tolist():
-            x, y = self.world.nodes[k]
-            self.log.add(time, "arrival", -1, k, self.arrivals[k], x, y)
+        if self.mission["arrival_rate"] > 0:
+            for k in np.nonzero(self.arrivals)[0].tolist():
+                x, y = self.world.nodes[k]
+                self.log.add(float(time), "arrival", -1, k, self.arrivals[k], x, y)
+        for i in self.fleet:
+            was, u = before[i], self.uavs[i]
+            if was["charging"] and not u["charging"]:
+                self._log_uav("charge_end", time, i, u["battery"])
+            if was["active"] and u["end"] == QUOTA:
+                self._log_uav("quota_filled", time, i, u["communications"])
+            if was["active"] and u["end"] == BATTERY:
+                self._log_uav("battery_empty", time, i, u["battery"])
 
 
-def _after_due_events(env: simpy.Environment) -> simpy.Timeout:
-    """An event that SimPy processes after all events already scheduled for the current time."""
-    return env.timeout(0)
+@kernel
+def _resolve(missions, uavs):
+    """Resolve the moves; bit i of the result tells whether UAV i may charge now."""
+    mission, team = missions[0], uavs[0]
+    rules.resolve(mission, team)
+    may_charge = 0
+    for i in range(mission.uavs):
+        may_charge |= np.int64(rules.may_charge(mission, team[i])) << i
+    return may_charge
+
+
+@kernel
+def _spend(missions, uavs):
+    rules.spend(missions[0], uavs[0])
+
+
+@kernel
+def _communicate(
+    missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n
+):  # fmt: skip
+    rules.communicate(
+        missions[0], uavs[0], residual[0], sensors[0], teeth[0],
+        nodes, mean_snr, order, means, batches, search, n,
+    )  # fmt: skip
+
+
+@kernel
+def _close(missions, uavs, residual, arrivals):
+    """Add the arrivals and settle the slot; return the number of UAVs that are still active."""
+    rules.arrive(missions[0], residual[0], arrivals)
+    rules.settle(missions[0], uavs[0])
+    return missions[0].active
