@@ -2,8 +2,8 @@
 
 This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
 the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
-adds the arrivals at its end. The charging zone is a ``simpy.Resource``: a UAV that may charge
-requests a pad, and gives it back when it may not any more.
+adds the arrivals at its end. The charging zone is a ``simpy.Resource`` (dess.sections.zone): a UAV
+that may charge asks for a pad, and gives it back when it may not any more.
 
     record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
     record.success, record.collection_ratio, record.events.columns()
@@ -12,13 +12,11 @@ Several things happen at the start of a slot, at the same simulation time, in th
 ``docs/concepts/model.md`` also shows as a drawing:
 
 1. the policies decide, and the safety controller resolves the moves;
-2. in index order, UAVs that now may charge request a pad, and UAVs that may not any more (charged,
+2. in index order, UAVs that now may charge ask for a pad, and UAVs that may not any more (charged,
    moved on or out of the mission) give back their pad or leave the queue;
-3. pads that were given back are granted to the next UAVs in the queue, and charging starts.
+3. free pads are granted to the next UAVs in the queue, and charging starts.
 
-SimPy processes the events of one time in the order in which they were scheduled, so a timeout of
-zero between 2 and 3 resumes the clock only when all pads given back have been granted. A slot in
-which no UAV requests a pad or gives one back has neither 2 nor 3.
+A slot in which no UAV asks for a pad or gives one back has neither 2 nor 3, unless pads may fail.
 
 For numba, a numpy record as an argument takes longer (3 us) than the arrays of the whole state, so
 the compiled functions here take the arrays and hand their first records to the rules.
@@ -36,9 +34,15 @@ from dess.code.kernels import kernel
 from dess.record import EventLog, MissionRecord, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
+from dess.sections.charging import request_pad
+from dess.sections.failure_log import log_failures
+from dess.sections.failures import strike
+from dess.sections.zone import ChargingZone
 from dess.state import (
     BATTERY,
+    LOST,
     QUOTA,
+    State,
     check_seed,
     constants_of,
     empty_state,
@@ -112,8 +116,7 @@ class MissionModel:
         )  # fmt: skip
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
-        self.zone = simpy.Resource(self.env, int(self.mission["pads"]))
-        self.pads: list[Any] = [None] * len(self.fleet)  # requests, pending or granted
+        self.zone = ChargingZone(self.env, self.mission, self.uavs)
 
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
@@ -134,14 +137,15 @@ class MissionModel:
         env, missions, uavs, residual = self.env, *self.state[:3]
         arrays = *self.state, *self.world, *self.scratch
         m = int(self.mission["communication_slots"])
+        has_failures = bool(self.mission["has_failures"])
+        pads_fail = bool(self.mission["pad_rate"] > 0)
         slot, active, in_zone = 0, len(self.fleet), 0
         while active:
             decide(self.team, self.state, self.world)
             may_charge = _resolve(missions, uavs)
-            if may_charge != in_zone:
+            if may_charge != in_zone or pads_fail:
                 in_zone = may_charge
                 self._request_pads(slot, may_charge)
-                yield env.timeout(0)  # pads given back are granted to the next in the queue
                 self._start_charging(slot)
             _spend(missions, uavs)
             self._log_moves(slot)
@@ -153,29 +157,43 @@ class MissionModel:
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1
             self._log_close(slot, before)
+            if has_failures:
+                active = self._fail(slot)
 
     def _request_pads(self, slot: int, may_charge: int) -> None:
-        """Request pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
+        """Ask for pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
         for i in self.fleet:
-            pad, u = self.pads[i], self.uavs[i]
+            u, has_asked = self.uavs[i], self.zone.requests[i] is not None
             if may_charge >> i & 1:
-                if pad is None:
-                    self.pads[i] = self.zone.request()
-                    u["pad_request"] = slot
+                if not has_asked:
+                    self.zone.ask(i)
+                    request_pad(self.mission, u)
                     self._log_uav("charge_request", slot, i, u["battery"])
-            elif pad is not None:
-                self.pads[i] = None
+            elif has_asked:
+                if not self.zone.holds_pad(i):
+                    self._log_uav("charge_withdrawal", slot, i, u["battery"])
+                self.zone.leave(i)
                 u["pad_request"] = -1
-                pad.cancel()  # leaves the queue, if the pad has not been granted
-                self.zone.release(pad)
 
     def _start_charging(self, slot: int) -> None:
-        """Let the UAVs that have been granted a pad charge from this slot on."""
+        """Let the UAVs that are granted a pad charge from this slot on."""
+        for i in self.zone.grant():
+            rules.start_charging(self.mission, self.uavs, i)
+            self._log_uav("charge_start", slot, i, self.uavs[i]["battery"])
+
+    def _fail(self, slot: int) -> int:
+        """Let things fail and be repaired; return the number of UAVs that are still active."""
+        before = State(*(array.copy() for array in self.state))
+        strike(self.mission, self.uavs, self.residual, self.sensors, LOST)
+        if self.log is not None:
+            log_failures(self.log, float(slot), before, self.state, self.world.nodes)
         for i in self.fleet:
-            pad, u = self.pads[i], self.uavs[i]
-            if pad is not None and pad.triggered and not u["charging"]:
-                u["charging"] = True
-                self._log_uav("charge_start", slot, i, u["battery"])
+            u = self.uavs[i]
+            if before.uavs[0, i]["charging"] and not u["charging"]:  # its pad has failed
+                self._log_uav("charge_end", slot, i, u["battery"])
+                self._log_uav("charge_request", slot, i, u["battery"])
+                self.zone.ask(i)
+        return int(self.mission["active"])
 
     def _log_uav(self, event: str, time: float, i: int, value: float) -> None:
         if self.log is not None:

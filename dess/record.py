@@ -79,6 +79,10 @@ _EVENT_COLUMNS = {
     "x": np.float64,
     "y": np.float64,
 }
+FAILURE_EVENTS = (
+    *("uav_failure", "uav_repair", "pad_failure", "pad_repair", "node_failure", "node_repair"),
+    "data_lost",
+)
 EVENT_NAMES = (
     "mission_start",
     "move",
@@ -86,10 +90,12 @@ EVENT_NAMES = (
     "charge_request",
     "charge_start",
     "charge_end",
+    "charge_withdrawal",
     "communication",
     "arrival",
     "quota_filled",
     "battery_empty",
+    *FAILURE_EVENTS,
     "mission_end",
 )
 
@@ -180,9 +186,11 @@ class EventLog:
     - ``communication`` and ``arrival``: the data units collected or arrived.
     - ``quota_filled``: the number of communication slots in which the UAV collected data.
     - ``collision``: the number of the action that the safety controller overruled.
-    - ``charge_request``, ``charge_start``, ``charge_end`` and ``battery_empty``: the battery [%].
+    - ``charge_request``, ``charge_start``, ``charge_end``, ``charge_withdrawal`` (the UAV leaves
+      the queue), ``battery_empty``, ``uav_failure`` and ``uav_repair``: the battery [%].
+    - ``pad_failure`` and ``pad_repair``: the index of the pad.
+    - ``node_failure`` and ``node_repair``: the data that the node holds. ``data_lost``: data units.
 
-    A UAV that leaves the queue for a pad has a ``charge_request`` without a ``charge_start``.
     ``uav`` and ``node`` are -1 where an event concerns no UAV or no node.
     """
 

@@ -256,9 +256,15 @@ def grant_pads(mission, uavs):
             waits = u.pad_request >= 0 and not u.charging
             if waits and (first < 0 or is_before(mission, u, uavs[first])):
                 first = i
-        if mission.has_failures:
-            take_pad(mission, uavs, uavs[first])
-        uavs[first].charging = True
+        start_charging(mission, uavs, first)
+
+
+@inlined
+def start_charging(mission, uavs, i):
+    """Give a free pad to UAV ``i``."""
+    if mission.has_failures:
+        take_pad(mission, uavs, uavs[i])
+    uavs[i].charging = True
 
 
 @inlined

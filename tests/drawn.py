@@ -74,10 +74,31 @@ def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
 
 
 @st.composite
+def failures(draw: st.DrawFn) -> dict[str, Any]:
+    """A section of failures: each kind happens often, seldom or not at all."""
+    values: dict[str, Any] = {}
+    for kind in ("uav", "pad", "node"):
+        values[f"{kind}_rate"] = draw(st.sampled_from([0.0, 0.01, 0.2, 1.0]))
+        values[f"{kind}_repair"] = draw(st.sampled_from([0.0, 1.0, 6.0]))
+    for kind in ("uav", "node"):
+        values[f"{kind}_data"] = draw(st.sampled_from(["kept", "lost"]))
+    return values
+
+
+@st.composite
 def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     """Spaces whose sections beyond the paper are on or off, those that both engines have."""
     sections = {
-        "age": {"measured": draw(st.booleans()), "reward": draw(st.just(0.0) | _numbers(-2.0, 2.0))}
+        "age": {
+            "measured": draw(st.booleans()),
+            "reward": draw(st.just(0.0) | _numbers(-2.0, 2.0)),
+        },
+        "charging": {
+            "order": draw(st.sampled_from(["first-come", "lowest-battery"])),
+            "power": draw(st.sampled_from([0, 0, 3, 17])),
+            "measured": draw(st.booleans()),
+        },
+        "failures": draw(st.just({}) | failures()),
     }
     return draw(spaces(**(sections | fixed)))
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
-from dess.record import EVENT_NAMES, MissionRecord, Records
+from dess.record import EVENT_NAMES, FAILURE_EVENTS, MissionRecord, Records
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
@@ -80,9 +80,22 @@ def test_both_engines_give_the_same_record(
         event("charging")
 
 
+# Of each kind of failure some are repaired.
+FAILING = {
+    "failures": {
+        **{"uav_rate": 0.01, "uav_repair": 3.0, "pad_rate": 0.05, "pad_repair": 5.0},
+        **{"node_rate": 0.02, "node_repair": 4.0, "node_data": "lost"},
+    },
+    "charging": {"order": "lowest-battery", "power": 7},
+}
+
+
+@pytest.mark.parametrize("sections", [{}, FAILING])
 @pytest.mark.parametrize("forbid_swaps", [False, True])
-def test_both_engines_agree_where_everything_happens(forbid_swaps: bool) -> None:
-    space = ScenarioSpace.of(BUSY, forbid_swaps=forbid_swaps)
+def test_both_engines_agree_where_everything_happens(
+    forbid_swaps: bool, sections: dict[str, Any]
+) -> None:
+    space = ScenarioSpace.of(BUSY, forbid_swaps=forbid_swaps, **sections)
     seen, ends, fleets, waited = set(), set(), set(), 0
     for policy in (Wanderer(), Commuter(), Fidget()):
         records = simulate_batch(space, policy, 2**64 - 1, 25)
@@ -94,7 +107,7 @@ def test_both_engines_agree_where_everything_happens(forbid_swaps: bool) -> None
             ends.update(single.uavs["end"].tolist())
             fleets.add(len(single.uavs))
             waited += int(single.uavs["slots_waiting"].sum())
-    assert seen == set(EVENT_NAMES)
+    assert seen == {name for name in EVENT_NAMES if sections or name not in FAILURE_EVENTS}
     assert ends == {QUOTA, BATTERY, TRUNCATED}
     assert fleets == {1, 2, 3, 4, 5, 6}
     assert waited > 100
