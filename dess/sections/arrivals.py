@@ -1,10 +1,42 @@
-"""New data in continuous time: packets with time stamps, in buffers at the nodes."""
+"""New data in continuous time: a Poisson process per node, whose rate may change over time.
 
-from typing import Literal
+The times are drawn by thinning (P. Lewis, G. Shedler: Simulation of nonhomogeneous Poisson
+processes by thinning, Naval Research Logistics 1979). Candidates arrive at the highest rate that
+the schedule allows, with exponential gaps, and each is accepted with the probability that the rate
+at its time has. Candidate number c of a node is a draw of its own, so arrivals depend neither on
+the policy nor on those of other nodes.
+"""
 
-from pydantic import Field
+import csv
+import io
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
 
-from dess.sections.section import Integer, Number, Section
+import numpy as np
+from pydantic import Field, model_validator
+
+from dess import streams
+from dess.code.kernels import kernel
+from dess.errors import InputError, shown
+from dess.files import read_text
+from dess.sections.section import Integer, Section
+
+Rate = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+Time = Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False)]
+
+_MOST_BYTES = 2**20
+_COLUMNS = ("slot", "factor")
+
+# The Poisson process of one node.
+SOURCE = np.dtype(
+    [
+        ("rate", np.float64),  # packets per slot where the factor of the schedule is 1
+        ("candidate", np.int64),  # number of the next candidate
+        ("time", np.float64),  # of the next arrival [slots]; infinite after the mission
+    ]
+)
 
 
 class Arrivals(Section):
@@ -15,17 +47,18 @@ class Arrivals(Section):
         description="when new data arrive: slotted, at the ends of mission slots (eq. 12), or "
         "continuous, a Poisson process per node",
     )
-    rates: tuple[Number, ...] = Field(
+    rates: tuple[Rate, ...] = Field(
         (),
         max_length=1024,
-        description="arrival rate per node [data units per slot]: a number per node; without it, "
-        "arrival_rate for all",
+        description="arrival rate per node [data units per slot]: a number 0..100 per node; "
+        "without it, arrival_rate for all",
     )
-    schedule: tuple[tuple[Number, Number], ...] = Field(
+    schedule: tuple[tuple[Time, Rate], ...] = Field(
         (),
         max_length=10_000,
-        description="factors of the rates over time: [slot, factor] from this slot on, or the name "
-        "of a CSV file with the columns slot and factor",
+        description="factors of the rates over time: a list of [slot, factor], the factor 0..100 "
+        "from this slot on and 1 before the first; or in a TOML file the name of a CSV file with "
+        "the columns slot and factor",
     )
     buffer: Integer = Field(
         0, ge=0, le=1_000_000, description="packets that a node can hold; 0 for no limit"
@@ -33,3 +66,88 @@ class Arrivals(Section):
     service: Literal["oldest", "newest"] = Field(
         "oldest", description="which packet of a node is served first"
     )
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        is_set = self.rates or self.schedule or self.buffer or self.service != "oldest"
+        if self.process == "slotted" and is_set:
+            raise ValueError(
+                "process: slotted arrivals have no rates, schedule, buffer or service; "
+                "allowed: continuous"
+            )
+        for (earlier, _), (later, _) in pairwise(self.schedule):
+            if later <= earlier:
+                raise ValueError(
+                    f"schedule: slot {later:g} comes after slot {earlier:g}; allowed: growing slots"
+                )
+        return self
+
+
+def schedule_in(path: Path) -> tuple[tuple[float, float], ...]:
+    """The schedule in a CSV file: a header line with ``slot`` and ``factor``, then numbers.
+
+    Raises:
+        InputError: If the file cannot be read, or has other columns or no numbers.
+    """
+    try:
+        rows = csv.DictReader(io.StringIO(read_text(path, _MOST_BYTES, "utf-8-sig")), strict=True)
+        if not {*_COLUMNS} <= {*(rows.fieldnames or ())}:
+            columns = ", ".join(rows.fieldnames or ()) or "none"
+            raise InputError(f"{path}: has columns {columns}; allowed: {' and '.join(_COLUMNS)}")
+        return tuple((_number(path, n, r, "slot"), _number(path, n, r, "factor"))
+                     for n, r in enumerate(rows, 2))  # fmt: skip
+    except csv.Error as error:
+        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
+    except OSError as error:
+        raise InputError(
+            f"{path}: cannot be read: {error.strerror}; allowed: a file of slots and factors"
+        ) from None
+
+
+def _number(path: Path, line: int, row: dict[str, str | None], column: str) -> float:
+    try:
+        return float(row[column] or "")
+    except ValueError:
+        value = shown(row[column])
+        raise InputError(
+            f"{path}: line {line}: {column} is {value}; allowed: a number"
+        ) from None
+
+
+def sources_of(arrivals: Arrivals, arrival_rate: float, nodes: int) -> np.ndarray:
+    """The (K,) ``SOURCE`` records of the nodes, before their first arrival."""
+    sources = np.zeros(nodes, SOURCE)
+    sources["rate"] = arrivals.rates or arrival_rate
+    return sources
+
+
+def factors_of(arrivals: Arrivals) -> tuple[np.ndarray, np.ndarray]:
+    """The (S,) slots from which the factors of a schedule hold, and the (S,) factors."""
+    starts, factors = np.array([(0.0, 1.0), *arrivals.schedule]).T.copy()
+    return starts, factors
+
+
+@kernel
+def draw_arrival(missions, sources, starts, factors, k):
+    """Draw the next arrival at node ``k``; its time is infinite if the mission ends before it.
+
+    Args:
+        missions: (1,) ``MISSION`` records.
+        sources: (K,) ``SOURCE`` records.
+        starts, factors: As from ``factors_of``.
+        k: Index of the node.
+    """
+    mission, source = missions[0], sources[k]
+    highest = factors.max()
+    while source.time < math.inf:
+        words = streams.block(
+            mission.seed, mission.replication, streams.ARRIVAL_TIME, 0, k, source.candidate
+        )
+        source.candidate += 1
+        source.time -= math.log(streams.uniform(words[0])) / (source.rate * highest)
+        if not source.time < mission.max_slots:
+            source.time = math.inf
+            return
+        factor = factors[np.searchsorted(starts, source.time, side="right") - 1]
+        if streams.uniform(words[1]) * highest < factor:
+            return
