@@ -59,6 +59,7 @@ OPERATIONS = np.dtype(
         ("latency_p99", np.float64),
         ("generated", np.float64),  # packets
         ("delivered", np.float64),  # packets
+        ("lost_packets", np.float64),
         ("lost", np.float64),  # data lost by full buffers and failures
         ("queue", np.float64),  # UAVs that wait for a pad, mean over time
         ("waiting", np.float64),  # mean time from the request for a pad to its grant or withdrawal

@@ -315,14 +315,14 @@ def communicate(
         u.served = -1
         if not flies(u):
             continue
-        if (n - 1) % channel.GROUP == 0:
+        if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
             channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
         amount = min(channel.rate(mission, snr) * u.rate, residual[node])
         residual[node] -= amount
-        if residual[node] == 0.0:
+        if residual[node] == 0.0 and mission.continuous == 0:
             age.empty(mission, sensors[node], teeth, n)
         u.served = node
         u.amount = amount

@@ -26,7 +26,7 @@ from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.sea import Cell, nodes_in
 from dess.sections.age import MOST_TEETH, Age
-from dess.sections.arrivals import Arrivals
+from dess.sections.arrivals import Arrivals, schedule_in
 from dess.sections.charging import Charging
 from dess.sections.failures import MOST_PADS, Failures
 from dess.sections.fleet import UavType, legs, places_per_slot
@@ -194,10 +194,19 @@ class _Constants(BaseModel):
                 "grid, nodes, communication_slots: too many together; allowed: "
                 f"5 * grid^2 * nodes * communication_slots <= {_CHANNEL_LIMIT}"
             )
-        if self.age.measured and self.max_slots * self.communication_slots > MOST_TEETH:
+        if (
+            self.age.measured
+            and not self.needs_events
+            and self.max_slots * self.communication_slots > MOST_TEETH
+        ):
             raise ValueError(
                 "age.measured: the mission has too many communication slots; allowed: "
                 f"max_slots * communication_slots <= {MOST_TEETH}"
+            )
+        if self.arrivals.rates and len(self.arrivals.rates) != len(self.nodes):
+            raise ValueError(
+                f"arrivals.rates: there are {len(self.arrivals.rates)} rates for "
+                f"{len(self.nodes)} nodes; allowed: a rate per node"
             )
         if self.pads is not None and self.pads > self.zone_cells:
             raise ValueError(
@@ -363,6 +372,7 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     Args:
         name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
             ``nodes`` may be the name of a file in the same folder, which ``dess.sea`` reads.
+            The ``schedule`` of ``[arrivals]`` may be a CSV file there (``schedule_in``).
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
@@ -372,8 +382,12 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     where, read = _SCENARIOS.load(name_or_path)
     read.pop("description", None)
     values = _merged(read, overrides)
+    table = read.get("arrivals")
+    schedule = table.get("schedule") if isinstance(table, dict) else None
+    if isinstance(schedule, str) and not {"arrivals", "arrivals.schedule"} & {*overrides}:
+        values["arrivals"]["schedule"] = schedule_in(_SCENARIOS.folder_of(name_or_path) / schedule)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
-        without = _validated(ScenarioSpace, values | {"nodes": [[0, 0]]}, where)
+        without = _validated(ScenarioSpace, values | {"nodes": [[0, 0]], "arrivals": {}}, where)
         path = _SCENARIOS.folder_of(name_or_path) / read["nodes"]
         values["nodes"] = nodes_in(path, without.grid, without.cell_size)
     return _validated(ScenarioSpace, values, where)

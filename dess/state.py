@@ -90,7 +90,8 @@ MISSION = np.dtype(
         ("reward_quota", np.float64),
         ("reward_step", np.float64),
         # sections
-        ("age_measured", np.int64),
+        ("continuous", np.int64),  # whether arrivals are
+        ("age_measured", np.int64),  # in the slotted model
         ("age_reward", np.float64),
         # progress
         ("slot", np.int64),  # mission slots done
@@ -190,8 +191,8 @@ def empty_state(missions: int, uavs: int, nodes: int, lengths: int = 0) -> State
 
 def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
     """How many lengths the teeth of ages can have in missions of these scenarios."""
-    slots = (s.max_slots * s.communication_slots + 1 for s in spaces if s.age.measured)
-    return max(slots, default=0)
+    measured = (s for s in spaces if s.age.measured and not s.needs_events)
+    return max((s.max_slots * s.communication_slots + 1 for s in measured), default=0)
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
@@ -207,7 +208,8 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
             name = "charging_pads" if field == "pads" else field
             mission[field] = getattr(scenario, name)
     mission["nodes"] = len(scenario.nodes)
-    mission["age_measured"] = scenario.age.measured
+    mission["continuous"] = scenario.needs_events
+    mission["age_measured"] = scenario.age.measured and not scenario.needs_events
     mission["age_reward"] = scenario.age.reward
     for field, value in zip(
         ("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True

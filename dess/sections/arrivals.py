@@ -109,9 +109,7 @@ def _number(path: Path, line: int, row: dict[str, str | None], column: str) -> f
         return float(row[column] or "")
     except ValueError:
         value = shown(row[column])
-        raise InputError(
-            f"{path}: line {line}: {column} is {value}; allowed: a number"
-        ) from None
+        raise InputError(f"{path}: line {line}: {column} is {value}; allowed: a number") from None
 
 
 def sources_of(arrivals: Arrivals, arrival_rate: float, nodes: int) -> np.ndarray:

@@ -1,0 +1,158 @@
+"""Poisson processes in continuous time: their gaps, thinning, and what is refused."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import kstest, poisson
+
+from dess import InputError
+from dess.scenario import ScenarioSpace, load_scenario
+from dess.sections.arrivals import draw_arrival, factors_of, sources_of
+from dess.state import constants_of
+from tests.drawn import replications, seeds
+
+
+def _space(**arrivals: Any) -> ScenarioSpace:
+    values = {f"arrivals.{name}": value for name, value in arrivals.items()}
+    return load_scenario("paper", **{"arrivals.process": "continuous"} | values)
+
+
+def _times(space: ScenarioSpace, k: int, seed: int = 1, replication: int = 0) -> np.ndarray:
+    """All arrivals at node ``k`` until the last slot."""
+    missions = constants_of(space)
+    missions["seed"], missions["replication"] = seed, replication
+    sources = sources_of(space.arrivals, space.arrival_rate, len(space.nodes))
+    found = []
+    while sources["time"][k] < np.inf:
+        draw_arrival(missions, sources, *factors_of(space.arrivals), k)
+        found.append(sources["time"][k])
+    return np.array(found[:-1])
+
+
+def test_gaps_are_exponential() -> None:
+    space = ScenarioSpace.of(_space(), arrival_rate=0.5, max_slots=20_000)
+    times = _times(space, 3)
+    assert kstest(np.diff(times, prepend=0.0) * 0.5, "expon").pvalue > 0.01
+    assert 0.01 < poisson.cdf(len(times), 10_000) < 0.99
+    assert times[-1] < 20_000
+
+
+SCHEDULE = ((100.0, 3.0), (400.0, 0.0), (500.0, 0.25), (1500.0, 2.0))
+
+
+def _integrated(times: np.ndarray, schedule: Sequence[tuple[float, float]]) -> np.ndarray:
+    """The integral of the factor from 0 to each time."""
+    edges = np.array([0.0, *(slot for slot, _ in schedule), 3000.0])
+    factors = np.array([1.0, *(factor for _, factor in schedule)])
+    return np.interp(times, edges, np.concatenate([[0.0], (factors * np.diff(edges)).cumsum()]))
+
+
+def test_thinned_arrivals_fit_the_integrated_rate() -> None:
+    """In the time of the integrated rate, arrivals are a Poisson process of rate 1."""
+    space = ScenarioSpace.of(_space(schedule=SCHEDULE), arrival_rate=2.0, max_slots=3000)
+    times = _times(space, 7)
+    assert not ((times >= 400) & (times < 500)).any()
+    own_time = 2.0 * _integrated(times, SCHEDULE)
+    total = 2.0 * _integrated(np.array([3000.0]), SCHEDULE)[0]
+    assert kstest(np.diff(own_time, prepend=0.0), "expon").pvalue > 0.01
+    assert kstest(own_time / total, "uniform").pvalue > 0.01
+    assert 0.01 < poisson.cdf(len(times), total) < 0.99
+
+
+def test_a_node_has_its_own_rate() -> None:
+    rates = [0.0, 5.0, *[0.1] * 23]
+    space = ScenarioSpace.of(_space(rates=rates), max_slots=1000)
+    assert len(_times(space, 0)) == 0
+    assert 0.01 < poisson.cdf(len(_times(space, 1)), 5000) < 0.99
+    assert 0.01 < poisson.cdf(len(_times(space, 2)), 100) < 0.99
+
+
+@given(seeds, replications, st.integers(0, 24))
+def test_a_schedule_of_ones_and_other_rates_change_no_arrival(
+    seed: int, replication: int, k: int
+) -> None:
+    plain = _times(_space(), k, seed, replication)
+    others = [0.5] * 25
+    others[k] = 0.02
+    space = _space(rates=others, schedule=[[10, 1], [20.5, 1]])
+    assert _times(space, k, seed, replication).tolist() == plain.tolist()
+    assert (np.diff(plain) > 0).all()
+
+
+def test_a_schedule_that_ends_at_zero_ends_the_arrivals() -> None:
+    assert (_times(_space(schedule=[[0, 50], [100, 0]]), 4) < 100).all()
+    assert len(_times(_space(schedule=[[0, 0]]), 4)) == 0
+
+
+# --- scenarios ---
+
+
+def _file(folder: Path, schedule: str | None, **others: str) -> Path:
+    """A scenario whose schedule is in a CSV file."""
+    if schedule is not None:
+        (folder / "storm.csv").write_text(schedule)
+    lines = ['schedule = "storm.csv"', 'process = "continuous"', *others.values()]
+    path = folder / "sea.toml"
+    path.write_text("\n".join(["[arrivals]", *lines]))
+    return path
+
+
+def test_a_schedule_is_read_from_a_file_beside_the_scenario(tmp_path: Path) -> None:
+    path = _file(tmp_path, "place,slot,factor\nsea,0,0.5\n\nsea,20.5,3\n")
+    space = load_scenario(path)
+    assert space.arrivals.schedule == ((0.0, 0.5), (20.5, 3.0))
+    (tmp_path / "same.toml").write_text(space.to_toml())  # the values, not the name
+    (tmp_path / "storm.csv").unlink()
+    assert load_scenario(tmp_path / "same.toml") == space
+    replaced = load_scenario(path, **{"arrivals.schedule": [[1, 2]]})
+    assert replaced.arrivals.schedule == ((1.0, 2.0),)
+
+
+def test_rates_and_a_schedule_beside_nodes_from_a_file(tmp_path: Path) -> None:
+    path = _file(tmp_path, "slot,factor\n5,2\n", rates="rates = [0.1, 0.2]")
+    (tmp_path / "buoys.csv").write_text("x,y\n1,1\n2,2\n")
+    path.write_text('nodes = "buoys.csv"\n' + path.read_text())
+    assert load_scenario(path).arrivals.rates == (0.1, 0.2)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "cannot be read"),
+        ("", "has columns none; allowed: slot and factor"),
+        ("slot,rate\n1,2\n", "has columns slot, rate; allowed: slot and factor"),
+        ("slot,factor\n1,2\n2,much\n", "line 3: factor is 'much'; allowed: a number"),
+        ("slot,factor\n1\n", "line 2: factor is None; allowed: a number"),
+        ("slot,factor\n1,-2\n", r"schedule.0.1: .*not -2.0"),
+        ("slot,factor\n5,1\n4,1\n", "slot 4 comes after slot 5"),
+    ],
+)
+def test_a_file_without_a_schedule_is_refused(
+    tmp_path: Path, content: str | None, message: str
+) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        load_scenario(_file(tmp_path, content))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("arrivals", "message"),
+    [
+        ({"process": "slotted", "buffer": 3}, "process: slotted .*allowed: continuous"),
+        ({"process": "slotted", "service": "newest"}, "process: slotted"),
+        ({"rates": [0.1]}, "arrivals.rates: there are 1 rates for 25 nodes"),
+        ({"rates": [-0.1] * 25}, "arrivals.rates"),
+        ({"schedule": [[3, 1], [3, 2]]}, "schedule: slot 3 comes after slot 3"),
+        ({"schedule": [[3, 101]]}, "arrivals.schedule"),
+        ({"buffer": -1}, "arrivals.buffer: -1 is out of range"),
+        ({"process": "poisson"}, "arrivals.process: .* allowed: slotted, continuous"),
+    ],
+)
+def test_arrivals_that_make_no_sense_are_refused(arrivals: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        _space(**arrivals)
