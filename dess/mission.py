@@ -23,6 +23,7 @@ the compiled functions here take the arrays and hand their first records to the 
 """
 
 from collections.abc import Generator, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ from dess.sections import fleet
 from dess.sections.charging import request_pad
 from dess.sections.failure_log import log_failures
 from dess.sections.failures import strike
+from dess.sections.packets import Packets
 from dess.sections.zone import ChargingZone
 from dess.state import (
     BATTERY,
@@ -114,6 +116,7 @@ class MissionModel:
             self.mission, ranges_of(scenario), types_of(scenario),
             self.uavs, self.residual, self.sensors, self.teeth,
         )  # fmt: skip
+        self.packets = Packets(scenario, self.state) if scenario.needs_events else None
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
         self.zone = ChargingZone(self.env, self.mission, self.uavs)
@@ -121,6 +124,8 @@ class MissionModel:
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
         self._log_state("mission_start")
+        if self.packets is not None:
+            self.env.process(self._arrivals(self.packets))
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
         is_extended = bool(self.mission["is_extended"])
@@ -130,6 +135,8 @@ class MissionModel:
         if is_extended:
             operations = records.operations[0]
             write_operations(self.mission, self.uavs, self.sensors, self.teeth, operations)
+            if self.packets is not None:
+                self.packets.write(operations)
         return MissionRecord(records.missions[0], records.uavs[0], self.log, operations)
 
     def _clock(self) -> Process:
@@ -153,12 +160,24 @@ class MissionModel:
                 yield env.timeout(slot + n / m - env.now)
                 _communicate(*arrays, n)
                 self._log_communications(slot, n, m)
+                if self.packets is not None:
+                    self._log_packets("delivery", self.packets.deliver(slot + n / m))
             before = self.uavs.copy() if self.log is not None else None
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1
             self._log_close(slot, before)
             if has_failures:
                 active = self._fail(slot)
+
+    def _arrivals(self, packets: Packets) -> Process:
+        """Let packets arrive, each at its own time."""
+        time, k = packets.next()
+        while time < inf:
+            yield self.env.timeout(max(time - self.env.now, 0.0))
+            lost = packets.arrive(k)
+            self._log_packets("arrival", [len(packets.buffers.packets) - 1])
+            self._log_packets("loss", [lost] if lost >= 0 else [])
+            time, k = packets.next()
 
     def _request_pads(self, slot: int, may_charge: int) -> None:
         """Ask for pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
@@ -193,6 +212,8 @@ class MissionModel:
                 self._log_uav("charge_end", slot, i, u["battery"])
                 self._log_uav("charge_request", slot, i, u["battery"])
                 self.zone.ask(i)
+        if self.packets is not None:
+            self._log_packets("loss", self.packets.fall_silent(float(slot)))
         return int(self.mission["active"])
 
     def _log_uav(self, event: str, time: float, i: int, value: float) -> None:
@@ -229,6 +250,16 @@ class MissionModel:
                 x = u["from_x"] + (u["x"] - u["from_x"]) * flown
                 y = u["from_y"] + (u["y"] - u["from_y"]) * flown
                 self.log.add(slot + n / m, "communication", i, u["served"], u["amount"], x, y)
+
+    def _log_packets(self, event: str, numbers: Sequence[int]) -> None:
+        """Log the arrival, the delivery or the loss of packets."""
+        if self.log is None or self.packets is None:
+            return
+        for number in numbers:
+            p = self.packets.buffers.packets[number]
+            x, y = self.world.nodes[p["node"]]
+            time = p["generated"] if event == "arrival" else p["left"]
+            self.log.add(time, event, p["uav"], p["node"], 1.0, x, y)
 
     def _log_close(self, time: int, before: np.ndarray | None) -> None:
         """Log new data, and the charging sessions and the UAVs that ended with a slot."""

@@ -340,6 +340,8 @@ def arrive(mission, residual, arrivals):
         residual: (K,) residual data [data units], increased.
         arrivals: (K,) new data of the slot [data units], overwritten.
     """
+    if mission.continuous != 0:  # then they are events of their own (dess.sections.packets)
+        return
     probability_of_none = math.exp(-mission.arrival_rate)
     for k in range(0, mission.nodes, 4):
         words = streams.block(

@@ -104,6 +104,22 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
 
 
 @st.composite
+def continuous_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
+    """Spaces whose packets arrive in continuous time; only the SimPy engine has them."""
+    nodes = draw(st.lists(cells(4), min_size=1, max_size=5, unique=True))
+    slots = draw(st.lists(st.integers(0, 30), max_size=3, unique=True).map(sorted))
+    arrivals = {
+        "process": "continuous",
+        "rates": draw(st.just([]) | st.just([draw(_numbers(0.0, 2.0)) for _ in nodes])),
+        "schedule": [[slot, draw(_numbers(0.0, 3.0))] for slot in slots],
+        "buffer": draw(st.sampled_from([0, 1, 2, 5])),
+        "service": draw(st.sampled_from(["oldest", "newest"])),
+    }
+    values = {"nodes": nodes, "arrivals": arrivals, "age": {"measured": True}, "max_slots": 30}
+    return draw(extended_spaces(**(values | fixed)))
+
+
+@st.composite
 def scenarios(draw: st.DrawFn, **fixed: Any) -> Scenario:
     """Single scenarios: a corner of a drawn space."""
     space = draw(spaces(**fixed))

@@ -1,185 +1,134 @@
-"""Buffers of packets by hand, against laws of queues, and driven with other service times."""
+"""Missions with packets: conservation, latency, and the event log packet by packet."""
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, settings
 
-from dess.sections.age import age_of_teeth
-from dess.sections.packets import DELIVERED, LOST, PACKET, WAITING, Buffers, teeth_of
+from dess import InputError, parallel_env
+from dess.batch import simulate_batch
+from dess.mission import MissionModel, simulate
+from dess.record import EventLog
+from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.sections.buffers import DELIVERED, LOST, WAITING
+from dess.view import View
+from tests.drawn import Commuter, Wanderer, continuous_spaces, policies, replications, seeds
 
-
-def _left(buffers: Buffers) -> list[float | None]:
-    """When each packet left its buffer."""
-    return [None if math.isnan(time) else time for time in buffers.packets["left"].tolist()]
-
-
-def test_the_oldest_packet_is_served_first_by_hand() -> None:
-    buffers = Buffers(1)
-    for time in (0.0, 1.0, 2.0):
-        buffers.store(0, time, 1.0)
-    buffers.serve(0, 3.0, 0.5)  # half of packet 0
-    assert _left(buffers) == [None, None, None]
-    buffers.serve(0, 4.0, 1.0, uav=2)  # the other half, and half of packet 1
-    assert _left(buffers) == [4.0, None, None]
-    buffers.serve(0, 5.0, 2.5)
-    assert _left(buffers) == [4.0, 5.0, 5.0]
-    assert buffers.packets["uav"].tolist() == [2, -1, -1]
-    assert buffers.delivered.tolist() == [0, 1, 2]
+# A mission of any small space with packets under any of the test policies.
+missions = given(continuous_spaces(), policies, seeds, replications)
 
 
-def test_the_newest_packet_is_served_first_by_hand() -> None:
-    buffers = Buffers(1, newest_first=True)
-    buffers.store(0, 0.0, 1.0)
-    buffers.serve(0, 1.0, 0.5)  # half of packet 0
-    buffers.store(0, 2.0, 1.0)
-    buffers.serve(0, 3.0, 1.0)  # packet 1 goes first; the rest of packet 0 stays
-    assert _left(buffers) == [None, 3.0]
-    buffers.serve(0, 4.0, 0.5)
-    assert _left(buffers) == [4.0, 3.0]
-    assert buffers.delivered.tolist() == [1, 0]
+def _flown(space: ScenarioSpace, policy: Any, seed: int, replication: int) -> tuple[Any, Any]:
+    """A mission that has been flown, and its record."""
+    model = MissionModel(space, [policy], seed, replication, EventLog())
+    return model, model.run()
 
 
-def test_a_full_buffer_refuses_the_new_packet_or_loses_its_oldest_by_hand() -> None:
-    refuses, replaces = Buffers(2, limit=2), Buffers(2, limit=2, newest_first=True)
-    for buffers, lost in ((refuses, 2), (replaces, 0)):
-        assert [buffers.store(0, float(time), 1.0) for time in range(3)] == [-1, -1, lost]
-        assert buffers.store(1, 3.0, 1.0) == -1  # the buffer of another node
-        assert buffers.packets["status"][lost] == LOST
-        assert buffers.packets["left"][lost] == 2.0
-        assert buffers.queues["count"].tolist() == [2, 1]
-        assert buffers.counts.tolist() == [4, 0, 1]
+@settings(max_examples=30)
+@missions
+def test_conservation_in_missions_and_at_each_node(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> None:
+    model, record = _flown(space, policy, seed, replication)
+    packets = model.packets.buffers.packets
+    ours = record.operations
+    assert len(packets) == ours["generated"]
+    assert (packets["status"] == DELIVERED).sum() == ours["delivered"]
+    assert (packets["status"] == LOST).sum() == ours["lost_packets"]
+    assert record.initial + record.arrived == pytest.approx(
+        record.collected + record.residual + ours["lost"]
+    )
+    assert 0.0 <= record.collection_ratio <= 1.0
+    log = record.events.columns()
+    for k in range(len(space.nodes)):
+        own = packets[packets["node"] == k]
+        waiting = own["remaining"][own["status"] == WAITING]
+        assert model.residual[k] == pytest.approx(waiting.sum(), abs=1e-9)
+        assert space.arrivals.buffer == 0 or len(waiting) <= space.arrivals.buffer
+        # Data of the node: what it had and what arrived is collected, lost or still there.
+        collected = log["value"][(log["event"] == "communication") & (log["node"] == k)].sum()
+        started = log["value"][(log["event"] == "mission_start") & (log["node"] == k)].sum()
+        arrived = (own["generated"] > 0.0).sum()
+        lost = own["remaining"][own["status"] == LOST].sum()
+        assert started + arrived == pytest.approx(collected + lost + waiting.sum())
 
 
-def test_all_packets_of_a_node_can_be_lost() -> None:
-    buffers = Buffers(2)
-    for k in (0, 1, 0):
-        buffers.store(k, 0.0, 1.0)
-    assert buffers.lose(0, 5.0).tolist() == [0, 2]
-    assert buffers.packets["status"].tolist() == [LOST, WAITING, LOST]
-    assert buffers.queues["count"].tolist() == [0, 1]
-    assert buffers.lose(0, 6.0).tolist() == []
+@settings(max_examples=15)
+@given(continuous_spaces(), seeds, replications)
+def test_arrivals_do_not_depend_on_the_policy(
+    space: ScenarioSpace, seed: int, replication: int
+) -> None:
+    records = [simulate(space, p, seed, replication, events=True) for p in (Wanderer(), Commuter())]
+    end = min(record.slots for record in records)
+    arrivals = []
+    for record in records:
+        assert record.events is not None
+        log = record.events.columns()
+        rows = (log["event"] == "arrival") & (log["time"] < end)
+        arrivals.append([*zip(log["time"][rows], log["node"][rows], strict=True)])
+    assert arrivals[0] == arrivals[1]
 
 
-# --- laws ---
+class _Hover:
+    name = "hover"
 
-# Operations on two nodes: (time since the last one, node, data units served or None for a packet).
-operations = st.lists(
-    st.tuples(
-        st.integers(0, 8).map(lambda eighths: eighths / 8),
-        st.integers(0, 1),
-        st.none() | st.integers(1, 20).map(lambda eighths: eighths / 8),
-    ),
-    max_size=400,
-)
+    def act(self, view: View) -> np.ndarray:
+        return np.full(len(view), 4)
 
 
-@given(operations, st.integers(0, 4), st.booleans())
-def test_laws_of_every_queue(steps: list[Any], limit: int, newest_first: bool) -> None:
-    """Conservation of packets and data, order of service, and Little's law, for each node."""
-    buffers = Buffers(2, limit, newest_first)
-    now, stored, served = 0.0, [0.0, 0.0], [0.0, 0.0]
-    lost_data, area = [0.0, 0.0], np.zeros(2)  # area: of the number in the buffer over time
-    for gap, k, amount in steps:
-        now += gap
-        area += gap * buffers.queues["count"]
-        if amount is None:
-            stored[k] += 1.0
-            lost = buffers.store(k, now, 1.0)
-            if lost >= 0:
-                lost_data[k] += buffers.packets["remaining"][lost]
-        else:
-            waiting = buffers.packets["status"] == WAITING
-            data = buffers.packets["remaining"][waiting & (buffers.packets["node"] == k)].sum()
-            buffers.serve(k, now, amount)
-            served[k] += min(amount, data)
-        assert limit == 0 or (buffers.queues["count"] <= limit).all()
-    for k in (0, 1):
-        own = buffers.packets[buffers.packets["node"] == k]
-        status = own["status"]
-        assert len(own) == stored[k]
-        assert (status == WAITING).sum() == buffers.queues["count"][k]
-        held = own["remaining"][status == WAITING].sum()
-        assert stored[k] == pytest.approx(served[k] + lost_data[k] + held)
-        # Little's law, where a packet that is still there has waited until now.
-        left = np.where(status == WAITING, now, own["left"])
-        assert area[k] == pytest.approx((left - own["generated"]).sum())
-        done = own[status == DELIVERED]
-        assert (done["left"] >= done["generated"]).all() and not done["remaining"].any()
-        if not newest_first:
-            order = [n for n in buffers.delivered if buffers.packets["node"][n] == k]
-            assert order == sorted(order)
-    assert buffers.counts[DELIVERED] == (buffers.packets["status"] == DELIVERED).sum()
-    assert buffers.counts[LOST] == (buffers.packets["status"] == LOST).sum()
+def _over_a_node(**values: Any) -> Scenario:
+    """A UAV hovers over a node; it collects up to ``slot_length`` data units per slot or so."""
+    base = {
+        "grid": 4,
+        "zone": [1, 1, 1, 1],
+        "nodes": [[1, 1]],
+        "uavs": 1,
+        "initial_data": 0.0,
+        "quota": 100_000,
+        "flying_time": 100,
+        "max_slots": 50,
+        "edge_snr": 300,
+        "arrivals.process": "continuous",
+    }
+    return Scenario.of(**(base | values))
 
 
-def test_a_single_server_with_exponential_times_has_the_mean_latency_of_theory() -> None:
-    """M/M/1 with arrival rate 0.5 and service rate 1: the mean time in the system is 2."""
-    random = np.random.default_rng(1)
-    arrivals = random.exponential(2.0, 40_000).cumsum()
-    work = random.exponential(1.0, len(arrivals))
-    buffers, free = Buffers(1), 0.0
-    ends = []
-    for time, needed in zip(arrivals, work, strict=True):
-        free = max(free, time) + needed
-        ends.append(free)
-    events = sorted([(t, 1.0) for t in arrivals] + [(t, 0.0) for t in ends])
-    for time, arrived in events:
-        if arrived:
-            buffers.store(0, time, 1.0)
-        else:
-            buffers.serve(0, time, 1.0)
-    done = buffers.packets
-    latency = done["left"] - done["generated"]
-    means = latency[2000:].reshape(38, 1000).mean(1)  # batches, nearly independent
-    assert abs(means.mean() - 2.0) < 4 * means.std(ddof=1) / math.sqrt(38)
+@pytest.mark.parametrize("m", [1, 3, 4, 7])
+def test_a_packet_is_served_in_the_next_communication_slot(m: int) -> None:
+    """Also where the node was empty before, and inside a group of communication slots."""
+    scenario = _over_a_node(communication_slots=m, slot_length=100, arrival_rate=1.5)
+    model, record = _flown(ScenarioSpace.of(scenario), _Hover(), 5, 0)
+    done = model.packets.buffers.packets[model.packets.buffers.delivered]
+    assert len(done) > 50
+    assert done["left"] == pytest.approx(np.ceil(done["generated"] * m) / m)
+    assert record.latency == pytest.approx((done["left"] - done["generated"]).mean())
 
 
-# --- age ---
+def test_policies_see_the_age_of_the_newest_data() -> None:
+    seen = {}
+
+    class Reader(_Hover):
+        def act(self, view: View) -> np.ndarray:
+            seen[int(view.constants["slot"][0])] = float(view.age[0, 0])
+            return super().act(view)
+
+    scenario = _over_a_node(slot_length=100, arrival_rate=0.3, **{"age.reward": -2.0})
+    model, record = _flown(ScenarioSpace.of(scenario), Reader(), 5, 0)
+    packets = model.packets.buffers.packets
+    for slot, age in seen.items():
+        known = packets["generated"][packets["left"] <= slot]
+        assert age == pytest.approx(slot - known.max(initial=0.0))
+    plain = simulate(_over_a_node(slot_length=100, arrival_rate=0.3), _Hover(), 5, 0)
+    ends = [
+        *[seen[slot] for slot in range(1, 50)],
+        record.slots - packets["generated"][packets["left"] <= record.slots].max(),
+    ]
+    assert record.reward - plain.reward == pytest.approx(-2.0 * sum(ends))
 
 
-def _done(*deliveries: tuple[int, float, float]) -> np.ndarray:
-    """Delivered packets: (node, generated, delivered)."""
-    packets = np.zeros(len(deliveries), PACKET)
-    for row, values in enumerate(deliveries):
-        packets[["node", "generated", "left"]][row] = values
-    return packets
-
-
-def _teeth(*deliveries: tuple[int, float, float], nodes: int = 1, end: float) -> Any:
-    lows, highs, peaks = teeth_of(_done(*deliveries), nodes, end)
-    return list(zip(lows.tolist(), highs.tolist(), strict=True)), peaks
-
-
-def test_the_sawtooth_of_time_stamps_by_hand() -> None:
-    """At 2 the age falls from 2 to 1, at 5 from 4 to 2; older data change nothing."""
-    teeth, peaks = _teeth((0, 1.0, 2.0), (0, 3.0, 5.0), (0, 2.0, 6.0), end=8.0)
-    assert teeth == [(0.0, 2.0), (1.0, 4.0), (2.0, 5.0)]
-    assert peaks == 2
-
-
-def test_deliveries_at_one_time_are_one_peak() -> None:
-    teeth, peaks = _teeth((0, 1.0, 4.0), (0, 2.0, 4.0), (1, 0.0, 4.0), nodes=2, end=5.0)
-    assert teeth == [(0.0, 4.0), (2.0, 3.0), (0.0, 5.0)]
-    assert peaks == 1
-
-
-def test_the_age_of_visits_at_fixed_gaps() -> None:
-    """Data collected as they are generated, every 3 slots: a mean age of 3 / 2."""
-    visits = [(0, 3.0 * n, 3.0 * n) for n in range(1, 101)]
-    lows, highs, peaks = teeth_of(_done(*visits), 1, 300.0)
-    mean, percentile = age_of_teeth(lows, highs, np.ones(len(lows)))
-    assert (mean, percentile) == pytest.approx((1.5, 2.97))
-    assert highs[:peaks].mean() == pytest.approx(3.0)
-
-
-def test_the_age_of_visits_at_exponential_gaps() -> None:
-    """The mean age is E[X^2] / (2 E[X]) = E[X] = 3, and the age is exponential, too."""
-    times = np.random.default_rng(2).exponential(3.0, 50_000).cumsum()
-    lows, highs, _ = teeth_of(_done(*((0, t, t) for t in times)), 1, times[-1])
-    mean, percentile = age_of_teeth(lows, highs, np.ones(len(lows)))
-    assert mean == pytest.approx(3.0, rel=0.03)  # the deviation is 0.7 %
-    assert percentile == pytest.approx(3.0 * math.log(100), rel=0.05)
+def test_only_the_simpy_engine_has_continuous_arrivals() -> None:
+    space = load_scenario("paper", **{"arrivals.process": "continuous"})
+    for refused in (lambda: simulate_batch(space, _Hover()), lambda: parallel_env(space)):
+        with pytest.raises(InputError, match="arrivals.process: continuous needs the SimPy"):
+            refused()
