@@ -205,6 +205,11 @@ def metric_name(metric: str) -> str:
     return METRICS.get(metric, metric.replace("_", " ").capitalize())
 
 
+def metric_label(metric: str) -> str:
+    """The name of a metric with its unit, in figures."""
+    return MEASURES[metric].label if metric in MEASURES else metric_name(metric)
+
+
 def measured_in(missions: Container[str]) -> list[str]:
     """The metrics of extended scenarios that a table of missions, or a row of it, has."""
     return [name for name in OPERATIONS.names or () if name in missions]
@@ -217,8 +222,12 @@ def metrics_in(missions: Container[str]) -> list[str]:
 
 def value_text(value: object) -> str:
     """A value of a parameter as text: ``12.5``, ``yes``, or ``5–7.5`` for a range."""
+    if isinstance(value, dict):  # a type of UAVs
+        given = {key: of_key for key, of_key in value.items() if of_key is not None}
+        return " ".join(f"{key} {value_text(of_key)}" for key, of_key in given.items())
     if isinstance(value, list | tuple):
-        return "–".join(map(value_text, value))
+        joint = ", " if any(isinstance(item, dict) for item in value) else "–"
+        return joint.join(map(value_text, value)) or "none"
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
     return value if isinstance(value, str) else f"{value:g}"

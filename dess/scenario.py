@@ -288,7 +288,7 @@ class Scenario(_Constants):
         Raises:
             InputError: For unknown keys, wrong types and values out of range.
         """
-        return _validated(cls, _merged({}, values), "scenario")
+        return _validated(cls, merged({}, values), "scenario")
 
 
 IntegerRange = tuple[Integer, Integer]
@@ -330,7 +330,7 @@ class ScenarioSpace(_Constants):
     ) -> "ScenarioSpace":
         """A space of the given values, on top of a scenario or space (default: the paper's)."""
         base = scenario.model_dump() if scenario is not None else {}
-        return _validated(cls, _merged(base, values), "scenario")
+        return _validated(cls, merged(base, values), "scenario")
 
     @property
     def numeric(self) -> list[str]:
@@ -381,7 +381,7 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     """
     where, read = _SCENARIOS.load(name_or_path)
     read.pop("description", None)
-    values = _merged(read, overrides)
+    values = merged(read, overrides)
     table = read.get("arrivals")
     schedule = table.get("schedule") if isinstance(table, dict) else None
     if isinstance(schedule, str) and not {"arrivals", "arrivals.schedule"} & {*overrides}:
@@ -405,22 +405,33 @@ def fields_of(model: type[_Constants]) -> dict[str, FieldInfo]:
     return found
 
 
-def _merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
     """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section."""
-    merged = dict(base)
+    result = dict(base)
     for name, value in values.items():
         section, _, part = name.partition(".")
         table = {part: value} if part else value
-        before = merged.get(section)
+        before = result.get(section)
         if (
             section in EXTENSIONS
             and isinstance(table, dict)
             and (before is None or isinstance(before, dict))
         ):
-            merged[section] = (before or {}) | table
+            result[section] = (before or {}) | table
         else:
-            merged[name] = value
-    return merged
+            result[name] = value
+    return result
+
+
+def dotted(values: dict[str, Any]) -> dict[str, Any]:
+    """Values by field: the table of a section becomes fields such as ``failures.uav_rate``."""
+    fields: dict[str, Any] = {}
+    for name, value in values.items():
+        if name in EXTENSIONS and isinstance(value, dict):
+            fields |= {f"{name}.{part}": of_part for part, of_part in value.items()}
+        else:
+            fields[name] = value
+    return fields
 
 
 def scenario_names() -> list[str]:

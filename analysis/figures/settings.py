@@ -23,7 +23,7 @@ from analysis.names import (
     LESS_IS_BETTER,
     METRICS,
     PRODUCT,
-    metric_name,
+    metric_label,
     parameter,
     value_text,
 )
@@ -68,7 +68,7 @@ def plot(
                 part = part.assign(policy=part[hue].map(value_text))
                 looks = _graded(settings.varied(results)[hue])
             _curves(part, x, looks, settings.varied(results)[x], ax)
-            ax.set(title=f"{metric_name(metric)}{': ' * bool(name)}{name}")
+            ax.set(title=f"{metric_label(metric)}{': ' * bool(name)}{name}")
             _of_metric(ax.yaxis, metric)
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
         title = parameter(hue).label if hue else None
@@ -130,7 +130,7 @@ def heat_map(
         _of_metric(bar.ax.yaxis, metric)
         figure.supxlabel(parameter(x).label, fontsize=10, parse_math=True)
         figure.supylabel(parameter(y).tick, fontsize=10, parse_math=True)
-        figure.suptitle(f"{metric_name(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
+        figure.suptitle(f"{metric_label(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
                         ha="left")  # fmt: skip
     return figure
 
@@ -157,7 +157,7 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
             ax.set(xlim=(-0.5, len(ticks) - 0.5))
             ax.set_xlabel(_label(field), parse_math=True)
             _of_metric(ax.yaxis, metric)
-        figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
+        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)
     return figure
 
@@ -188,7 +188,7 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
                 ax.set_xticks(places)
             ax.set_xlabel(_label(field), parse_math=True)
             _of_metric(ax.yaxis, metric)
-        figure.suptitle(metric_name(metric), fontsize=11, fontweight="bold")
+        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)
     return figure
 
@@ -206,7 +206,7 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
         for number, (name, part) in enumerate(missions.groupby("policy", sort=False)):
             ax.ecdf(part[metric], label=str(name), color=colours[str(name)][0], linewidth=1.7,
                     linestyle=style.LINES[number % 4])  # fmt: skip
-        ax.set(xlabel=metric_name(metric), ylabel="share of the missions", ylim=(-0.02, 1.02))
+        ax.set(xlabel=metric_label(metric), ylabel="share of the missions", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         _of_metric(ax.xaxis, metric)
         style.legend_below(figure, ax, 4)
@@ -319,4 +319,6 @@ def _of_metric(axis: Axis, metric: str) -> None:
 
 def _short(value: float, metric: str) -> str:
     """A value as it is written in a cell."""
-    return f"{100 * value:.1f}" if metric in METRICS else f"{value:,.0f}"
+    if metric in METRICS:
+        return f"{100 * value:.1f}"
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -21,10 +21,11 @@ from analysis.results.provenance import differing
 from analysis.results.tables import Results
 from analysis.stats.paired import compare
 from dess import InputError
-from dess.record import MISSION_RECORD, UAV_RECORD
+from dess.record import MISSION_RECORD, OPERATIONS, UAV_RECORD
 
 _KEYS = ["team", "scenario", "replication"]  # columns by which missions are matched
 _MISSION_FIELDS = [n for n in MISSION_RECORD.names or () if n not in ("seed", "replication")]
+_MISSION_FIELDS += OPERATIONS.names or ()
 _UAV_FIELDS = [*(UAV_RECORD.names or ())]
 _ORDER = [PRODUCT, RATIO, REWARD]  # metrics by whose changes missions are sorted
 
@@ -39,7 +40,7 @@ class Diff:
         missions: A row per mission that both have, in the order of A: ``fields`` (the names of
             those that differ in the records of the mission and of its UAVs, empty if none does),
             ``replication``, and with ``_a`` and ``_b`` each ``policy``, ``point`` and the fields of
-            ``MISSION_RECORD``.
+            ``MISSION_RECORD`` and ``OPERATIONS`` (nan where not measured).
         alone: The missions that only one folder has: ``only_in`` (``A`` or ``B``), ``what`` they
             are, and the number ``missions``.
     """
@@ -183,7 +184,7 @@ def _scenarios(a: Results, b: Results) -> tuple[np.ndarray, np.ndarray]:
 def _missions(results: Results, teams: Mapping[str, str], scenarios: np.ndarray) -> pd.DataFrame:
     """All missions with the columns that match them; equal design points count once."""
     rows = pd.concat([results.missions, results.checks], ignore_index=True)
-    rows = rows[["policy", "point", "replication", *_MISSION_FIELDS]]
+    rows = rows.reindex(columns=["policy", "point", "replication", *_MISSION_FIELDS])
     rows = rows.assign(team=rows["policy"].map(teams), scenario=scenarios[rows["point"]])
     return rows.drop_duplicates(_KEYS, ignore_index=True)
 
@@ -218,7 +219,7 @@ def _differs(pairs: pd.DataFrame, name: str) -> np.ndarray:
     if not pd.api.types.is_numeric_dtype(a):
         return (a != b).to_numpy()
     bits = [np.ascontiguousarray(values, float).view(np.int64) for values in (a, b)]
-    return bits[0] != bits[1]
+    return (bits[0] != bits[1]) & ~(a.isna() & b.isna()).to_numpy()  # nan: not measured
 
 
 def _alone(

@@ -15,7 +15,16 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, SHARES, parameter, value_text
+from analysis.names import (
+    COST,
+    LESS_IS_BETTER,
+    METRICS,
+    PRODUCT,
+    SHARES,
+    metrics_in,
+    parameter,
+    value_text,
+)
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
 from analysis.stats.differences import column_tests
@@ -91,7 +100,7 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
         InputError: If there is no such metric or policy.
     """
     missions = _missions(results, metric, policy)
-    others = [name for name in (*SHARES, *MEANS) if name != metric]
+    others = [name for name in metrics_in(missions) if name != metric]
     cells = missions.groupby(["policy", "point"], sort=False)
     table = cells.size().rename("n").reset_index()
     table = table.join(points(results), on="point")
@@ -271,7 +280,7 @@ def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.D
 
 def check_metric(results: Results, metric: str) -> None:
     """Raise ``InputError`` if the missions do not have the metric."""
-    known = [name for name in (*SHARES, *MEANS, *LESS_IS_BETTER) if name in results.missions]
+    known = [*metrics_in(results.missions), *([COST] if COST in results.missions else [])]
     if metric not in known:
         raise InputError(f"metric: {metric!r} is unknown{one_of(metric, known)}")
 
@@ -326,8 +335,10 @@ def _hashable(field: str, values: Sequence[Any]) -> list[Any]:
         return _numbered([f"{len(nodes)} cells" for nodes in values], values)
     if field == "zone":
         return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
-    plain = [v[0] if isinstance(v, list | tuple) and v[0] == v[-1] else v for v in values]
-    if any(isinstance(value, bool | list | tuple) for value in plain):
+    plain = [
+        v[0] if isinstance(v, list | tuple) and len(v) == 2 and v[0] == v[1] else v for v in plain
+    ]
+    if any(isinstance(value, bool | list | tuple | dict) for value in plain):
         return [value_text(value) for value in plain]
     return plain
 

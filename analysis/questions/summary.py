@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
+from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
 from analysis.questions import costs
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.chunks import parts_of
@@ -84,7 +84,8 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
             here = places.get((metric, point), [])
             if len(here) > 1:
                 values = rows.to_numpy(float)[:, wide.columns.get_indexer(policies[here])]
-                verdicts[here] = _verdicts(values, metric in SHARES)
+                sign = -1.0 if metric in LESS_IS_BETTER else 1.0
+                verdicts[here] = _verdicts(sign * values, metric in SHARES)
     return means.assign(verdict=verdicts)
 
 

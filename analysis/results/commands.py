@@ -11,7 +11,7 @@ from typing import Any
 
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.provenance import Origin
-from dess.scenario import load_scenario, scenario_names
+from dess.scenario import dotted, load_scenario, scenario_names
 
 
 def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:
@@ -45,8 +45,18 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
     if name not in scenario_names():
         name, paper = "paper", load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
-        changes = {key: value for key, value in fields.items() if value != paper[key]}
-    settings = [word for k, v in changes.items() for word in ("--set", f"{k}={json.dumps(v)}")]
+        changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}
+    settings = [w for k, v in dotted(changes).items() for w in ("--set", f"{k}={_as_toml(v)}")]
     acting = ",".join(policy.split(",")[: origin.space(values).uavs[1]])  # the others have no UAV
     which = ["--policy", acting, "--seed", str(origin.seed), "--replication", str(replication)]
     return shlex.join(["dess", "simulate", "--scenario", name, *settings, *which])
+
+
+def _as_toml(value: Any) -> str:
+    """A value in the syntax of TOML: as in JSON, but for tables, such as a type of UAVs."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_as_toml, value))}]"
+    if isinstance(value, dict):
+        given = {key: of_key for key, of_key in value.items() if of_key is not None}
+        return f"{{{', '.join(f'{key} = {_as_toml(of_key)}' for key, of_key in given.items())}}}"
+    return json.dumps(value)

@@ -7,6 +7,7 @@ from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import Field, model_validator
+from pydantic_core import to_jsonable_python
 
 import dess
 from analysis.results.provenance import (
@@ -228,8 +229,9 @@ class Manifest(Origin):
         A field that a design point does not set has the value of the scenario.
         """
         fields = dict.fromkeys(field for point in self.points for field in point.values)
-        rows = ({**self.scenario, **point.values} for point in self.points)
-        return [{field: row[field] for field in fields} for row in rows]
+        base = self.space({})
+        unset = {field: to_jsonable_python(base.value(field)) for field in fields}
+        return [unset | point.values for point in self.points]
 
     @cached_property
     def scenarios(self) -> tuple[ScenarioSpace, ...]:

@@ -34,7 +34,7 @@ from analysis.study.stopping import Text
 from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import InputError, validation_line
-from dess.scenario import ScenarioSpace
+from dess.scenario import ScenarioSpace, fields_of, merged
 from policies import load_team
 from policies.base import Policy
 from policies.registry import files_of
@@ -127,7 +127,7 @@ class Origin(Document):
         space, study = self.space({}), self.study
         if space.model_dump(mode="json").keys() != self.scenario.keys():
             raise ValueError("scenario: is not complete")
-        if study["set"].keys() - self.scenario.keys() or "/" in study["scenario"]:
+        if study["set"].keys() - fields_of(ScenarioSpace).keys() or "/" in study["scenario"]:
             raise ValueError("study.scenario, study.set: are not a scenario and its fields")
         if [team.policy for team in self.policies] != [*study["policies"]]:
             raise ValueError("policies: are not those of the study")
@@ -143,7 +143,7 @@ class Origin(Document):
         Raises:
             InputError: If it is not valid.
         """
-        return scenario_of(self.scenario | values)
+        return scenario_of(merged(self.scenario, values))
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:
         """How the code and libraries of this process differ from those that made the results.

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.names import BOUNDED, MEANS, SHARES
+from analysis.names import BOUNDED, SHARES, metrics_in
 from analysis.stats.bounded import LEVEL as LEVEL
 from analysis.stats.bounded import bounded_ends
 from dess.errors import InputError, one_of
@@ -202,15 +202,16 @@ def summary(
     Returns:
         A row per group, in order of first appearance, and metric: the columns ``by``, ``metric``
         (``success``, ``collection_ratio``, ``collection_ratio_and_communication``, ``reward``),
-        ``mean``, ``low``, ``high`` and ``n``, the number of missions. The intervals are those of
+        ``mean``, ``low``, ``high`` and ``n``, the number of missions. Extended scenarios add what
+        they measure; missions without a value are left out. The intervals are those of
         ``interval_of``.
     """
     strata = "point" in missions and "point" not in by
-    rows = [
-        (*group, metric, *_interval(part, metric, level, strata), len(part))
-        for group, part in groups(missions, by)
-        for metric in (*SHARES, *MEANS)
-    ]
+    rows = []
+    for group, part in groups(missions, by):
+        for metric in metrics_in(missions):
+            if n := int(part[metric].count()):
+                rows.append((*group, metric, *_interval(part, metric, level, strata), n))
     return pd.DataFrame(rows, columns=[*by, "metric", "mean", "low", "high", "n"])
 
 
@@ -263,6 +264,7 @@ def _interval(missions: pd.DataFrame, metric: str, level: float, strata: bool) -
     """The mean of a group: over its missions, or over the points that these are at."""
     if strata and missions["point"].nunique() > 1:
         wide = missions.pivot(index="replication", columns="point", values=metric)
+        wide = wide.dropna(axis="columns", how="all")
         if (wide.count() > 1).all():
             return stratified(wide.to_numpy(float), metric, level)
-    return interval_of(metric, missions[metric].to_numpy(), level)
+    return interval_of(metric, missions[metric].dropna().to_numpy(), level)

@@ -6,6 +6,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pandas as pd
 
+from analysis.names import MEASURES
 from analysis.stats.intervals import check_columns, groups
 from dess import InputError
 
@@ -29,6 +30,7 @@ def metrics_by_treatment(
         raise InputError(f"by: {of} is what is compared; allowed: other columns")
     for metric in metrics:
         values = pd.to_numeric(missions[metric], errors="coerce")
+        values = values[missions[metric].notna()] if metric in MEASURES else values
         if odd := int(len(values) - np.isfinite(values).sum()):
             raise InputError(f"{metric}: no number in {odd} missions; allowed: finite numbers")
     keys = list(dict.fromkeys([*by, *(k for k in _MISSION if k in missions and k != of)]))

@@ -103,7 +103,8 @@ def compare(
         A row per policy (in order of first appearance), group (in order of their values) and
         metric: ``policy`` (or ``point``), ``baseline``, the columns ``by``, ``metric``, the fields
         of ``Paired`` and, after ``p``, ``p_adjusted``. A positive difference means that the value
-        is above that of the baseline. If a group has several missions of a replication (at several
+        is above that of the baseline. What a mission of a pair did not measure is left out. If a
+        group has several missions of a replication (at several
         design points, which share its random draws), their means are compared, and ``n`` is the
         number of replications.
 
@@ -123,8 +124,10 @@ def compare(
         check_same_missions(tables, name, baseline)
         for group, (a, b) in matched([tables[name], reference], by):
             for metric in metrics:
-                result = paired(a[metric], b[metric], level, metric)
-                rows.append((name, baseline, *group, metric, *result))
+                measured = ~np.isnan(a[metric]) & ~np.isnan(b[metric])
+                if measured.any():
+                    result = paired(a[metric][measured], b[metric][measured], level, metric)
+                    rows.append((name, baseline, *group, metric, *result))
     columns = [of, "baseline", *by, "metric", *Paired._fields]
     return with_adjusted(pd.DataFrame(rows, columns=columns), correction)
 

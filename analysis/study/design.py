@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from analysis.study.stopping import StrictTable, of_its_kind
 from dess import InputError
-from dess.scenario import Integer, Scenario, fields_of
+from dess.scenario import Integer, Scenario, dotted, fields_of
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
@@ -38,6 +38,15 @@ class DesignPoint:
 
     values: dict[str, Any]
     replication: int = 0
+
+
+def by_field(value: Any) -> Any:
+    """The values of a design by field: tables of sections become fields, lists tuples."""
+    return as_tuples(dotted(value)) if isinstance(value, dict) else value
+
+
+def _rows_by_field(value: Any) -> Any:
+    return tuple(map(by_field, value)) if isinstance(value, list | tuple) else value
 
 
 def as_tuples(value: Any) -> Any:
@@ -83,10 +92,10 @@ def _is_power_of_two(number: int) -> int:
 
 
 Values = Annotated[
-    dict[str, tuple[Any, ...]], BeforeValidator(as_tuples), AfterValidator(_have_values)
+    dict[str, tuple[Any, ...]], BeforeValidator(by_field), AfterValidator(_have_values)
 ]
-Rows = Annotated[tuple[dict[str, Any], ...], BeforeValidator(as_tuples)]
-Ranges = Annotated[dict[str, Any], BeforeValidator(as_tuples), AfterValidator(_are_ranges)]
+Rows = Annotated[tuple[dict[str, Any], ...], BeforeValidator(_rows_by_field)]
+Ranges = Annotated[dict[str, Any], BeforeValidator(by_field), AfterValidator(_are_ranges)]
 PowerOfTwo = Annotated[Integer, AfterValidator(_is_power_of_two)]
 
 

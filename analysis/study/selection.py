@@ -40,7 +40,9 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.study.stopping import MOST, Metric, StrictTable
+from analysis.names import BOUNDED, LESS_IS_BETTER, SHARES
+from analysis.study.stopping import MOST, Metric, StrictTable, values_in
+from dess import InputError
 from dess.scenario import Integer, Number
 
 # Number of stages whose sums are computed together; it does not change any result.
@@ -94,7 +96,7 @@ class Selection(StrictTable):
         description="kn-bounded: for metrics between 0 and 1 with rare failures; kn: for others"
     )
     metric: Metric = Field(
-        "collection_ratio_and_communication", description="the best has its largest mean"
+        "collection_ratio_and_communication", description="the best has its best mean"
     )
     first: Integer = Field(
         20, ge=2, le=MOST, description="missions of every design point in round one"
@@ -112,8 +114,8 @@ class Selection(StrictTable):
 
     @model_validator(mode="after")
     def _fits_the_procedure(self) -> Self:
-        if self.procedure == "kn-bounded" and self.metric == "reward":
-            raise ValueError("metric: reward is not bounded; allowed: procedure kn with it")
+        if self.procedure == "kn-bounded" and self.metric not in (*SHARES, *BOUNDED):
+            raise ValueError(f"metric: {self.metric} is not bounded; allowed: procedure kn with it")
         return self
 
     def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
@@ -148,7 +150,9 @@ class Selection(StrictTable):
             best=race.best,
             survivors=tuple(map(int, race.alive)),
             counts=tuple(counts),
-            means=tuple(float(x[:n].mean()) for n, x in zip(counts, values, strict=True)),
+            means=tuple(
+                float(self._sign * x[:n].mean()) for n, x in zip(counts, values, strict=True)
+            ),
             procedure=self.procedure,
             guarantee=self._guarantee(race),
             guaranteed=race.over,
@@ -159,7 +163,18 @@ class Selection(StrictTable):
         )
 
     def _values(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray]:
-        return [np.asarray(sample[self.metric], float) for sample in samples]
+        """The values of the metric, negative if less is better: the best has the largest mean."""
+        found = [values_in(sample, self.metric) for sample in samples]
+        if any(np.isnan(values).any() for values in found):
+            raise InputError(
+                f"selection.metric: {self.metric} is not measured in some missions; "
+                "allowed: a metric that every mission has"
+            )
+        return [self._sign * values for values in found]
+
+    @property
+    def _sign(self) -> float:
+        return -1.0 if self.metric in LESS_IS_BETTER else 1.0
 
     def _guarantee(self, race: "_Race") -> str:
         if len(race.values) == 1:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
+from typing import Annotated, Any, NamedTuple, Self, get_args
 
 import numpy as np
 from pydantic import (
@@ -16,12 +16,12 @@ from pydantic import (
 )
 from scipy.special import ndtri, stdtrit
 
-from analysis.names import BOUNDED
+from analysis.names import BOUNDED, MEANS, MEASURES, SHARES
 from analysis.stats.bounded import LEVEL, bounded_ends
-from dess.errors import one_of, shown, validation_line
+from dess.errors import InputError, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
-Metric = Literal["success", "collection_ratio", "collection_ratio_and_communication", "reward"]
+_METRICS = [*SHARES, *MEANS, *MEASURES]
 
 # The largest number of missions that a rule may ask for.
 MOST = 1_000_000_000
@@ -35,6 +35,14 @@ def _printable(text: str) -> str:
     return text
 
 
+def _known(metric: str) -> str:
+    if metric not in _METRICS:
+        raise ValueError(f"{metric!r} is unknown{one_of(metric, _METRICS)}")
+    return metric
+
+
+# A metric of missions; those of ``MEASURES`` only where the scenario measures them.
+Metric = Annotated[str, AfterValidator(_known)]
 # A name, or another line of text.
 Text = Annotated[str, Field(max_length=4000), AfterValidator(_printable)]
 
@@ -202,7 +210,7 @@ class Precision(StrictTable):
         stop = self._stop(self._last_miss(np.max(list(ratios.values()), axis=0)))
         rows = []
         for metric, target in self.targets.items():
-            means, widths = running_interval(metric, sample[metric])
+            means, widths = running_interval(metric, values_in(sample, metric))
             held = len(means) - int(self._last_miss(ratios[metric])[-1]) > self.look_ahead
             mean, width, allowed = (float(of[-1]) for of in (means, widths, target.width(means)))
             met = stop is not None or held
@@ -211,7 +219,7 @@ class Precision(StrictTable):
 
     def _excess(self, metric: Metric, sample: Mapping[str, np.ndarray]) -> np.ndarray:
         """Half-width / target after 1..n missions; at most 1 where the target is met."""
-        means, widths = running_interval(metric, sample[metric])
+        means, widths = running_interval(metric, values_in(sample, metric))
         allowed = self.targets[metric].width(means)
         never = np.where(widths > 0, np.inf, 0.0)
         return np.divide(widths, allowed, out=never, where=allowed > 0)
@@ -228,17 +236,35 @@ class Precision(StrictTable):
         return int(counts[complete[0]]) - self.look_ahead if complete.size else None
 
 
+def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
+    """The values of a metric of missions.
+
+    Raises:
+        InputError: If the scenario does not measure it.
+    """
+    if metric not in sample:
+        known = [name for name in _METRICS if name in sample]
+        raise InputError(f"{metric}: is not measured by the scenario; allowed: {', '.join(known)}")
+    return np.asarray(sample[metric], float)
+
+
 def running_interval(metric: str, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Means of the first 1..n values, and the half-widths of their 95 % confidence intervals.
 
     Args:
         metric: Its interval is that of ``stats.intervals.interval_of``.
-        values: (n,) values.
+        values: (n,) values; nan where a mission has not measured the metric.
 
     Returns:
-        (n,) means and (n,) half-widths. Student's half-width of a single value is infinite.
+        (n,) means and (n,) half-widths. Student's half-width of a single value is infinite, and so
+        is that of no value.
     """
     sample = np.asarray(values, float)
+    present = ~np.isnan(sample)
+    if not present.all():
+        means, widths = running_interval(metric, sample[present])
+        place = np.cumsum(present)
+        return np.append(0.0, means)[place], np.append(np.inf, widths)[place]
     counts = np.arange(1, len(sample) + 1)
     if metric == "success":
         successes = np.cumsum(sample)

@@ -23,7 +23,7 @@ from analysis.study.engine import Engine, engine_of
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
-from dess.scenario import Integer, ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.streams import MAX_SEED
 from policies import load_team
 from policies.registry import check_no_files
@@ -49,6 +49,10 @@ class Point(NamedTuple):
     replication: int = 0
 
 
+def _by_field(values: Any) -> Any:
+    return dotted(values) if isinstance(values, dict) else values
+
+
 class StudyData(StrictTable):
     """The fields of a study and their limits, as study files and results have them.
 
@@ -65,7 +69,9 @@ class StudyData(StrictTable):
     )
     description: Text = Field("", description="what the study is about, in a line")
     scenario: Text = Field("paper", description="a shipped scenario or a TOML file")
-    set: dict[str, Any] = Field({}, description="fields of the scenario, the same everywhere")
+    set: Annotated[dict[str, Any], BeforeValidator(_by_field)] = Field(
+        {}, description="fields of the scenario, the same everywhere"
+    )
     design: Design | None = Field(
         None, description="the design points; without one, the scenario is the only point"
     )
@@ -216,7 +222,7 @@ class Study(StudyData):
     @cached_property
     def _fields(self) -> dict[str, Any]:
         """The fields of ``_base``: its file is read once, and not for every design point."""
-        return dict(self._base)
+        return self._base.model_dump()
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
