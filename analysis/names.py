@@ -62,6 +62,7 @@ MEASURES = {
     "lost": Measure("Data lost", "data units"),
     "queue": Measure("UAVs waiting for a pad"),
     "waiting": Measure("Waiting time for a pad", _SLOTS),
+    "pad_requests": Measure("Requests for a pad", less_is_better=False),
     UTILISATION: Measure("Utilisation of the pads", less_is_better=False),
     "failures": Measure("Failures of UAVs"),
     "slots_grounded": Measure("Time under repair", _SLOTS),

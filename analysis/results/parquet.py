@@ -308,11 +308,16 @@ def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], lis
             damaged.append(path)
     for name, files in sound.items():
         first = files[0][1]
-        if all(table.equals(first) for _, table in files):
+        if all(_are_equal(table, first) for _, table in files):
             tables[name] = first
         else:
             damaged += [path for path, _ in files]
     return tables, damaged
+
+
+def _are_equal(a: pa.Table, b: pa.Table) -> bool:
+    """Whether two tables are equal, where nan equals nan; arrow holds that it does not."""
+    return a.equals(b) or a.to_pandas().equals(b.to_pandas())
 
 
 def _name_in(table: pa.Table) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess.code.libraries import missing
+from dess.errors import InputError, one_of
 from dess.files import check_folder
 from reports.cli import completion, console
 from reports.cli.ranges import all_settings, all_values
@@ -52,6 +53,13 @@ def sweep(
             help="Policies to compare; repeatable.  [default: greedy]",
         ),
     ] = None,
+    metric: Annotated[
+        str,
+        typer.Option(
+            help="The metric that ranks the settings: success, ratio, product, reward, cost, or "
+            "what the scenario measures, such as age."
+        ),
+    ] = "product",
     missions: Annotated[
         int,
         typer.Option(
@@ -91,9 +99,14 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate every combination of values, write a page, and print the ranked settings."""
+    from analysis.names import ALIASES, COST, MEANS, MEASURES, SHARES
+    from analysis.questions import settings as settings_of
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
 
+    metric, known = ALIASES.get(metric, metric), [*SHARES, *MEANS, COST, *MEASURES]
+    if metric not in known:
+        raise InputError(f"--metric: {metric!r} is unknown{one_of(metric, [*ALIASES, *known])}")
     study = question.question(
         all_values(settings or []),
         scenario,
@@ -112,17 +125,18 @@ def sweep(
         f"dess study run {file} --out {folder}",
     )
     answer = Sweep(study, folder, found)
+    settings_of.check_metric(found, metric)
     if not as_json:  # the answer comes before the page, which takes longer
-        _print(answer)
+        _print(answer, metric)
         console.say(f"study: {file}")
-    page = _render(folder, out)
+    page = _render(folder, out, metric)
     if as_json:
-        _print_json(answer, page, file)
+        _print_json(answer, metric, page, file)
     elif page:
         console.say(f"page: {page}")
 
 
-def _render(folder: Path, out: Path) -> Path | None:
+def _render(folder: Path, out: Path, metric: str) -> Path | None:
     """Write the page; a line says so where the libraries of pages are not installed."""
     if absent := missing("reports", "the page of a sweep"):
         console.say(f"no page: {absent}", sys.stderr)
@@ -130,17 +144,19 @@ def _render(folder: Path, out: Path) -> Path | None:
     from reports.pages.render import render_study
 
     with rendering() as steps:
-        return render_study(folder, out, steps)
+        return render_study(folder, out, steps, {"metric": metric})
 
 
-def _print(answer: "Sweep") -> None:
+def _print(answer: "Sweep", metric: str) -> None:
     """Print the first settings of the ranking, and the cheapest ones."""
     from analysis import numbers
-    from analysis.names import COST, SHORT_METRICS, value_text
+    from analysis.names import COST, MEASURES, SHORT_METRICS, metric_label, metric_name, value_text
     from analysis.questions.settings import varied
 
-    table, fields, prices = answer.table(), [*varied(answer.results)], answer.study.costs
-    heads = ["rank", "", "policy", *fields, *SHORT_METRICS.values(), *([COST] if prices else [])]
+    table, fields, prices = answer.table(metric), [*varied(answer.results)], answer.study.costs
+    more = [metric_label(metric)] if metric in MEASURES else []
+    heads = ["rank", "", "policy", *fields, *more, *SHORT_METRICS.values()]
+    heads += [COST] if prices else []
     rows = []
     for row in table.head(SHOWN).to_dict("records"):
         ends = [[row[m], row[f"{m}_low"], row[f"{m}_high"]] for m in SHORT_METRICS]
@@ -148,19 +164,24 @@ def _print(answer: "Sweep") -> None:
         mark = "≈" if row["tied"] else ""
         values = [value_text(row[field]) for field in fields]
         metrics = [numbers.interval(*estimate) for estimate in ends]
+        if more:
+            estimate = [row[metric], row[f"{metric}_low"], row[f"{metric}_high"]]
+            metrics.insert(0, numbers.quantities(*estimate))
         rows.append([f"{row['rank']}", mark, row["policy"], *values, *metrics, *cost])
     console.print_table(heads, rows)
-    more = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
-    end = "≈: the product may be as good as that of the first"
-    console.say(f"{len(table):,} settings{more}; {end}")
+    first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
+    what = SHORT_METRICS.get(metric) or metric_name(metric).lower()
+    console.say(
+        f"{len(table):,} settings{first}; ≈: the {what} may be as good as that of the first"
+    )
     for line in answer.answers():
         console.say(line)
 
 
-def _print_json(answer: "Sweep", page: Path | None, file: Path) -> None:
+def _print_json(answer: "Sweep", metric: str, page: Path | None, file: Path) -> None:
     """Print all settings and where all of it is, as JSON."""
     places = {"results": str(answer.path), "study_file": str(file), "page": page and str(page)}
-    answers, rows = answer.answers(), json.loads(answer.table().to_json(orient="records"))
+    answers, rows = answer.answers(), json.loads(answer.table(metric).to_json(orient="records"))
     about = {"study": answer.study.name, **places, "answers": answers, "table": rows}
     print(json.dumps(about, indent=2))
 

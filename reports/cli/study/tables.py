@@ -6,7 +6,16 @@ from pathlib import Path
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, PRODUCT, RATIO, SHORT_METRICS, SUCCESS
+from analysis.names import (
+    COST,
+    MEASURES,
+    PRODUCT,
+    RATIO,
+    SHORT_METRICS,
+    SUCCESS,
+    measured_in,
+    metric_label,
+)
 from analysis.questions import costs, summary
 from analysis.questions.head_to_head import new_training
 from analysis.questions.summary import settings
@@ -50,7 +59,9 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
     printers = {
         "sensitivities": _print_sensitivities,
         "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
-        "means": lambda means: _print_by_point(points, means, [*SHORT_METRICS]),
+        "means": lambda means: _print_by_point(
+            points, means, [*SHORT_METRICS, *measured_in({*means["metric"]})]
+        ),
         "distributions": _print_distributions,
         "precisions": lambda precisions: _print_precisions(points, precisions),
         "comparisons": _print_comparisons,
@@ -100,6 +111,10 @@ def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) 
     if printed:
         cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
     print_frame(title, cells.rename(columns=SHORT_METRICS))
+    measured = means[means["metric"].isin(MEASURES)]
+    if not measured.empty:
+        cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
+        print_frame(title, cells.rename(index=metric_label))
 
 
 def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) -> None:
@@ -111,10 +126,12 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
-        cells = numbers.wide(rows, "point", "policy")
+        write = numbers.quantities if metric in MEASURES else numbers.interval
+        cells = numbers.wide(rows, "point", "policy", write).fillna("")
         if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
             cells["best"] = _best(rows)
-        print_frame(SHORT_METRICS[metric], cells.rename(index=dict(enumerate(points))))
+        title = SHORT_METRICS.get(metric) or metric_label(metric)
+        print_frame(title, cells.rename(index=dict(enumerate(points))))
         if "best" in cells:
             console.say(
                 " best: significantly better than the others on common replications (95 %, at "
