@@ -54,12 +54,12 @@ def sweep(
         ),
     ] = None,
     metric: Annotated[
-        str,
+        str | None,
         typer.Option(
             help="The metric that ranks the settings: success, ratio, product, reward, cost, or "
-            "what the scenario measures, such as age."
+            "what the scenario measures, such as age.  [default: product]"
         ),
-    ] = "product",
+    ] = None,
     missions: Annotated[
         int,
         typer.Option(
@@ -99,14 +99,15 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate every combination of values, write a page, and print the ranked settings."""
-    from analysis.names import ALIASES, COST, MEANS, MEASURES, SHARES
+    from analysis.names import ALIASES, COST, MEANS, MEASURES, PRODUCT, SHARES
     from analysis.questions import settings as settings_of
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
 
-    metric, known = ALIASES.get(metric, metric), [*SHARES, *MEANS, COST, *MEASURES]
-    if metric not in known:
-        raise InputError(f"--metric: {metric!r} is unknown{one_of(metric, [*ALIASES, *known])}")
+    ranking, known = ALIASES.get(metric or PRODUCT, metric or PRODUCT), [*SHARES, *MEANS, COST]
+    if ranking not in (*known, *MEASURES):
+        allowed = one_of(metric, [*ALIASES, *known, *MEASURES])
+        raise InputError(f"--metric: {metric!r} is unknown{allowed}")
     study = question.question(
         all_values(settings or []),
         scenario,
@@ -125,18 +126,18 @@ def sweep(
         f"dess study run {file} --out {folder}",
     )
     answer = Sweep(study, folder, found)
-    settings_of.check_metric(found, metric)
+    settings_of.check_metric(found, ranking)
     if not as_json:  # the answer comes before the page, which takes longer
-        _print(answer, metric)
+        _print(answer, ranking)
         console.say(f"study: {file}")
-    page = _render(folder, out, metric)
+    page = _render(folder, out, {"metric": ranking} if metric else {})
     if as_json:
-        _print_json(answer, metric, page, file)
+        _print_json(answer, ranking, page, file)
     elif page:
         console.say(f"page: {page}")
 
 
-def _render(folder: Path, out: Path, metric: str) -> Path | None:
+def _render(folder: Path, out: Path, parameters: dict[str, str]) -> Path | None:
     """Write the page; a line says so where the libraries of pages are not installed."""
     if absent := missing("reports", "the page of a sweep"):
         console.say(f"no page: {absent}", sys.stderr)
@@ -144,7 +145,7 @@ def _render(folder: Path, out: Path, metric: str) -> Path | None:
     from reports.pages.render import render_study
 
     with rendering() as steps:
-        return render_study(folder, out, steps, {"metric": metric})
+        return render_study(folder, out, steps, parameters)
 
 
 def _print(answer: "Sweep", metric: str) -> None:

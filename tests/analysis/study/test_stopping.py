@@ -1,12 +1,11 @@
 import json
 from itertools import pairwise
-from typing import get_args
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
-from analysis.names import BOUNDED, MEANS, METRICS, PRODUCT, SHARES
+from analysis.names import BOUNDED, MEANS, MEASURES, METRICS, PRODUCT, SHARES
 from analysis.stats.intervals import bounded_interval, interval_of, mean_interval, wilson
 from analysis.study import stopping
 from analysis.study.stopping import Metric, Precision, running_interval
@@ -60,7 +59,19 @@ def slow_stop(rule, data):
 
 
 def test_the_metrics_are_those_of_the_statistics():
-    assert get_args(Metric) == SHARES + MEANS
+    known = TypeAdapter(Metric)
+    for metric in (*SHARES, *MEANS, *MEASURES):
+        assert known.validate_python(metric) == metric
+    with pytest.raises(ValueError, match="'ages' is unknown .did you mean age"):
+        known.validate_python("ages")
+
+
+def test_missions_that_measure_nothing_are_left_out_of_running_intervals():
+    values = np.array([np.nan, 3.0, np.nan, 5.0, 4.0])
+    means, widths = running_interval("waiting", values)
+    own_means, own_widths = running_interval("waiting", values[[1, 3, 4]])
+    assert means[[1, 2, 3, 4]].tolist() == own_means[[0, 0, 1, 2]].tolist()
+    assert widths.tolist() == [np.inf, *own_widths[[0, 0, 1, 2]]]
 
 
 @pytest.mark.parametrize("metric", SHARES + MEANS)

@@ -21,7 +21,7 @@ FIELDS = ["--set", "uavs=1..2", "--set", "quota=20,40"]
 @pytest.fixture
 def unrendered(monkeypatch):
     """No page is made, which takes seconds."""
-    monkeypatch.setattr(render, "render_study", lambda folder, out, steps: Path(out, "page.html"))
+    monkeypatch.setattr(render, "render_study", lambda folder, out, *_: Path(out, "page.html"))
 
 
 def test_a_line_leads_to_a_page(dess, tmp_path):
