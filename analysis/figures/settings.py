@@ -66,10 +66,10 @@ def plot(
             looks = {policy: colours[policy] for policy in names}
             if hue:
                 part = part.assign(policy=part[hue].map(value_text))
-                looks = _graded(settings.varied(results)[hue])
-            _curves(part, x, looks, settings.varied(results)[x], ax)
+                looks = graded(settings.varied(results)[hue])
+            curves(part, x, looks, settings.varied(results)[x], ax)
             ax.set(title=f"{metric_label(metric)}{': ' * bool(name)}{name}")
-            _of_metric(ax.yaxis, metric)
+            of_metric(ax.yaxis, metric)
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
         title = parameter(hue).label if hue else None
         handles = axes.flat[0].get_legend_handles_labels()
@@ -127,7 +127,7 @@ def heat_map(
         for ax in axes.flat[len(facets) :]:
             ax.set_visible(False)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
-        _of_metric(bar.ax.yaxis, metric)
+        of_metric(bar.ax.yaxis, metric)
         figure.supxlabel(parameter(x).label, fontsize=10, parse_math=True)
         figure.supylabel(parameter(y).tick, fontsize=10, parse_math=True)
         figure.suptitle(f"{metric_label(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
@@ -156,7 +156,7 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
             _name_ticks(ax.xaxis, ticks, 6)
             ax.set(xlim=(-0.5, len(ticks) - 0.5))
             ax.set_xlabel(_label(field), parse_math=True)
-            _of_metric(ax.yaxis, metric)
+            of_metric(ax.yaxis, metric)
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)
     return figure
@@ -187,7 +187,7 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
             elif len(places) <= 6:
                 ax.set_xticks(places)
             ax.set_xlabel(_label(field), parse_math=True)
-            _of_metric(ax.yaxis, metric)
+            of_metric(ax.yaxis, metric)
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         style.legend_below(figure, axes.flat[0], 4)
     return figure
@@ -208,7 +208,7 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
                     linestyle=style.LINES[number % 4])  # fmt: skip
         ax.set(xlabel=metric_label(metric), ylabel="share of the missions", ylim=(-0.02, 1.02))
         ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
-        _of_metric(ax.xaxis, metric)
+        of_metric(ax.xaxis, metric)
         style.legend_below(figure, ax, 4)
     return figure
 
@@ -219,7 +219,7 @@ def shown(values: Sequence[Any]) -> list[Any]:
     return [values[round(place)] for place in places]
 
 
-def _curves(
+def curves(
     rows: pd.DataFrame, x: str, looks: dict[str, tuple[str, str]], values: Sequence[Any], ax: Axes
 ) -> None:
     """Means with intervals along a field; values that are not numbers are evenly spaced."""
@@ -302,13 +302,13 @@ def _places(column: pd.Series, values: Sequence[Any]) -> pd.Series:
     return column.map({value: place for place, value in enumerate(values)}).astype(int)
 
 
-def _graded(values: Sequence[Any]) -> dict[str, tuple[str, str]]:
+def graded(values: Sequence[Any]) -> dict[str, tuple[str, str]]:
     """Colours from light to dark, and markers, for values in their order."""
     shades = sns.color_palette("flare", len(values)).as_hex()
     return {value_text(v): (shades[k], "os^vPX*"[k % 7]) for k, v in enumerate(values)}
 
 
-def _of_metric(axis: Axis, metric: str) -> None:
+def of_metric(axis: Axis, metric: str) -> None:
     """Ticks of a metric: in percent, or as numbers."""
     style.round_ticks(axis, 6)
     if metric in METRICS:

@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from analysis.names import MEANS, SHARES
 from analysis.stats.correction import Correction, with_adjusted
 from analysis.stats.differences import difference_test, differences_of
-from analysis.stats.intervals import LEVEL, check_share
+from analysis.stats.intervals import LEVEL, Interval, check_share
 from analysis.stats.matching import (
     Treatment,
     check_same_missions,
@@ -76,6 +77,25 @@ def paired(a: np.ndarray, b: np.ndarray, level: float = LEVEL, metric: str = "")
     correlation = float(np.corrcoef(a, b)[0, 1]) if of_a and of_b else 0.0
     reduction = 1 - of_differences / (of_a + of_b) if of_a + of_b else 0.0
     return Paired(*mean, p, correlation, reduction, a.size)
+
+
+def relative_change(values: np.ndarray, reference: np.ndarray, level: float = LEVEL) -> Interval:
+    """The change of a mean as a share of a reference mean, with the interval of a ratio of means.
+
+    Source: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, Section 6.3: the variance of the
+    ratio of two means of paired values; with Student's quantile.
+
+    Args:
+        values: (n,) values.
+        reference: (n,) reference values of the same replications, whose mean is not 0.
+        level: Confidence level.
+    """
+    ratio, n = float(values.mean() / reference.mean()), len(values)
+    if n == 1:
+        return Interval(ratio - 1, ratio - 1, ratio - 1)
+    error = np.std(values - ratio * reference, ddof=1) / np.sqrt(n) / abs(reference.mean())
+    half = float(stats.t.isf((1 - level) / 2, n - 1) * error)
+    return Interval(ratio - 1, ratio - 1 - half, ratio - 1 + half)
 
 
 def compare(

@@ -194,7 +194,8 @@ class Training:
                 self.generator.random(len(environments)) < self.config.low_battery_starts
             ]
             draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
-            _lower_batteries(*self.stepper.state, low, draws)
+            state = self.stepper.state
+            _lower_batteries(state.missions, state.uavs, state.residual, low, draws)
 
     def _collect(self, epsilon: float) -> None:
         """Run one slot of all environments with the exploring policy, and store it."""

@@ -278,7 +278,10 @@ def test_intervals_of_skewed_values_cover_the_mean_after_stopping():
     "fields, complaint",
     [
         ({"targets": {}}, "targets"),
-        ({"targets": {"speed": {"absolute": 1.0}}}, "'success', 'collection_ratio'"),
+        (
+            {"targets": {"speed": {"absolute": 1.0}}},
+            "'speed' is unknown; allowed: success, collection_ratio",
+        ),
         ({"targets": {"reward": {}}}, "allowed: absolute, relative, or both"),
         ({"targets": {"reward": {"absolute": 0.0}}}, "greater than or equal to 0.000000001"),
         ({"targets": {"reward": {"relative": float("inf")}}}, "finite"),

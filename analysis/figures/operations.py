@@ -1,0 +1,40 @@
+"""Figures of the operation of a fleet: metrics against a field, and the queue for pads over time.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures import style
+from analysis.figures.settings import curves, graded, of_metric
+from analysis.names import metric_label, parameter, value_text
+
+
+def against(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None = None) -> Figure:
+    """A metric against a field: a curve for each value of a second field, with 95 % intervals.
+
+    Args:
+        rows: Rows of ``operations.effects.means``.
+        x: The field on the horizontal axis.
+        line: The column with a curve for each value.
+        metric: The metric.
+        panel: A column with a panel for each value; by default there is one panel.
+    """
+    rows = rows[rows["metric"] == metric]
+    panels = [*rows.groupby(panel, sort=False)] if panel else [("", rows)]
+    values = sorted(rows[x].unique())
+    with style.look():
+        figure, axes = style.panels(2.9 * len(panels) + 0.9, len(panels), "y", sharex=True,
+                                    sharey=True, squeeze=False)  # fmt: skip
+        for ax, (value, part) in zip(axes.flat, panels, strict=True):
+            looks = graded(sorted(rows[line].unique()))
+            curves(part.assign(policy=part[line].map(value_text)), x, looks, values, ax)
+            where = f": {parameter(panel).within} {value_text(value)}" if panel else ""
+            ax.set(title=f"{metric_label(metric)}{where}")
+            of_metric(ax.yaxis, metric)
+        axes.flat[-1].set_xlabel(parameter(x).label)
+        handles = axes.flat[0].get_legend_handles_labels()
+        title = parameter(line).label
+        figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
+    return figure

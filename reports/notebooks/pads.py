@@ -1,0 +1,110 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [pads]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # How many charging pads
+#
+# This page shows how many charging pads fleets of different sizes need, and how long UAVs wait for
+# a pad if there are fewer.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder with the results folder of the study pads
+margin = 0.02  # a loss of the product that does not matter, as a share
+
+# %%
+from pathlib import Path
+
+from IPython.display import display
+
+from analysis import load_results, names, numbers
+from analysis.figures import operations as figures
+from analysis.questions.operations import answers, effects
+from analysis.stats.intervals import LEVEL
+from reports.pages import html
+
+# %%
+study = load_results(Path(results) / "pads")
+uses = ["waiting", "queue", names.UTILISATION]
+metrics = [names.SUCCESS, names.PRODUCT, *uses]
+means = effects.means(study, metrics)
+missions = numbers.span(means["n"])
+level = numbers.level(LEVEL)
+
+# %%
+html.say("{answer}", answer=html.composed(answers.pads(study, margin)))
+
+# %% [markdown]
+# ## What was simulated
+#
+# The mission is that of the paper: UAVs start in a zone of 16 cells, collect data until their quota
+# is filled, and return to the zone to charge. Pads are given to UAVs in the order of their requests
+# (first come, first served). All numbers of pads meet the same random draws (common random
+# numbers). The return guard knows the number of pads, but no policy makes an appointment: a UAV
+# that finds all pads in use waits, and flying in place takes battery.
+
+# %% [markdown]
+# ## Success and product
+
+# %%
+html.gallery(
+    [
+        (
+            figures.against(means, "pads", "uavs", metric, "policy"),
+            f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
+            f"n = {missions} missions per point; bars are {level} intervals.",
+        )
+        for metric in metrics[:2]
+    ]
+)
+
+# %%
+lost = effects.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
+html.table(
+    effects.listed(lost, None, ["policy", "uavs"], "pads", numbers.points),
+    "Collection ratio and communication with fewer pads, minus that with the most pads: paired "
+    f"differences in percentage points with {level} intervals, by number of pads",
+    data=lost,
+)
+
+# %% [markdown]
+# ## Waiting, queue and use of the pads
+#
+# The waiting time of a request ends when the UAV is given a pad or gives up. The queue and the
+# utilisation are means over the time of the mission: the number of UAVs that wait, and the share of
+# the pads in use. A mission in which no UAV asked for a pad has no waiting time.
+
+# %%
+html.gallery(
+    [
+        (
+            figures.against(means, "pads", "uavs", metric, "policy"),
+            f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
+            f"n = {missions} missions per point; bars are {level} intervals.",
+        )
+        for metric in uses
+    ]
+)
+
+# %%
+display(
+    *(
+        html.table(
+            effects.listed(means, metric, ["policy", "uavs"], "pads"),
+            f"{names.metric_label(metric)}: means with {level} intervals, by number of pads",
+        )
+        for metric in uses
+    )
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+html.provenance([study])
