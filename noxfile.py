@@ -23,6 +23,9 @@ STUDIES: dict[str, list[str]] = {
     "sensitivity": [],
     "comparison": [],
     "explorer": [],
+    "pads": [],
+    "age": [],
+    "failures": [],
     "verification": [],
 }
 # Two test files at a time, in the order of their collection.

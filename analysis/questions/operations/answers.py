@@ -80,10 +80,10 @@ def age(results: Results) -> str:
     rows = table[(table["policy"] == results.policies[0]) & (table["arrival_rate"] == rate)]
     rows = rows.dropna(subset=["published"])
     parts = [
-        f"from one to {row.uavs} UAVs by {_percent(row.mean, row.low, row.high)}"
+        f"from one to {row.uavs} UAVs by {relative(row.mean, row.low, row.high)}"
         for row in rows.itertuples()
     ]
-    printed = numbers.words([numbers.minus(f"{100 * of:+.0f} %") for of in rows["published"]])
+    printed = numbers.words([f"{numbers.minus(f'{100 * of:+.0f}')} %" for of in rows["published"]])
     return (
         f"**The average age of information changes {numbers.words(parts)}** (policy "
         f"`{results.policies[0]}`, arrival rate {value_text(rate)}). Published for another model: "
@@ -112,11 +112,11 @@ def failures(results: Results) -> str:
     )
     return (
         f"**A UAV that fails in a mission slot with probability {value_text(rate)} changes the "
-        f"product of {fleet} UAVs {numbers.words(parts)}** (policy `{results.policies[0]}`).{rest}"
+        f"product of {fleet:.0f} UAVs {numbers.words(parts)}** (policy `{results.policies[0]}`).{rest}"
     )
 
 
-def _percent(mean: float, low: float, high: float) -> str:
+def relative(mean: float, low: float, high: float) -> str:
     """A relative change with its interval, as ``−46.0 % [−47.1, −44.9]``."""
     middle, *ends = [numbers.minus(f"{100 * value:+.1f}") for value in (mean, low, high)]
     return f"{middle} % [{ends[0]}, {ends[1]}]"

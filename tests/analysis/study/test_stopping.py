@@ -280,7 +280,7 @@ def test_intervals_of_skewed_values_cover_the_mean_after_stopping():
         ({"targets": {}}, "targets"),
         (
             {"targets": {"speed": {"absolute": 1.0}}},
-            "'speed' is unknown; allowed: success, collection_ratio",
+            "'speed' is unknown; allowed: success",
         ),
         ({"targets": {"reward": {}}}, "allowed: absolute, relative, or both"),
         ({"targets": {"reward": {"absolute": 0.0}}}, "greater than or equal to 0.000000001"),

@@ -17,8 +17,9 @@ def test_names_are_listed(dess):
         "policies": [*SHIPPED, *trained_names()],
         "scenarios": ["bay", "fig1", "fig4", "paper"],
         "studies": [
-            *("charge-limits", "comparison", "explorer", "fig1", "fig4", "fig5", "precise"),
-            *("screening", "sensitivity", "sweet-spot", "table4", "verification"),
+            *("age", "charge-limits", "comparison", "explorer", "failures", "fig1", "fig4", "fig5"),
+            *("pads", "precise", "screening", "sensitivity", "sweet-spot", "table4"),
+            "verification",
         ],
     }.items():
         code, out, err = dess(command)
