@@ -60,7 +60,7 @@ SOURCES = {
 }
 # Notebooks document themselves in their cells.
 LIBRARY = {name: tree for name, tree in SOURCES.items() if ".notebooks." not in name}
-NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").glob("*.py"))
+NOTEBOOKS = sorted((ROOT / "reports" / "notebooks").rglob("*.py"))
 # Functions that simulate missions.
 SIMULATING = {"simulate", "simulate_batch", "evaluate", "resimulate", "run_study", "measure"}
 SIMULATING |= {"mission_of", "sweep", "what_if"}

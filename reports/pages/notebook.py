@@ -175,7 +175,9 @@ def drop(notebook: NotebookNode, tag: str) -> None:
 
 
 def _file(folder: Path, name: str) -> Path:
-    return folder / f"{name.replace('-', '_')}.py"
+    """The file of a notebook, in the folder or in one of its folders."""
+    file = f"{name.replace('-', '_')}.py"
+    return next(iter(sorted(folder.glob(f"*/{file}"))), folder / file)
 
 
 def tags_of(cell: NotebookNode) -> list[str]:

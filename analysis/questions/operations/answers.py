@@ -112,7 +112,8 @@ def failures(results: Results) -> str:
     )
     return (
         f"**A UAV that fails in a mission slot with probability {value_text(rate)} changes the "
-        f"product of {fleet:.0f} UAVs {numbers.words(parts)}** (policy `{results.policies[0]}`).{rest}"
+        f"product of {fleet:.0f} UAVs {numbers.words(parts)}** "
+        f"(policy `{results.policies[0]}`).{rest}"
     )
 
 

@@ -8,6 +8,7 @@ import pytest
 import dess as dess_package
 from analysis import load_study
 from dess import ScenarioSpace, load_scenario
+from dess.scenario import fields_of
 from policies.registry import SHIPPED, trained_names
 from tests.analysis.small import environment
 
@@ -46,10 +47,10 @@ def test_a_scenario_is_shown_field_by_field(dess, dess_json):
     rows = {line.split()[0]: line for line in out.splitlines() if line.strip()}
     assert rows["uavs"].split()[1:3] == ["2", "[1,"]
     assert "an integer 1..16 or [low, high]" in rows["uavs"]
-    assert {*ScenarioSpace.model_fields} <= {*rows}
+    assert {*fields_of(ScenarioSpace)} <= {*rows}
     shown = dess_json("scenarios", "show", "small.toml")
     fields = {field.pop("name"): field for field in shown["fields"]}
-    assert [*fields] == [*ScenarioSpace.model_fields]
+    assert [*fields] == [*fields_of(ScenarioSpace)]
     assert fields["cell_size"] == {
         "meaning": "side of a cell (c)",
         "unit": "m",
