@@ -146,7 +146,8 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
         s = spaces[index]
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
-        return (s.grid, s.communication_slots, channel, s.nodes, speeds)
+        way_home = (s.zone, *s.wind.model_dump().values()) if s.wind.is_on or speeds else ()
+        return (s.grid, s.communication_slots, channel, s.nodes, speeds, way_home)
 
     ordered = sorted(range(len(spaces)), key=key)
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]

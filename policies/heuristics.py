@@ -1,4 +1,4 @@
-"""Heuristic policies: random, nearest, greedy and tour under the return guard, random without it.
+"""Heuristic policies: random, nearest, greedy, tour and age under the guard, random without it.
 
 Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
 (``_step``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
@@ -17,18 +17,20 @@ from dess.observations.guard import (
     must_charge,
     parking_cell,
     path_length,
+    round_trip,
     safe_moves,
     slots_needed,
 )
+from dess.observations.reach import reach_of
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
-_RANDOM, _NEAREST, _GREEDY, _TOUR, _UNGUARDED = range(5)
+_RANDOM, _NEAREST, _GREEDY, _TOUR, _AGE, _UNGUARDED = range(6)
 
 # A node is worth a visit if it has at least this share of the mean initial data. Without such a
 # threshold, UAVs would fly to and fro for single new data units.
 _WORTH = 0.25
-# Weight of a node to which a teammate is nearer (greedy), and slots added to every distance.
+# Weight of a node to which a teammate is nearer (greedy, age), and slots added to every distance.
 _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
 # Cost [slots] of a step into a cell, by the result of the guard's contest for that cell.
@@ -50,8 +52,10 @@ class _Heuristic:
             state.missions,
             state.uavs,
             state.residual,
+            state.sensors,
             view.world.nodes,
             circuit,
+            reach_of(state.missions),
             view.mission,
             view.uav,
         )
@@ -95,8 +99,21 @@ class Tour(_Heuristic):
     _kind = _TOUR
 
 
+class Age(_Heuristic):
+    """Fly to the node with the highest age of information per slot of distance.
+
+    Nodes without data are not visited, since nothing newer could be collected. A node counts less
+    if a teammate is nearer to it.
+    """
+
+    name = "age"
+    _kind = _AGE
+
+
 @kernel
-def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_uav):
+def _decide(
+    kind, missions, uavs, residual, sensors, nodes, circuit, reach, rows_mission, rows_uav
+):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
     safe = np.empty(5, np.bool_)
@@ -108,11 +125,13 @@ def _decide(kind, missions, uavs, residual, nodes, circuit, rows_mission, rows_u
         home_x, home_y = u.x, u.y
         if charge:
             home_x, home_y, _ = parking_cell(mission, team, i, taken)
-        safe_moves(mission, team, i, charge, home_x, home_y, safe)
+        safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
         if kind in (_RANDOM, _UNGUARDED):
             actions[row] = _random_action(mission, team, i, safe)
             continue
-        node = _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y)
+        node = _goal(
+            kind, mission, team, i, data, sensors[b], nodes, circuit, charge, home_x, home_y, reach
+        )  # fmt: skip
         if node >= 0:
             home_x, home_y = nodes[node, 0], nodes[node, 1]
         actions[row] = _step(mission, team, i, safe, home_x, home_y)
@@ -155,28 +174,33 @@ def _step(mission, team, i, safe, goal_x, goal_y):
 
 
 @inlined
-def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
+def _goal(
+    kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
+):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
-    reach = u.battery - 1 - margin(mission) if charge else slots_needed(mission, u)
+    spare = u.battery - 1 - margin(mission, u) if charge else slots_needed(mission, u)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):
         if data[k] <= 0.0:
             continue
-        slots = abs(u.x - nodes[k, 0]) + abs(u.y - nodes[k, 1])
-        home = abs(home_x - nodes[k, 0]) + abs(home_y - nodes[k, 1]) if charge else 0
-        if slots + home > reach:
+        x, y = nodes[k, 0], nodes[k, 1]
+        slots = _slots(u, x, y)
+        spent = round_trip(mission, u, x, y, home_x, home_y, reach) if charge else slots
+        if spent > spare:
             continue
         if kind == _NEAREST:
             score = 1.0 / (slots + _SLOTS_AT_NODE)
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
-            if _teammate_is_nearer(mission, team, i, nodes[k, 0], nodes[k, 1], slots):
-                score *= _SHARED
+        elif kind == _AGE:
+            score = (mission.slot - sensors[k].newest) / (slots + _SLOTS_AT_NODE)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
-        if data[k] < worth:
+        if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, x, y, slots):
+            score *= _SHARED
+        if kind != _AGE and data[k] < worth:
             score *= 1e-3
         if score > best:
             best, node = score, k
@@ -184,11 +208,17 @@ def _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y):
 
 
 @inlined
+def _slots(u, x, y):
+    """The slots that UAV ``u`` takes to a cell."""
+    return (abs(u.x - x) + abs(u.y - y)) * u.slots_per_cell
+
+
+@inlined
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
         if j != i and o.active and not o.charging:
-            other = abs(o.x - x) + abs(o.y - y)
+            other = _slots(o, x, y)
             if other < slots or (other == slots and j < i):
                 return True
     return False

@@ -34,6 +34,7 @@ SHIPPED = {
     "nearest": ("policies.heuristics:Nearest", "the nearest node with enough data"),
     "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
+    "age": ("policies.heuristics:Age", "the stalest data for the distance"),
 }
 
 # One folder per trained policy, and the file that describes it.

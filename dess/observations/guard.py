@@ -6,17 +6,19 @@
 A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
 charging zone, with a margin of some slots for detours around teammates. The rules are described in
 ``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
-mission.
+mission; ``reach`` is the table of ``dess.observations.reach``.
 """
 
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
+from dess.observations.reach import reach_of
 from dess.rules import in_zone, on_grid, zone_cell, zone_number
-from dess.state import STEP_X, STEP_Y
+from dess.sections.wind import move_surcharge
+from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
-# Margin [slots] on the way to the zone per active teammate, since each may cause a detour.
+# Margin [cells] on the way to the zone per active teammate, since each may cause a detour.
 MARGIN_PER_TEAMMATE = 2
 # Margin [slots] for the quota when little data is left, as some slots may find no data to collect.
 SCARCE_SLOTS = 6
@@ -33,8 +35,9 @@ def slots_needed(mission, u):
 def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota with its battery and must charge first.
 
-    If little data is left, a communication slot may find no node to serve, so a margin is added.
-    Where flying costs no battery, no UAV must charge.
+    In wind, every move until then may cost the most. If little data is left, a communication slot
+    may find no node to serve, so a margin is added. Where flying costs no battery, no UAV must
+    charge.
 
     Args:
         mission: ``MISSION`` record.
@@ -45,7 +48,8 @@ def must_charge(mission, u, data):
     # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
-    return u.battery < mission.flight_cost * needed
+    moves = (needed + u.slots_per_cell - 1) // u.slots_per_cell
+    return u.battery < mission.flight_cost * (needed + mission.wind_most * moves)
 
 
 @inlined
@@ -56,7 +60,7 @@ def is_parked(mission, u):
 
 @inlined
 def path_length(mission, uavs, i, x, y, to_x, to_y):
-    """Slots that UAV ``i`` needs from a cell to another, with a detour around a parked teammate."""
+    """Cells that UAV ``i`` flies from one to another, with a detour around a parked teammate."""
     length = abs(x - to_x) + abs(y - to_y)
     if x == to_x or y == to_y:
         for j in range(mission.uavs):
@@ -82,7 +86,7 @@ def parking_cell(mission, uavs, i, taken):
         taken: (zone cells,) working memory.
 
     Returns:
-        The x and y of the cell and the slots to reach it; the UAV's own cell if all are taken.
+        The x and y of the cell and how many cells away it is; the UAV's own cell if all are taken.
     """
     u = uavs[i]
     taken[: mission.zone_width * mission.zone_height] = False
@@ -137,9 +141,49 @@ def _nearest_free(mission, uavs, i, taken):
 
 
 @inlined
-def margin(mission):
-    """The margin [slots] on the way to the zone for detours around teammates."""
-    return MARGIN_PER_TEAMMATE * (mission.active - 1)
+def margin(mission, u):
+    """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
+
+    A detour is flown forth and back, so the wind costs the most in one direction only.
+    """
+    return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
+
+
+@inlined
+def battery_home(mission, u, slots, reach):
+    """The battery [%] that UAV ``u`` needs to reach its parking cell.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        slots: Slots to its parking cell, as ``parking_cell`` returns them.
+        reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
+            in it; if the parking cell is farther, each further cell may cost the most.
+    """
+    if reach.size == 0:
+        return slots
+    return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, slots)
+
+
+@inlined
+def _further(mission, u, slots):
+    """The battery [%] for the cells by which the parking cell is farther than the zone."""
+    x = min(max(u.x, mission.zone_x), mission.zone_x + mission.zone_width - 1)
+    y = min(max(u.y, mission.zone_y), mission.zone_y + mission.zone_height - 1)
+    return (slots - abs(u.x - x) - abs(u.y - y)) * (u.slots_per_cell + mission.wind_most)
+
+
+@inlined
+def round_trip(mission, u, x, y, home_x, home_y, reach):
+    """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
+
+    Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
+    """
+    cells = abs(u.x - x) + abs(u.y - y)
+    if reach.size == 0:
+        return cells + abs(home_x - x) + abs(home_y - y)
+    against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
+    return cells * u.slots_per_cell + int(against) + reach[u.slots_per_cell - 1, y, x]
 
 
 @inlined
@@ -169,7 +213,7 @@ def contest(mission, uavs, i, x, y):
 
 
 @kernel
-def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
+def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -184,10 +228,11 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
         i: Index of the UAV.
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home_x, home_y: Its parking cell.
+        reach: The table of ``reach_of``.
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
-    late = np.zeros(5, np.int64)  # slots by which the parking cell is reached too late
+    late = np.zeros(5, np.int64)  # battery [%] that lacks on the way to the parking cell
     contested = np.empty(5, np.int64)
     least = 1_000_000
     for action in range(5):
@@ -195,9 +240,12 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
         contested[action] = contest(mission, uavs, i, x, y)
         safe[action] = on_grid(mission, x, y) and contested[action] < 3
         if safe[action] and charge:
-            home = path_length(mission, uavs, i, x, y, home_x, home_y)
+            if reach.size == 0:
+                needed = 1 + path_length(mission, uavs, i, x, y, home_x, home_y)
+            else:
+                needed = _needed(mission, uavs, i, action, x, y, home_x, home_y, reach)
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late[action] = max(home + 1 + margin(mission) - (u.battery - 1), 0)
+            late[action] = max(needed + 1 + margin(mission, u) - u.battery, 0)
             least = min(least, late[action])
     clear = safe & (contested < 2)
     nearest = safe & (late == least) if charge else safe.copy()
@@ -205,14 +253,26 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, safe):
         safe[:] = nearest & clear
     elif late[nearest].any() and clear.any():
         # the margin is there to wait or step aside until the teammate has passed
-        wait = clear & (late <= margin(mission))
+        wait = clear & (late <= margin(mission, u))
         safe[:] = wait if wait.any() else nearest
     else:
         safe[:] = nearest
 
 
+@inlined
+def _needed(mission, uavs, i, action, x, y, home_x, home_y, reach):
+    """The battery [%] for an action of UAV ``i`` and the way home from the cell it leads to."""
+    u = uavs[i]
+    if action == HOVER:
+        cost = 0 if u.latch and in_zone(mission, x, y) else 1
+    else:
+        cost = u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+    slots = path_length(mission, uavs, i, u.x, u.y, home_x, home_y)
+    return cost + reach[u.slots_per_cell - 1, y, x] + _further(mission, u, slots)
+
+
 @kernel
-def _mask(missions, uavs, residual, rows_mission, rows_uav):
+def _mask(missions, uavs, residual, rows_mission, rows_uav, reach):
     masks = np.zeros((len(rows_mission), 5), np.bool_)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
     for row in range(len(rows_mission)):
@@ -222,7 +282,7 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav):
         home_x, home_y = 0, 0
         if charge:
             home_x, home_y, _ = parking_cell(mission, team, i, taken)
-        safe_moves(mission, team, i, charge, home_x, home_y, masks[row])
+        safe_moves(mission, team, i, charge, home_x, home_y, reach, masks[row])
     return masks
 
 
@@ -232,4 +292,5 @@ def guard(view: View) -> np.ndarray:
     Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
     state = view.state
-    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav)
+    reach = reach_of(state.missions)
+    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, reach)

@@ -13,7 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
-from dess.observations.guard import must_charge, parking_cell, safe_moves, slots_needed
+from dess.observations.guard import (
+    battery_home,
+    must_charge,
+    parking_cell,
+    safe_moves,
+    slots_needed,
+)
+from dess.observations.reach import reach_of
 from dess.rules import on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
@@ -22,8 +29,8 @@ from dess.state import HOVER, STEP_X, STEP_Y, State
 CHARGE_START, CHARGE_COMPLETE = range(2)
 MISSION_COLUMNS = 2
 # Columns of ``CompactStates.uavs``: the cell, the battery [%], mission slots until the quota is
-# filled, whether the UAV is active, latched, charging and must charge, slots to its parking cell,
-# and the mask of its allowed actions as bits.
+# filled, whether the UAV is active, latched, charging and must charge, the battery [%] that it
+# needs to reach its parking cell, and the mask of its allowed actions as bits.
 X, Y, BATTERY, NEEDED, ACTIVE, LATCH, CHARGING, MUST_CHARGE, HOME, MASK = range(10)
 UAV_COLUMNS = 10
 
@@ -86,12 +93,13 @@ def compact_states(state: State, guarded: bool) -> CompactStates:
         guarded: True for the mask of the return guard, False for the mask of all legal actions.
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
-    _fill(state.missions, state.uavs, state.residual, guarded, states)
+    reach = reach_of(state.missions)
+    _fill(state.missions, state.uavs, state.residual, guarded, reach, states)
     return states
 
 
 @kernel
-def _fill(missions, uavs, residual, guarded, out):
+def _fill(missions, uavs, residual, guarded, reach, out):
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
     safe = np.empty(5, np.bool_)
     for b in range(len(missions)):
@@ -110,10 +118,11 @@ def _fill(missions, uavs, residual, guarded, out):
                 continue
             row[MUST_CHARGE] = must_charge(mission, u, data)
             home_x, home_y, slots = parking_cell(mission, team, i, taken)
-            row[HOME] = slots
-            if not u.charging:
+            row[HOME] = min(battery_home(mission, u, slots, reach), _MOST)
+            if not u.charging and u.slots_left == 0:
                 if guarded:
-                    safe_moves(mission, team, i, row[MUST_CHARGE] != 0, home_x, home_y, safe)
+                    charge = row[MUST_CHARGE] != 0
+                    safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
                 else:
                     for action in range(5):
                         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]

@@ -42,18 +42,18 @@ class Wind(Section):
 
 
 @inlined
-def surcharge(gusts, seed, grid, wind_x, wind_y, step_x, step_y, x, y):
+def surcharge(grid, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
     """The battery [%] that a move into cell ``x, y`` costs beyond that in still air.
 
     Batteries are integers, so a fraction is rounded up or down by a draw per cell; its expected
     value is the fraction. A tail wind saves nothing.
 
     Args:
-        gusts: Standard deviation of the wind from cell to cell [% per cell].
-        seed: Seed of the field.
         grid: Cells along one side.
         wind_x, wind_y: The mean wind [% per cell].
-        step_x, step_y: The step of the move [cells]; the surcharge of no step is 0.
+        gusts: Standard deviation of the wind from cell to cell [% per cell].
+        seed: Seed of the field.
+        step_x, step_y: The step of the move [cells].
         x, y: The cell that the move leads to.
     """
     words = streams.block(seed, 0, streams.WIND, 0, 0, y * grid + x)
@@ -67,33 +67,33 @@ def surcharge(gusts, seed, grid, wind_x, wind_y, step_x, step_y, x, y):
 
 @inlined
 def move_surcharge(mission, step_x, step_y, x, y):
-    """The surcharge [%] of a move of a mission; see ``surcharge``."""
+    """The surcharge [%] of a move in a mission, 0 of no step; see ``surcharge``."""
     if mission.wind_most == 0 or (step_x == 0 and step_y == 0):
         return 0
     return surcharge(
-        mission.wind_gusts, mission.wind_seed, mission.grid,
-        mission.wind_x, mission.wind_y, step_x, step_y, x, y,
+        mission.grid, mission.wind_x, mission.wind_y, mission.wind_gusts, mission.wind_seed,
+        step_x, step_y, x, y,
     )  # fmt: skip
 
 
 @lru_cache(maxsize=16)
-def surcharges(wind: Wind, grid: int) -> np.ndarray:
+def surcharges(grid: int, wind_x: float, wind_y: float, gusts: float, seed: int) -> np.ndarray:
     """(4, M, M) surcharges [%] of the moves north, east, south and west into cell ``y, x``."""
     table = np.zeros((4, grid, grid), np.int64)
-    if wind.is_on:
-        _fill(wind.gusts, wind.seed, *wind.push(), table)
+    if wind_x or wind_y or gusts:
+        _fill(wind_x, wind_y, gusts, seed, table)
     table.flags.writeable = False
     return table
 
 
 @kernel
-def _fill(gusts, seed, wind_x, wind_y, table):
+def _fill(wind_x, wind_y, gusts, seed, table):
     grid = table.shape[1]
     for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
         for y in range(grid):
             for x in range(grid):
                 table[action, y, x] = surcharge(
-                    gusts, seed, grid, wind_x, wind_y, step_x, step_y, x, y
+                    grid, wind_x, wind_y, gusts, seed, step_x, step_y, x, y
                 )
 
 
@@ -105,5 +105,5 @@ def constants(wind: Wind, grid: int) -> dict[str, float]:
         "wind_y": wind_y,
         "wind_gusts": wind.gusts,
         "wind_seed": wind.seed,
-        "wind_most": surcharges(wind, grid).max(),
+        "wind_most": surcharges(grid, wind_x, wind_y, wind.gusts, wind.seed).max(),
     }

@@ -93,8 +93,8 @@ def check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
     """
     most = np.ones(UAV_COLUMNS, np.int64)  # truth values, but for:
     most[[X, Y]] = grid - 1
-    most[[BATTERY, NEEDED]] = 100, np.iinfo(np.int16).max
-    most[[HOME, MASK]] = 4 * grid, 2 ** len(ACTION_NAMES) - 1
+    most[[BATTERY, NEEDED, HOME]] = 100, np.iinfo(np.int16).max, np.iinfo(np.int16).max
+    most[MASK] = 2 ** len(ACTION_NAMES) - 1
     for name, highest in (("missions", 100), ("uavs", most), ("action", len(ACTION_NAMES) - 1)):
         if (arrays[name] < 0).any() or (arrays[name] > highest).any():
             raise ValueError(f"replay memory: {name} out of range")
