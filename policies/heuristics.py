@@ -22,6 +22,7 @@ from dess.observations.guard import (
     slots_needed,
 )
 from dess.observations.reach import reach_of
+from dess.rules import flies
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
@@ -217,7 +218,7 @@ def _slots(u, x, y):
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
-        if j != i and o.active and not o.charging:
+        if j != i and flies(o):
             other = _slots(o, x, y)
             if other < slots or (other == slots and j < i):
                 return True

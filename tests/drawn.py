@@ -73,6 +73,17 @@ def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     return ScenarioSpace.of(**(values | fixed))
 
 
+_uav_types = st.fixed_dictionaries(
+    {},
+    optional={
+        "flying_time": st.integers(8, 80),
+        "slots_per_cell": st.integers(1, 4),
+        "quota": st.integers(5, 600),
+        "rate": _numbers(0.1, 10.0),
+    },
+)
+
+
 @st.composite
 def failures(draw: st.DrawFn) -> dict[str, Any]:
     """A section of failures: each kind happens often, seldom or not at all."""
@@ -99,6 +110,13 @@ def extended_spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
             "measured": draw(st.booleans()),
         },
         "failures": draw(st.just({}) | failures()),
+        "wind": {
+            "strength": draw(st.just(0.0) | _numbers(0.0, 10.0)),
+            "direction": draw(_numbers(0.0, 360.0)),
+            "gusts": draw(st.just(0.0) | _numbers(0.0, 10.0)),
+            "seed": draw(st.integers(0, 2**32 - 1)),
+        },
+        "fleet": draw(st.lists(_uav_types, max_size=3)),
     }
     return draw(spaces(**(sections | fixed)))
 

@@ -54,8 +54,8 @@ def must_charge(mission, u, data):
 
 @inlined
 def is_parked(mission, u):
-    """Whether an active UAV in the zone charges or is about to charge, and blocks its cell."""
-    return u.active and u.latch and in_zone(mission, u.x, u.y)
+    """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
+    return u.active and (u.grounded or (u.latch and in_zone(mission, u.x, u.y)))
 
 
 @inlined

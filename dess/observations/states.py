@@ -21,7 +21,7 @@ from dess.observations.guard import (
     slots_needed,
 )
 from dess.observations.reach import reach_of
-from dess.rules import on_grid
+from dess.rules import may_act, on_grid
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y, State
 
@@ -119,7 +119,7 @@ def _fill(missions, uavs, residual, guarded, reach, out):
             row[MUST_CHARGE] = must_charge(mission, u, data)
             home_x, home_y, slots = parking_cell(mission, team, i, taken)
             row[HOME] = min(battery_home(mission, u, slots, reach), _MOST)
-            if not u.charging and u.slots_left == 0:
+            if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
                     safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)

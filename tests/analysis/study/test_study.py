@@ -27,8 +27,9 @@ def test_the_shipped_studies():
 
 def test_the_papers_studies_run_every_shipped_policy():
     once = [name for name in trained_names() if name not in REPEATED]
-    assert load_study("table4").policies == (*SHIPPED, *once)
-    guarded = [name for name in SHIPPED if name != "random-unguarded"]
+    shipped = [name for name in SHIPPED if name != "age"]  # it has another aim than the paper
+    assert load_study("table4").policies == (*shipped, *once)
+    guarded = [name for name in shipped if name != "random-unguarded"]
     for name in ("fig4", "fig5", "sweet-spot"):
         assert load_study(name).policies == (*guarded, *once)
 

@@ -1,0 +1,185 @@
+"""Wind: what moves against it cost, the same field in all missions, and a guard that counts it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import event, given
+from hypothesis import strategies as st
+
+import policies
+from dess import InputError, load_scenario, simulate, simulate_batch
+from dess.observations.reach import reach_of
+from dess.scenario import Scenario, ScenarioSpace
+from dess.sections.wind import Wind, surcharges
+from dess.state import BATTERY, constants_of
+from policies.registry import SHIPPED
+from tests.drawn import Script, Wanderer, replications, seeds, spaces
+
+OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
+GUARDED = st.sampled_from([name for name in SHIPPED if name != "random-unguarded"])
+winds = st.builds(
+    Wind,
+    strength=st.floats(0, 6),
+    direction=st.floats(0, 360),
+    gusts=st.floats(0, 2),
+    seed=st.integers(0, 2**32 - 1),
+)
+
+
+def _table(wind: Wind, grid: int) -> np.ndarray:
+    return surcharges(grid, *wind.push(), wind.gusts, wind.seed)
+
+
+def _batteries(route: str, **scenario: Any) -> list[float]:
+    """The battery of a lone UAV at the end of each slot."""
+    space = ScenarioSpace.of(**(OPEN | {"max_slots": len(route)} | scenario))
+    record = simulate(space, Script(route), 3, events=True)
+    assert record.events is not None
+    log = record.events.columns()
+    return log["value"][log["event"] == "move"].tolist()
+
+
+# --- costs by hand ---
+
+
+def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does() -> None:
+    # From the north: north costs 1 + 3, all other moves and hovering cost 1.
+    north = {"wind.strength": 3, "wind.direction": 0}
+    assert _batteries("NES.WN", **north) == [56, 55, 54, 53, 52, 48]
+    for direction, against in ((90, "E"), (180, "S"), (270, "W"), (360, "N")):
+        wind = {"wind.strength": 3, "wind.direction": direction}
+        for action in "NESW":
+            assert _batteries(action, **wind) == [56 if action == against else 59]
+
+
+def test_a_slanting_wind_costs_its_component_on_average() -> None:
+    # From the north-east with 2 %: sqrt(2) % for a move to the north or to the east. Each cell
+    # rounds it up or down, so the mean of 64 x 64 cells has a deviation below 0.01.
+    north, east, south, west = _table(Wind(strength=2, direction=45), 64)
+    for against in (north, east):
+        assert set(np.unique(against)) == {1, 2}
+        assert against.mean() == pytest.approx(np.sqrt(2), abs=0.04)
+    assert not south.any() and not west.any()
+
+
+def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
+    # The mean of max(0, g) is the deviation / sqrt(2 pi).
+    table = _table(Wind(gusts=3), 128)
+    assert table.min() == 0
+    assert table.mean(axis=(1, 2)) == pytest.approx(3 / np.sqrt(2 * np.pi), abs=0.1)
+    # A gust that is against a move to the north is with a move to the south.
+    north, east, south, west = table
+    assert ((north == 0) | (south == 0)).all() and ((east == 0) | (west == 0)).all()
+
+
+def test_an_overruled_move_costs_what_hovering_does() -> None:
+    corner = {"zone": [0, 0, 1, 1], "wind.strength": 3, "wind.direction": 0}
+    assert _batteries("N.", **corner) == [59, 58]
+
+
+def test_a_flight_without_battery_decrease_costs_nothing_in_wind_either() -> None:
+    assert _batteries("NNN", flight_cost=0, **{"wind.strength": 9, "wind.gusts": 4}) == [60] * 3
+
+
+def test_a_battery_that_does_not_suffice_is_empty_and_not_negative() -> None:
+    scenario = ScenarioSpace.of(**OPEN | {"flying_time": 4, "charge_start": 10, "max_slots": 20})
+    wind = ScenarioSpace.of(scenario, **{"wind.strength": 8})
+    for record in (simulate(wind, Script("N..")), simulate_batch(wind, Script("N.."))):
+        assert record.uavs["battery"].ravel().tolist() == [0]
+        assert record.uavs["end"].ravel().tolist() == [BATTERY]
+
+
+# --- the field ---
+
+
+@given(winds, seeds, replications, st.integers(0, 1))
+def test_every_move_of_every_mission_costs_what_the_field_says(
+    wind: Wind, seed: int, replication: int, engine: int
+) -> None:
+    space = ScenarioSpace.of(**OPEN | {"flying_time": 100, "max_slots": 12}, wind=wind.model_dump())
+    record = simulate(space, Wanderer(), seed, replication, events=True)
+    assert record.events is not None
+    log = record.events.columns()
+    table, moves = _table(wind, 9), log["event"] == "move"
+    x, y, battery = 4, 4, 100.0
+    for new_x, new_y, after in zip(
+        *(log[c][moves].astype(int) for c in ("x", "y", "value")), strict=True
+    ):
+        step = (new_x - x, new_y - y)
+        cost = 1
+        if step != (0, 0):
+            action = [(0, -1), (1, 0), (0, 1), (-1, 0)].index(step)
+            cost += table[action, new_y, new_x]
+        assert after == max(battery - cost, 0)
+        x, y, battery = new_x, new_y, after
+
+
+def test_another_seed_is_another_field() -> None:
+    one, other = (_table(Wind(gusts=2, seed=seed), 16) for seed in (1, 2))
+    assert (one != other).any()
+    assert (one == _table(Wind(gusts=2, seed=1), 16)).all()
+
+
+def test_what_is_no_wind_is_refused() -> None:
+    for field, value in (("strength", -1), ("direction", 361), ("gusts", 11), ("seed", 0.5)):
+        with pytest.raises(InputError, match=f"wind.{field}"):
+            load_scenario("paper", **{f"wind.{field}": value})
+
+
+# --- the guard ---
+
+
+@given(spaces(), winds)
+def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
+    space: ScenarioSpace, wind: Wind
+) -> None:
+    """The table satisfies the equation of the shortest way, in every cell outside the zone."""
+    fleet = [{"slots_per_cell": 2}]
+    space = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
+    reach, extra, grid = reach_of(constants_of(space)), _table(wind, space.grid), space.grid
+    x0, y0, width, height = space.zone
+    for s in (1, 2):
+        for y, x in np.ndindex(grid, grid):
+            if x0 <= x < x0 + width and y0 <= y < y0 + height:
+                assert reach[s - 1, y, x] == 0
+                continue
+            steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
+            assert reach[s - 1, y, x] == min(
+                s + extra[action, b, a] + reach[s - 1, b, a]
+                for action, a, b in steps
+                if 0 <= a < grid and 0 <= b < grid
+            )
+
+
+@given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
+def test_a_guarded_lone_uav_never_depletes_its_battery_in_wind(
+    space: ScenarioSpace, wind: Wind, name: str, slots_per_cell: int, seed: int, replication: int
+) -> None:
+    fleet = [{"slots_per_cell": slots_per_cell}]
+    windy = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
+    record = simulate(windy, policies.load(name), seed, replication)
+    assert (record.uavs["end"] != BATTERY).all()
+    event(f"charged {record.uavs['slots_charging'][0] > 0}")
+
+
+@pytest.mark.parametrize("name", ["greedy", "random"])
+def test_teams_come_home_in_a_strong_wind(name: str) -> None:
+    windy = load_scenario("paper", **{"wind.strength": 2, "wind.direction": 200, "wind.gusts": 1})
+    ends = simulate_batch(windy, policies.load(name), 7, 60).uavs["end"]
+    assert (ends == BATTERY).mean() < 0.02
+
+
+def test_the_guard_without_wind_does_not_look_at_a_table() -> None:
+    assert reach_of(constants_of(load_scenario("paper"))).size == 0
+    assert reach_of(constants_of(load_scenario("paper", fleet=[{"rate": 2.0}]))).size == 0
+
+
+def test_a_learned_policy_applies_in_wind() -> None:
+    windy = load_scenario("paper", **{"wind.strength": 1, "wind.gusts": 0.5})
+    ends = simulate_batch(windy, policies.load("ddqn"), 7, 20).uavs["end"]
+    assert (ends == BATTERY).mean() < 0.05
+
+
+def test_a_scenario_shows_its_wind() -> None:
+    assert Scenario.of(**{"wind.strength": 2.0}).wind == Wind(strength=2.0)
