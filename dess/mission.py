@@ -22,6 +22,7 @@ For numba, a numpy record as an argument takes longer (3 us) than the arrays of 
 the compiled functions here take the arrays and hand their first records to the rules.
 """
 
+from collections import namedtuple
 from collections.abc import Generator, Sequence
 from math import inf
 from typing import Any
@@ -32,7 +33,14 @@ import simpy
 from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.record import EventLog, MissionRecord, empty_records, write_operations, write_record
+from dess.record import (
+    PARAMETER_EVENTS,
+    EventLog,
+    MissionRecord,
+    empty_records,
+    write_operations,
+    write_record,
+)
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.charging import request_pad
@@ -44,6 +52,7 @@ from dess.state import (
     BATTERY,
     LOST,
     QUOTA,
+    UAV,
     State,
     check_seed,
     constants_of,
@@ -56,6 +65,7 @@ from dess.state import (
 from dess.view import decide, team_of
 
 Process = Generator[simpy.Event, Any, None]
+_Uav: Any = namedtuple("_Uav", UAV.names or ())  # type: ignore[misc]
 
 
 def simulate(
@@ -124,6 +134,7 @@ class MissionModel:
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
         self._log_state("mission_start")
+        self._log_parameters()
         if self.packets is not None:
             self.env.process(self._arrivals(self.packets))
         self.env.run(self.env.process(self._clock()))
@@ -146,12 +157,12 @@ class MissionModel:
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
         pads_fail = bool(self.mission["pad_rate"] > 0)
-        slot, active, in_zone = 0, len(self.fleet), 0
+        slot, active, allowed = 0, len(self.fleet), 0
         while active:
             decide(self.team, self.state, self.world)
             may_charge = _resolve(missions, uavs)
-            if may_charge != in_zone or pads_fail:
-                in_zone = may_charge
+            if may_charge != allowed or pads_fail:
+                allowed = may_charge
                 self._request_pads(slot, may_charge)
                 self._start_charging(slot)
             _spend(missions, uavs)
@@ -162,7 +173,7 @@ class MissionModel:
                 self._log_communications(slot, n, m)
                 if self.packets is not None:
                     self._log_packets("delivery", self.packets.deliver(slot + n / m))
-            before = self.uavs.copy() if self.log is not None else None
+            before = self._team() if self.log is not None else []
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1
             self._log_close(slot, before)
@@ -187,10 +198,10 @@ class MissionModel:
                 if not has_asked:
                     self.zone.ask(i)
                     request_pad(self.mission, u)
-                    self._log_uav("charge_request", slot, i, u["battery"])
+                    self._log_charging("charge_request", slot, i)
             elif has_asked:
                 if not self.zone.holds_pad(i):
-                    self._log_uav("charge_withdrawal", slot, i, u["battery"])
+                    self._log_charging("charge_withdrawal", slot, i)
                 self.zone.leave(i)
                 u["pad_request"] = -1
 
@@ -198,7 +209,7 @@ class MissionModel:
         """Let the UAVs that are granted a pad charge from this slot on."""
         for i in self.zone.grant():
             rules.start_charging(self.mission, self.uavs, i)
-            self._log_uav("charge_start", slot, i, self.uavs[i]["battery"])
+            self._log_charging("charge_start", slot, i)
 
     def _fail(self, slot: int) -> int:
         """Let things fail and be repaired; return the number of UAVs that are still active."""
@@ -207,49 +218,63 @@ class MissionModel:
         if self.log is not None:
             log_failures(self.log, float(slot), before, self.state, self.world.nodes)
         for i in self.fleet:
-            u = self.uavs[i]
-            if before.uavs[0, i]["charging"] and not u["charging"]:  # its pad has failed
-                self._log_uav("charge_end", slot, i, u["battery"])
-                self._log_uav("charge_request", slot, i, u["battery"])
+            if before.uavs[0, i]["charging"] and not self.uavs[i]["charging"]:  # its pad has failed
+                self._log_charging("charge_end", slot, i)
+                self._log_charging("charge_request", slot, i)
                 self.zone.ask(i)
         if self.packets is not None:
             self._log_packets("loss", self.packets.fall_silent(float(slot)))
         return int(self.mission["active"])
 
-    def _log_uav(self, event: str, time: float, i: int, value: float) -> None:
+    def _log_charging(self, event: str, slot: int, i: int) -> None:
         if self.log is not None:
-            u = self.uavs[i]
-            self.log.add(float(time), event, i, -1, value, u["x"], u["y"])
+            u = self._team()[i]
+            self._log_uav(event, slot, i, u, u.battery)
+
+    def _team(self) -> list[Any]:
+        """The UAVs as plain values, which Python reads faster than the fields of a record."""
+        return [_Uav(*values) for values in self.uavs[: len(self.fleet)].tolist()]
+
+    def _log_uav(
+        self, event: str, time: int, i: int, u: Any, value: float, other: int = -1
+    ) -> None:
+        assert self.log is not None
+        self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
 
     def _log_state(self, event: str) -> None:
         if self.log is None:
             return
-        time = float(self.mission["slot"])
-        for i in self.fleet:
-            self._log_uav(event, time, i, self.uavs[i]["battery"])
+        time = int(self.mission["slot"])
+        for i, u in enumerate(self._team()):
+            self._log_uav(event, time, i, u, u.battery)
         for k, (x, y) in enumerate(self.world.nodes):
-            self.log.add(time, event, -1, k, self.residual[k], x, y)
+            self.log.add(float(time), event, -1, k, self.residual[k], x, y)
+
+    def _log_parameters(self) -> None:
+        if self.log is not None:
+            for event in PARAMETER_EVENTS:
+                self.log.add(0.0, event, -1, -1, self.mission[event.removeprefix("mission_")])
 
     def _log_moves(self, slot: int) -> None:
         if self.log is None:
             return
-        for i in self.fleet:
-            u = self.uavs[i]
-            if u["active"]:
-                if u["overruled"]:
-                    self._log_uav("collision", slot, i, u["action"])
-                self._log_uav("move", slot, i, u["battery"])
+        for i, u in enumerate(self._team()):
+            if u.active:
+                if u.overruled:
+                    self._log_uav("collision", slot, i, u, u.action, u.overruled_by)
+                self._log_uav("move", slot, i, u, u.battery)
 
     def _log_communications(self, slot: int, n: int, m: int) -> None:
         if self.log is None:
             return
-        for i in self.fleet:
-            u = self.uavs[i]
-            if u["active"] and u["served"] >= 0:
-                flown = fleet.share_flown(self.mission, u, n)
-                x = u["from_x"] + (u["x"] - u["from_x"]) * flown
-                y = u["from_y"] + (u["y"] - u["from_y"]) * flown
-                self.log.add(slot + n / m, "communication", i, u["served"], u["amount"], x, y)
+        for i, u in enumerate(self._team()):
+            if u.active and u.served >= 0:
+                flown = fleet.share_flown(m, u, n)
+                x = u.from_x + (u.x - u.from_x) * flown
+                y = u.from_y + (u.y - u.from_y) * flown
+                self.log.add(
+                    slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
+                )
 
     def _log_packets(self, event: str, numbers: Sequence[int]) -> None:
         """Log the arrival, the delivery or the loss of packets."""
@@ -259,24 +284,25 @@ class MissionModel:
             p = self.packets.buffers.packets[number]
             x, y = self.world.nodes[p["node"]]
             time = p["generated"] if event == "arrival" else p["left"]
-            self.log.add(time, event, p["uav"], p["node"], 1.0, x, y)
+            self.log.add(
+                time, event, p["uav"], p["node"], 1.0, x, y, packet=number, generated=p["generated"]
+            )
 
-    def _log_close(self, time: int, before: np.ndarray | None) -> None:
+    def _log_close(self, time: int, before: list[Any]) -> None:
         """Log new data, and the charging sessions and the UAVs that ended with a slot."""
-        if self.log is None or before is None:
+        if self.log is None:
             return
         if self.mission["arrival_rate"] > 0:
             for k in np.nonzero(self.arrivals)[0].tolist():
                 x, y = self.world.nodes[k]
                 self.log.add(float(time), "arrival", -1, k, self.arrivals[k], x, y)
-        for i in self.fleet:
-            was, u = before[i], self.uavs[i]
-            if was["charging"] and not u["charging"]:
-                self._log_uav("charge_end", time, i, u["battery"])
-            if was["active"] and u["end"] == QUOTA:
-                self._log_uav("quota_filled", time, i, u["communications"])
-            if was["active"] and u["end"] == BATTERY:
-                self._log_uav("battery_empty", time, i, u["battery"])
+        for i, (was, u) in enumerate(zip(before, self._team(), strict=True)):
+            if was.charging and not u.charging:
+                self._log_uav("charge_end", time, i, u, u.battery)
+            if was.active and u.end == QUOTA:
+                self._log_uav("quota_filled", time, i, u, u.communications)
+            if was.active and u.end == BATTERY:
+                self._log_uav("battery_empty", time, i, u, u.battery)
 
 
 @kernel

@@ -1,7 +1,7 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
 from dataclasses import dataclass, field
-from math import isnan
+from math import isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,13 +79,24 @@ _EVENT_COLUMNS = {
     "value": np.float64,
     "x": np.float64,
     "y": np.float64,
+    "battery": np.int64,
+    "other": np.int64,
+    "snr": np.float64,
+    "packet": np.int64,
+    "generated": np.float64,
 }
 FAILURE_EVENTS = (
     *("uav_failure", "uav_repair", "pad_failure", "pad_repair", "node_failure", "node_repair"),
     "data_lost",
 )
+# Parameters of the mission, a row each.
+PARAMETER_EVENTS = tuple(
+    f"mission_{name}"
+    for name in ("seed", "replication", "flying_time", "charge_start", "charge_complete")
+)
 EVENT_NAMES = (
     "mission_start",
+    *PARAMETER_EVENTS,
     "move",
     "collision",
     "charge_request",
@@ -177,31 +188,30 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Record
 class EventLog:
     """The events of one mission, in the order in which they happened.
 
-    Every column is also an attribute, as in ``log.time``. The meaning of ``value`` depends on the
-    event:
-
-    - ``mission_start`` and ``mission_end`` have one row per UAV (its battery [%]) and one row per
-      node (its residual data [data units]).
-    - ``move`` has one row per active UAV and mission slot, also where the UAV hovers. The position
-      is the cell after the action, the value is the battery [%] at the end of the slot.
-    - ``communication`` and ``arrival``: the data units collected or arrived.
-    - ``quota_filled``: the number of communication slots in which the UAV collected data.
-    - ``collision``: the number of the action that the safety controller overruled.
-    - ``charge_request``, ``charge_start``, ``charge_end``, ``charge_withdrawal`` (the UAV leaves
-      the queue), ``battery_empty``, ``uav_failure`` and ``uav_repair``: the battery [%].
-    - ``pad_failure`` and ``pad_repair``: the index of the pad.
-    - ``node_failure`` and ``node_repair``: the data that the node holds. ``data_lost``: data units.
-
-    ``uav`` and ``node`` are -1 where an event concerns no UAV or no node.
+    Every column is also an attribute, as in ``log.time``. The page ``docs/concepts/model.md`` says
+    what the columns and events mean.
     """
 
     rows: list[tuple] = field(default_factory=list)
 
     def add(
-        self, time: float, event: str, uav: int, node: int, value: float, x: float, y: float
+        self,
+        time: float,
+        event: str,
+        uav: int,
+        node: int,
+        value: float,
+        x: float = -1.0,
+        y: float = -1.0,
+        battery: int = -1,
+        other: int = -1,
+        snr: float = nan,
+        packet: int = -1,
+        generated: float = nan,
     ) -> None:
-        """Append one event at ``time`` [mission slots] and position ``x, y`` [cells]."""
-        self.rows.append((time, event, uav, node, value, x, y))
+        """Append one event; the arguments are its columns."""
+        row = (time, event, uav, node, value, x, y, battery, other, snr, packet, generated)
+        self.rows.append(row)
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -117,8 +117,8 @@ def _launch_uavs(mission, types, uavs):
             u.battery = kind.flying_time if kind.flying_time > 0 else mission.flying_time
         u.communications = u.slots_flying = u.slots_charging = u.slots_waiting = 0
         u.action = u.executed = HOVER
-        u.pad_request = u.pad = u.served = -1
-        u.amount = u.collected = u.reward = u.total_reward = 0.0
+        u.pad_request = u.pad = u.served = u.overruled_by = -1
+        u.amount = u.snr = u.collected = u.reward = u.total_reward = 0.0
         u.x = u.y = u.from_x = u.from_y = -1
         if u.active:
             words = streams.block(mission.seed, mission.replication, streams.START, 0, 0, i)
@@ -164,6 +164,7 @@ def resolve(mission, uavs):
         u.y += STEP_Y[u.action]
         if not on_grid(mission, u.x, u.y):
             _cancel(u)
+            u.overruled_by = -1
     if count == 1:
         return
     changed = True
@@ -175,6 +176,8 @@ def resolve(mission, uavs):
             if u.active and u.executed != HOVER and fleet.begins_move(u):
                 for j in range(count):
                     if j != i and uavs[j].active and _collide(mission, u, uavs[j]):
+                        if not u.overruled:
+                            u.overruled_by = j
                         u.overruled = True
         for i in range(count):
             u = uavs[i]
@@ -326,6 +329,7 @@ def communicate(
             age.empty(mission, sensors[node], teeth, n)
         u.served = node
         u.amount = amount
+        u.snr = snr
         u.collected += amount
         u.communications += 1
         mission.slot_collected += amount

@@ -129,6 +129,7 @@ UAV = np.dtype(
         ("slots_flying", np.int64),
         ("slots_charging", np.int64),
         ("slots_waiting", np.int64),  # for a pad
+        ("overruled_by", np.int64),  # if overruled: the UAV in its way, -1 at the edge of the grid
         ("served", np.int64),  # node served in the present communication slot, -1 for none
         ("active", np.bool_),
         ("latch", np.bool_),  # charging latch iota
@@ -137,6 +138,7 @@ UAV = np.dtype(
         ("overruled", np.bool_),
         ("rate", np.float64),  # factor of the rate at which it collects data
         ("amount", np.float64),  # collected in the present communication slot
+        ("snr", np.float64),  # of the node served [dB]
         ("collected", np.float64),  # in the mission
         ("reward", np.float64),  # of the present slot
         ("total_reward", np.float64),

@@ -27,7 +27,7 @@ def uav_slots(events: Events) -> pd.DataFrame:
     log = pd.DataFrame(events)
     moves = log[log["event"] == "move"].astype({"time": int, "x": int, "y": int, "value": int})
     names = {"time": "slot", "value": "battery"}
-    table = moves.rename(columns=names)[["uav", "slot", "x", "y", "battery"]]
+    table = moves[["uav", "time", "x", "y", "value"]].rename(columns=names)
     table = table.sort_values(["uav", "slot"], ignore_index=True)
     start = _of_uavs(log, "mission_start").set_index("uav")
     for axis in ("x", "y"):
@@ -46,7 +46,7 @@ def battery_levels(events: Events) -> pd.DataFrame:
     log = pd.DataFrame(events)
     moves = log[log["event"] == "move"]
     states = pd.concat([_of_uavs(log, "mission_start"), moves.assign(time=moves["time"] + 1)])
-    levels = states.rename(columns={"value": "battery"})[["uav", "time", "battery"]]
+    levels = states[["uav", "time", "value"]].rename(columns={"value": "battery"})
     levels = levels.astype({"time": int, "battery": int})
     return levels.sort_values(["uav", "time"], ignore_index=True)
 

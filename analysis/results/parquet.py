@@ -59,8 +59,15 @@ EVENTS = pa.schema(
         ("uav", pa.int64()),
         ("node", pa.int64()),
         *((name, pa.float64()) for name in ("value", "x", "y")),
+        ("battery", pa.int64()),
+        ("other", pa.int64()),
+        ("snr", pa.float64()),
+        ("packet", pa.int64()),
+        ("generated", pa.float64()),
     ]
 )
+# Event logs of before had the first columns only.
+FORMER_EVENTS = pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])
 
 
 class Tables(NamedTuple):
@@ -218,7 +225,8 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     Args:
         path: The file.
         schema: The schema; by default that of an event log, whose values are checked as well. The
-            schema of missions stands for that of extended missions too.
+            schema of missions stands for that of extended missions too, and that of event logs
+            for that of before.
 
     Raises:
         InputError: If it cannot be read, or takes more memory than there is.
@@ -235,6 +243,8 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
         file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=words)
         if schema is MISSIONS and file.schema_arrow.names == EXTENDED_MISSIONS.names:
             schema = EXTENDED_MISSIONS
+        if schema is EVENTS and file.schema_arrow.names == FORMER_EVENTS.names:
+            schema = FORMER_EVENTS
         if file.schema_arrow.names != schema.names:
             return None
         _check_size(path, file.metadata)
@@ -247,7 +257,7 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
         return None
     if not table.schema.equals(schema):
         return None
-    return table if schema is not EVENTS or _is_log(table) else None
+    return table if schema not in (EVENTS, FORMER_EVENTS) or _is_log(table) else None
 
 
 def _check_size(path: Path, metadata: pq.FileMetaData) -> None:
@@ -277,6 +287,8 @@ def _is_log(table: pa.Table) -> bool:
         return False
     limits = {"uav": (-1, MOST_UAVS - 1), "node": (-1, MOST_NODES - 1), "time": (0, MOST_SLOTS)}
     limits |= dict.fromkeys(("x", "y"), (-1, MOST_CELLS))
+    if "battery" in table.column_names:
+        limits |= {"battery": (-1, 100), "other": (-1, MOST_UAVS - 1)}
     columns = {name: table[name].to_numpy() for name in limits}  # nan is in none of the limits
     return (
         all(low <= columns[name].min() for name, (low, _) in limits.items())

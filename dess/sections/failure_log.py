@@ -27,11 +27,11 @@ def _log_uavs(log: EventLog, time: float, before: State, after: State) -> None:
     for i, (was, u) in enumerate(zip(before.uavs[0], after.uavs[0], strict=True)):
         where = u["x"], u["y"]
         if u["grounded"] > was["grounded"] or u["end"] == LOST != was["end"]:
-            log.add(time, "uav_failure", i, -1, u["battery"], *where)
+            log.add(time, "uav_failure", i, -1, u["battery"], *where, u["battery"])
         if u["grounded"] < was["grounded"]:
-            log.add(time, "uav_repair", i, -1, u["battery"], *where)
+            log.add(time, "uav_repair", i, -1, u["battery"], *where, u["battery"])
         if u["collected"] < was["collected"]:
-            log.add(time, "data_lost", i, -1, was["collected"], *where)
+            log.add(time, "data_lost", i, -1, was["collected"], *where, u["battery"])
 
 
 def _log_pads(log: EventLog, time: float, before: State, after: State) -> None:

@@ -6,6 +6,7 @@ on. Until it is there, it has nothing to decide.
 
 from collections.abc import Sequence
 from math import lcm
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -108,9 +109,7 @@ def begins_move(u):
     return u.slots_left == u.slots_per_cell - 1
 
 
-@inlined
-def share_flown(mission, u, n):
+def share_flown(m: int, u: Any, n: int) -> float:
     """The share of its move that a UAV has flown at communication slot ``n`` = 1..m."""
-    m = mission.communication_slots
     s = u.slots_per_cell
     return ((s - 1 - u.slots_left) * m + n) / (s * m)

@@ -13,18 +13,21 @@ from hashlib import sha256
 from pathlib import Path
 
 import pandas as pd
+import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
 from analysis.execution.effort import CONFIRMED, channel_memory, check_time
 from analysis.results import commands
 from analysis.results.evidence import Evidence, Mission, chosen, learned_files
 from analysis.results.files import MANIFEST
+from analysis.results.parquet import EVENTS
 from analysis.results.resimulate import difference
 from analysis.results.store import Store
 from analysis.results.tables import results_of
 from dess import InputError, simulate
 from dess.code.memory import check_memory
 from dess.files import read_text
+from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
 from policies import load_team
 from policies.registry import check_no_files
@@ -249,10 +252,18 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None
-        if not stored.to_pandas().equals(pd.DataFrame(log.columns())):
+        if not stored.to_pandas().equals(_as_stored(pd.DataFrame(log.columns()), stored)):
             command = commands.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(logged), lines)
+
+
+def _as_stored(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:
+    """An event log as it was stored: logs of before lack columns and the parameters."""
+    if stored.schema.equals(EVENTS):
+        return log
+    events = log[~log["event"].isin(PARAMETER_EVENTS)]
+    return events[stored.column_names].reset_index(drop=True)
 
 
 def _check_files(text: str, path: Path) -> Check:

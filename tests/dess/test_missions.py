@@ -364,3 +364,34 @@ def test_a_uav_that_has_ended_leaves_the_map() -> None:
     # UAV 0 is paid for slot 0 only; UAV 1 for the team's data, two steps and one collision.
     assert record.uavs["reward"].tolist() == pytest.approx([106.4, 5.3], abs=1e-9)
     assert (record.slots, record.uav_slots) == (2, 3)
+
+
+def test_a_collision_names_the_uav_in_the_way() -> None:
+    """UAV 0 is between UAV 1 and UAV 2 in a zone of three cells in the first row of the grid.
+
+    Slot 0: UAV 1 asks for the cell of UAV 0; UAV 2 asks for a cell off the grid.
+    Slot 1: both ask for the cell of UAV 0, so that each has two UAVs in its way.
+    Slot 2: UAV 0 leaves the cell; the two others are in the way of each other.
+    """
+    scenario = Scenario.of(**PAIR | {"uavs": 3, "zone": [0, 0, 3, 1]}, max_slots=3)
+    starts = [(1, 0), (0, 0), (2, 0)]
+    _, log = _simulate(scenario, "..S", "EEE", "NWW", starts=starts)
+    assert _values(log, "collision", "time", "uav", "other", "value") == [
+        (0.0, 1, 0, 1.0),
+        (0.0, 2, -1, 0.0),
+        (1.0, 1, 0, 1.0),
+        (1.0, 2, 0, 3.0),
+        (2.0, 1, 2, 1.0),
+        (2.0, 2, 1, 3.0),
+    ]
+
+
+def test_the_snr_of_a_communication_gives_its_rate() -> None:
+    """Beside the node the SNR is 15, above it 255; the node is emptied with the third."""
+    scenario = Scenario.of(
+        **HAND | {"nodes": [[1, 0]], "initial_data": 14.0, "quota": 3, "flying_time": 20}
+    )
+    _, log = _simulate(scenario, ".E")
+    snr, amounts = zip(*_values(log, "communication", "snr", "value"), strict=True)
+    assert snr == pytest.approx([10 * math.log10(k) for k in (15, 255, 255)], abs=1e-9)
+    assert amounts == pytest.approx([4, 8, 2], abs=1e-9)

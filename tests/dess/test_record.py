@@ -174,7 +174,7 @@ def test_the_columns_of_a_log_are_attributes() -> None:
     log = simulate(ScenarioSpace.of(), Commuter(), 3, 4, events=True).events
     assert log is not None and log.event[0] == "mission_start"
     for name, column in log.columns().items():
-        assert getattr(log, name) == column.tolist()
+        np.testing.assert_array_equal(getattr(log, name), column)
     with pytest.raises(AttributeError, match="colour"):
         _ = log.colour
 
@@ -184,3 +184,26 @@ def test_the_collection_ratio_without_data_is_one() -> None:
     record = simulate(scenario, Commuter(), 0, 0)
     assert (record.initial, record.arrived, record.collected, record.residual) == (0, 0, 0, 0)
     assert (record.collection_ratio, record.success) == (1.0, 0)
+
+
+def test_a_log_begins_with_the_parameters_of_its_mission() -> None:
+    record, log = _logged(ScenarioSpace.of(uavs=[1, 3]), Commuter(), 2**40 + 1, 7)
+    names = ("seed", "replication", "flying_time", "charge_start", "charge_complete")
+    logged = dict(zip(log["event"].tolist(), log["value"].tolist(), strict=True))
+    assert {name: logged[f"mission_{name}"] for name in names} == {
+        name: getattr(record, name) for name in names
+    }
+
+
+@missions
+def test_every_row_of_a_uav_has_its_battery(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> None:
+    record, log = _logged(space, policy, seed, replication)
+    is_level = ~np.isin(log["event"], ["collision", "communication", "quota_filled", "data_lost"])
+    of_uav = log["uav"] >= 0
+    assert (log["battery"][of_uav & is_level] == log["value"][of_uav & is_level]).all()
+    assert (log["battery"][~of_uav] == -1).all()
+    for i in range(len(record.uavs)):
+        battery = log["battery"][(log["uav"] == i) & (log["event"] != "move")]
+        assert battery[-1] == record.uavs["battery"][i]
