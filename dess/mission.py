@@ -24,7 +24,7 @@ the compiled functions here take the arrays and hand their first records to the 
 
 from collections import namedtuple
 from collections.abc import Generator, Sequence
-from math import inf
+from math import inf, nan
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ from dess.sections import fleet
 from dess.sections.charging import request_pad
 from dess.sections.failure_log import log_failures
 from dess.sections.failures import strike
-from dess.sections.packets import Packets
+from dess.sections.packets import Packets, deliver
 from dess.sections.zone import ChargingZone
 from dess.state import (
     BATTERY,
@@ -126,7 +126,7 @@ class MissionModel:
             self.mission, ranges_of(scenario), types_of(scenario),
             self.uavs, self.residual, self.sensors, self.teeth,
         )  # fmt: skip
-        self.packets = Packets(scenario, self.state) if scenario.needs_events else None
+        self.packets = Packets(scenario, self.state, log) if scenario.needs_events else None
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
         self.zone = ChargingZone(self.env, self.mission, self.uavs)
@@ -153,7 +153,7 @@ class MissionModel:
     def _clock(self) -> Process:
         """Open every mission slot, run its communication slots and close it."""
         env, missions, uavs, residual = self.env, *self.state[:3]
-        arrays = *self.state, *self.world, *self.scratch
+        arrays, packets = (*self.state, *self.world, *self.scratch), self.packets
         m = int(self.mission["communication_slots"])
         has_failures = bool(self.mission["has_failures"])
         pads_fail = bool(self.mission["pad_rate"] > 0)
@@ -169,10 +169,13 @@ class MissionModel:
             self._log_moves(slot)
             for n in range(1, m + 1):
                 yield env.timeout(slot + n / m - env.now)
-                _communicate(*arrays, n)
+                if packets is None:
+                    _communicate(*arrays, n)
+                else:
+                    _communicate_packets(*arrays, n, *packets.buffers.arrays)
                 self._log_communications(slot, n, m)
-                if self.packets is not None:
-                    self._log_packets("delivery", self.packets.deliver(slot + n / m))
+                if packets is not None:
+                    packets.log_deliveries()
             before = self._team() if self.log is not None else []
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1
@@ -185,9 +188,7 @@ class MissionModel:
         time, k = packets.next()
         while time < inf:
             yield self.env.timeout(max(time - self.env.now, 0.0))
-            lost = packets.arrive(k)
-            self._log_packets("arrival", [len(packets.buffers.packets) - 1])
-            self._log_packets("loss", [lost] if lost >= 0 else [])
+            packets.arrive(k)
             time, k = packets.next()
 
     def _request_pads(self, slot: int, may_charge: int) -> None:
@@ -223,7 +224,7 @@ class MissionModel:
                 self._log_charging("charge_request", slot, i)
                 self.zone.ask(i)
         if self.packets is not None:
-            self._log_packets("loss", self.packets.fall_silent(float(slot)))
+            self.packets.fall_silent(float(slot))
         return int(self.mission["active"])
 
     def _log_charging(self, event: str, slot: int, i: int) -> None:
@@ -244,11 +245,15 @@ class MissionModel:
     def _log_state(self, event: str) -> None:
         if self.log is None:
             return
-        time = int(self.mission["slot"])
+        time, is_start = int(self.mission["slot"]), event == "mission_start"
         for i, u in enumerate(self._team()):
             self._log_uav(event, time, i, u, u.battery)
         for k, (x, y) in enumerate(self.world.nodes):
-            self.log.add(float(time), event, -1, k, self.residual[k], x, y)
+            packet = self.packets.oldest(k) if is_start and self.packets is not None else -1
+            born = 0.0 if packet >= 0 else nan
+            self.log.add(
+                float(time), event, -1, k, self.residual[k], x, y, packet=packet, generated=born
+            )
 
     def _log_parameters(self) -> None:
         if self.log is not None:
@@ -275,18 +280,6 @@ class MissionModel:
                 self.log.add(
                     slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
                 )
-
-    def _log_packets(self, event: str, numbers: Sequence[int]) -> None:
-        """Log the arrival, the delivery or the loss of packets."""
-        if self.log is None or self.packets is None:
-            return
-        for number in numbers:
-            p = self.packets.buffers.packets[number]
-            x, y = self.world.nodes[p["node"]]
-            time = p["generated"] if event == "arrival" else p["left"]
-            self.log.add(
-                time, event, p["uav"], p["node"], 1.0, x, y, packet=number, generated=p["generated"]
-            )
 
     def _log_close(self, time: int, before: list[Any]) -> None:
         """Log new data, and the charging sessions and the UAVs that ended with a slot."""
@@ -329,6 +322,18 @@ def _communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
         nodes, mean_snr, order, means, batches, search, n,
     )  # fmt: skip
+
+
+@kernel
+def _communicate_packets(
+    missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n,
+    packets, queues, delivered, counts, newest_first,
+):  # fmt: skip
+    rules.communicate(
+        missions[0], uavs[0], residual[0], sensors[0], teeth[0],
+        nodes, mean_snr, order, means, batches, search, n,
+    )  # fmt: skip
+    deliver(missions, uavs, residual, sensors, n, packets, queues, delivered, counts, newest_first)
 
 
 @kernel

@@ -94,6 +94,8 @@ PARAMETER_EVENTS = tuple(
     f"mission_{name}"
     for name in ("seed", "replication", "flying_time", "charge_start", "charge_complete")
 )
+# What becomes of packets in continuous time, besides ``arrival``.
+PACKET_EVENTS = ("delivery", "loss")
 EVENT_NAMES = (
     "mission_start",
     *PARAMETER_EVENTS,
@@ -108,6 +110,7 @@ EVENT_NAMES = (
     "quota_filled",
     "battery_empty",
     *FAILURE_EVENTS,
+    *PACKET_EVENTS,
     "mission_end",
 )
 

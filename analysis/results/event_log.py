@@ -58,7 +58,8 @@ def residual_data(events: Events) -> pd.DataFrame:
     """
     log = pd.DataFrame(events)
     start = log[(log["event"] == "mission_start") & (log["node"] >= 0)]
-    flows = log[log["event"].isin(["communication", "arrival"])]
+    flowing = log["event"].isin(["arrival", "communication", "data_lost", "loss"])
+    flows = log[flowing & (log["node"] >= 0)]
     change = flows["value"].where(flows["event"] == "arrival", -flows["value"])
     times, nodes = range(duration(log) + 1), start["node"].to_numpy()
     changes = change.groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).sum()

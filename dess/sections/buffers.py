@@ -71,6 +71,11 @@ class Buffers:
         """The numbers of the delivered packets, in the order of their delivery."""
         return self.order[: self.counts[DELIVERED]]
 
+    @property
+    def arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, bool]:
+        """What ``serve_packets`` takes first."""
+        return self.records, self.queues, self.order, self.counts, self.newest_first
+
     def store(self, k: int, time: float, amount: float) -> int:
         """Put a new packet into the buffer of node ``k``.
 
@@ -89,8 +94,7 @@ class Buffers:
 
     def serve(self, k: int, time: float, amount: float, uav: int = -1) -> None:
         """Collect data units from the packets of node ``k``."""
-        arrays = self.records, self.queues, self.order, self.counts
-        serve_packets(*arrays, self.newest_first, k, time, amount, uav)
+        serve_packets(*self.arrays, k, time, amount, uav)
 
     def lose(self, k: int, time: float) -> np.ndarray:
         """Lose all packets of node ``k``; return their numbers."""

@@ -48,6 +48,6 @@ def _log_nodes(log: EventLog, time: float, before: State, after: State, nodes: n
         event = "node_failure" if are[k] else "node_repair"
         held = before.residual[0, k] if are[k] else after.residual[0, k]
         log.add(time, event, -1, k, held, *nodes[k])
-    if after.missions[0]["node_data_lost"]:
+    if after.missions[0]["node_data_lost"] and not after.missions[0]["continuous"]:
         for k in np.nonzero(are & (before.residual[0] > 0))[0].tolist():
             log.add(time, "data_lost", -1, k, before.residual[0, k], *nodes[k])

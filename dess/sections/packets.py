@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.record import EventLog
 from dess.sections.arrivals import draw_arrival, factors_of, sources_of
 from dess.sections.buffers import (
     DELIVERED,
@@ -28,13 +29,15 @@ class Packets:
         buffers: The buffers of the nodes.
     """
 
-    def __init__(self, scenario: Any, state: Any):
+    def __init__(self, scenario: Any, state: Any, log: EventLog | None):
         """Begin a mission.
 
         Args:
             scenario: The ``ScenarioSpace``.
             state: The ``State`` of one mission that has been launched.
+            log: Its event log.
         """
+        self._log, self._nodes, self._logged = log, scenario.nodes, 0
         self._missions, self._uavs, self._residual, self._sensors = state[:4]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
         self._measures_age = scenario.age.measured
@@ -46,13 +49,17 @@ class Packets:
                 self.buffers.store(k, 0.0, self._residual[0, k])
             draw_arrival(self._missions, self._sources, *self._factors, k)
 
+    def oldest(self, k: int) -> int:
+        """The number of the oldest packet in the buffer of a node, or -1 if it is empty."""
+        return int(self.buffers.queues["oldest"][k])
+
     def next(self) -> tuple[float, int]:
         """The time of the next arrival [slots], infinite if there is none, and its node."""
         k = int(self._sources["time"].argmin())
         return float(self._sources["time"][k]), k
 
-    def arrive(self, k: int) -> int:
-        """Let the next packet of node ``k`` arrive; return the number of the packet lost, or -1."""
+    def arrive(self, k: int) -> None:
+        """Let the next packet of node ``k`` arrive."""
         b = self.buffers
         b.make_room()
         lost = _arrive(
@@ -60,24 +67,36 @@ class Packets:
             b.records, b.queues, b.counts, b.limit, b.newest_first, k,
         )  # fmt: skip
         draw_arrival(self._missions, self._sources, *self._factors, k)
-        return lost
+        self._log_events("arrival", [len(b.packets) - 1])
+        self._log_events("loss", [lost] if lost >= 0 else [])
 
-    def deliver(self, time: float) -> list[int]:
-        """Take what the UAVs have collected at this time; return the packets delivered."""
-        b, before = self.buffers, self.buffers.counts[DELIVERED]
-        _deliver(
-            self._missions, self._uavs, self._residual, self._sensors,
-            b.records, b.queues, b.order, b.counts, b.newest_first, time,
-        )  # fmt: skip
-        return list(b.delivered[before:])
+    def log_deliveries(self) -> None:
+        """Log the packets that have been delivered since the last call."""
+        if self._log is not None:
+            self._log_events("delivery", self.buffers.delivered[self._logged :].tolist())
+            self._logged = len(self.buffers.delivered)
 
-    def fall_silent(self, time: float) -> list[int]:
-        """Lose the packets of nodes that have just lost their data; return their numbers."""
-        mission = self._missions[0]
-        if not mission["node_data_lost"]:
-            return []
-        silent = np.nonzero(self._sensors["silent"][0])[0].tolist()
-        return [number for k in silent for number in self.buffers.lose(k, time)]
+    def fall_silent(self, time: float) -> None:
+        """Lose the packets of silent nodes, if the data of a silent node are lost."""
+        if self._missions[0]["node_data_lost"]:
+            for k in np.nonzero(self._sensors["silent"][0])[0].tolist():
+                self._log_events("loss", self.buffers.lose(k, time).tolist())
+
+    def _log_events(self, event: str, numbers: list[int]) -> None:
+        """Log the arrival, the delivery or the loss of packets."""
+        if self._log is None:
+            return
+        for number in numbers:
+            p = self.buffers.packets[number]
+            born, left = float(p["generated"]), float(p["left"])
+            time = born if event == "arrival" else left
+            value = {"arrival": 1.0, "delivery": left - born, "loss": p["remaining"]}[event]
+            x, y = self._nodes[p["node"]]
+            i = int(p["uav"])
+            battery = self._uavs[0, i]["battery"] if i >= 0 else -1
+            self._log.add(
+                time, event, i, p["node"], value, x, y, battery, packet=number, generated=born
+            )
 
     def write(self, out: np.void) -> None:
         """Write what was measured in the mission into an ``OPERATIONS`` record."""
@@ -114,12 +133,15 @@ def _arrive(
 
 
 @kernel
-def _deliver(
-    missions, uavs, residual, sensors, packets, queues, order, counts, newest_first, time
+def deliver(
+    missions, uavs, residual, sensors, n, packets, queues, order, counts, newest_first
 ):  # fmt: skip
-    """Serve the nodes of all UAVs, in index order, and note the newest data of each node."""
+    """Take what the UAVs collected in communication slot ``n`` from the packets, in index order.
+
+    The last five arguments are ``Buffers.arrays``.
+    """
     mission, team, data, nodes = missions[0], uavs[0], residual[0], sensors[0]
-    before = counts[DELIVERED]
+    time, before = mission.slot + n / mission.communication_slots, counts[DELIVERED]
     for i in range(mission.uavs):
         k = team[i].served
         if k >= 0:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
-from dess.record import EVENT_NAMES, FAILURE_EVENTS, MissionRecord, Records
+from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
@@ -107,7 +107,8 @@ def test_both_engines_agree_where_everything_happens(
             ends.update(single.uavs["end"].tolist())
             fleets.add(len(single.uavs))
             waited += int(single.uavs["slots_waiting"].sum())
-    assert seen == {name for name in EVENT_NAMES if sections or name not in FAILURE_EVENTS}
+    absent = {*PACKET_EVENTS} if sections else {*PACKET_EVENTS, *FAILURE_EVENTS}
+    assert seen == {*EVENT_NAMES} - absent
     assert ends == {QUOTA, BATTERY, TRUNCATED}
     assert fleets == {1, 2, 3, 4, 5, 6}
     assert waited > 100
