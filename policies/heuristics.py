@@ -20,6 +20,7 @@ from dess.observations.guard import (
     round_trip,
     safe_moves,
     slots_needed,
+    waiting_time,
 )
 from dess.observations.reach import reach_of
 from dess.rules import flies
@@ -180,7 +181,9 @@ def _goal(
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
-    spare = u.battery - 1 - margin(mission, u) if charge else slots_needed(mission, u)
+    spare = slots_needed(mission, u)
+    if charge:
+        spare = u.battery - 1 - margin(mission, u) - waiting_time(mission, team, i)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):

@@ -13,7 +13,8 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
-from dess.rules import in_zone, on_grid, zone_cell, zone_number
+from dess.rules import flies, in_zone, on_grid, zone_cell, zone_number
+from dess.sections.failures import working_pads
 from dess.sections.wind import move_surcharge
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
@@ -36,8 +37,8 @@ def must_charge(mission, u, data):
     """Whether UAV ``u`` cannot fill its quota with its battery and must charge first.
 
     In wind, every move until then may cost the most. If little data is left, a communication slot
-    may find no node to serve, so a margin is added. Where flying costs no battery, no UAV must
-    charge.
+    may find no node to serve, so a margin is added. Where flying costs no battery, or no pad will
+    ever work again, no UAV must charge.
 
     Args:
         mission: ``MISSION`` record.
@@ -48,6 +49,8 @@ def must_charge(mission, u, data):
     # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
+    if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and working_pads(mission) == 0:
+        return False
     moves = (needed + u.slots_per_cell - 1) // u.slots_per_cell
     return u.battery < mission.flight_cost * (needed + mission.wind_most * moves)
 
@@ -149,6 +152,41 @@ def margin(mission, u):
     return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
 
 
+@kernel
+def waiting_time(mission, uavs, i):
+    """The slots for which UAV ``i`` must expect to wait for a pad, where the guard allows for them.
+
+    Before it, pads are given to the teammates that have asked, and to those in the air that must
+    charge and have less battery (on a tie, a lower index). If they take all pads that work, it
+    waits until they are charged. More than C_S is of no use, since a UAV may ask for a pad only at
+    or below C_S.
+
+    Args:
+        mission: ``MISSION`` record.
+        uavs: (I,) ``UAV`` records.
+        i: Index of the UAV.
+    """
+    u = uavs[i]
+    if not (mission.has_charging or mission.pad_rate > 0.0) or u.pad_request >= 0:
+        return 0
+    ahead = lacking = 0
+    for j in range(mission.uavs):
+        o = uavs[j]
+        has_asked = o.active and o.pad_request >= 0
+        is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
+        must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
+        if j != i and (has_asked or (must and is_lower)):
+            ahead += 1
+            lacking += mission.charge_complete - min(o.battery, mission.charge_start)
+    pads = working_pads(mission)
+    if ahead < pads:
+        return 0
+    power = max(pads, 1) * mission.charge_rate
+    if mission.power > 0:
+        power = min(power, mission.power)
+    return min((lacking + power - 1) // power, mission.charge_start - 1)
+
+
 @inlined
 def battery_home(mission, u, slots, reach):
     """The battery [%] that UAV ``u`` needs to reach its parking cell.
@@ -232,6 +270,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
+    reserve = margin(mission, u) + waiting_time(mission, uavs, i) if charge else 0
     late = np.zeros(5, np.int64)  # battery [%] that lacks on the way to the parking cell
     contested = np.empty(5, np.int64)
     least = 1_000_000
@@ -245,7 +284,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
             else:
                 needed = _needed(mission, uavs, i, action, x, y, home_x, home_y, reach)
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late[action] = max(needed + 1 + margin(mission, u) - u.battery, 0)
+            late[action] = max(needed + 1 + reserve - u.battery, 0)
             least = min(least, late[action])
     clear = safe & (contested < 2)
     nearest = safe & (late == least) if charge else safe.copy()

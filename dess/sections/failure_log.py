@@ -35,11 +35,9 @@ def _log_uavs(log: EventLog, time: float, before: State, after: State) -> None:
 
 
 def _log_pads(log: EventLog, time: float, before: State, after: State) -> None:
-    mission = after.missions[0]
-    corner = mission["zone_x"], mission["zone_y"]
-    change = mission["pads_out"] - before.missions[0]["pads_out"]
+    change = after.missions[0]["pads_out"] - before.missions[0]["pads_out"]
     for pad in np.nonzero(change)[0].tolist():
-        log.add(time, "pad_failure" if change[pad] > 0 else "pad_repair", -1, -1, pad, *corner)
+        log.add(time, "pad_failure" if change[pad] > 0 else "pad_repair", -1, -1, pad)
 
 
 def _log_nodes(log: EventLog, time: float, before: State, after: State, nodes: np.ndarray) -> None:

@@ -9,9 +9,9 @@ from hypothesis import event, given
 from dess import streams
 from dess.batch import simulate_batch
 from dess.mission import simulate
-from dess.observations.guard import guard
+from dess.observations.guard import guard, must_charge, waiting_time
 from dess.scenario import ScenarioSpace, load_scenario
-from dess.state import BATTERY, HOVER, empty_state
+from dess.state import BATTERY, HOVER, constants_of, empty_state
 from dess.view import View
 from tests.drawn import EAST, NORTH, SOUTH, WEST, Fidget, replications, seeds, spaces
 
@@ -136,3 +136,66 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> 
 def test_guarded_random_teams_seldom_fail(fleet: int) -> None:
     records = simulate_batch(load_scenario("paper", uavs=fleet), Guarded(), 42, 200)
     assert records.missions["success"].mean() > 0.9
+
+
+# --- pads ---
+
+# One UAV far off, and two in the zone; C_S 30, C_C 80, 10 % per slot.
+QUEUE: dict[str, Any] = {"uavs": 3, "charge_start": 30, "charge_complete": 80, "pads": 1}
+
+
+def _wait(batteries: list[int], asked: list[int], quota: int = 440, **scenario: Any) -> int:
+    """The slots for which UAV 0 expects to wait; ``asked`` are those that have asked for a pad."""
+    space = ScenarioSpace.of(**(QUEUE | {"quota": quota} | scenario))
+    state = empty_state(1, 3, len(space.nodes))
+    state.missions[:] = constants_of(space)
+    team = state.uavs[0]
+    team["active"], team["battery"], team["pad_request"] = True, batteries, -1
+    team["quota"], team["slots_per_cell"], team["pad_request"][asked] = quota, 1, 0
+    return int(waiting_time(state.missions[0], team, 0))
+
+
+ON: dict[str, Any] = {"charging": {"measured": True}}
+
+
+@pytest.mark.parametrize(
+    ("batteries", "asked", "scenario", "slots"),
+    [
+        ([60, 30, 60], [1], {}, 0),  # the section is off
+        ([60, 30, 60], [1], ON, 5),  # 50 % at 10 % per slot
+        ([60, 70, 70], [], ON, 0),  # it comes first
+        ([60, 20, 50], [1], ON, 11),  # 60 % and, of the one in the air at C_S, 50 %
+        ([60, 20, 60], [1], ON, 6),  # on a tie the lower index, its own, comes first
+        ([60, 20, 20], [1, 2], ON | {"pads": 2}, 6),  # 120 % at 20 % per slot
+        ([60, 20, 20], [1], ON | {"pads": 3}, 0),
+        ([60, 20, 20], [1, 2], {"charging": {"power": 5}}, 24),
+        ([60, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
+        ([20, 20, 20], [0, 1], ON, 0),  # it has asked
+        ([60, 50, 50], [], ON | {"quota": 40}, 0),  # they need not charge
+    ],
+)
+def test_the_time_that_a_uav_expects_to_wait(
+    batteries: list[int], asked: list[int], scenario: dict[str, Any], slots: int
+) -> None:
+    assert _wait(batteries, asked, **scenario) == slots
+
+
+def test_the_guard_brings_uavs_home_in_time_to_wait_for_the_only_pad() -> None:
+    values = {"uavs": 3, "pads": 1, "quota": 300}
+    plain = simulate_batch(load_scenario("paper", **values), Guarded(), 7, 60)
+    aware = simulate_batch(load_scenario("paper", **values, **ON), Guarded(), 7, 60)
+    depleted = [int((records.uavs["end"] == BATTERY).sum()) for records in (plain, aware)]
+    assert depleted[1] < depleted[0] / 2
+
+
+def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
+    space = ScenarioSpace.of(**QUEUE, failures={"pad_rate": 0.1})
+    state = empty_state(1, 3, len(space.nodes))
+    state.missions[:] = constants_of(space)
+    u = state.uavs[0, 0]
+    u["battery"], u["quota"], u["slots_per_cell"] = 5, 440, 1
+    assert must_charge(state.missions[0], u, 1e6)
+    state.missions["pads_out"][0, 0] = 1
+    assert not must_charge(state.missions[0], u, 1e6)
+    state.missions["pad_repair"] = 0.5
+    assert must_charge(state.missions[0], u, 1e6)
