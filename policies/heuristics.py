@@ -35,6 +35,8 @@ _WORTH = 0.25
 # Weight of a node to which a teammate is nearer (greedy, age), and slots added to every distance.
 _SHARED = 0.3
 _SLOTS_AT_NODE = 1.0
+# Weight of the nodes that a UAV can visit after the next one (age).
+_BEYOND = 0.1
 # Cost [slots] of a step into a cell, by the result of the guard's contest for that cell.
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
@@ -104,8 +106,9 @@ class Tour(_Heuristic):
 class Age(_Heuristic):
     """Fly to the node with the highest age of information per slot of distance.
 
-    Nodes without data are not visited, since nothing newer could be collected. A node counts less
-    if a teammate is nearer to it.
+    The nodes that can be visited after it count too, with a tenth of their age per slot of distance
+    on the way over that node. Nodes without data are not visited, since nothing newer could be
+    collected. A node counts less if a teammate is nearer to it.
     """
 
     name = "age"
@@ -199,7 +202,7 @@ def _goal(
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == _AGE:
-            score = (mission.slot - sensors[k].newest) / (slots + _SLOTS_AT_NODE)
+            score = _staleness(mission, data, sensors, nodes, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, x, y, slots):
@@ -209,6 +212,22 @@ def _goal(
         if score > best:
             best, node = score, k
     return node
+
+
+@inlined
+def _staleness(mission, data, sensors, nodes, k, slots):
+    """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
+    here = beyond = 0.0
+    for other in range(mission.nodes):
+        if data[other] > 0.0:
+            further = abs(nodes[k, 0] - nodes[other, 0]) + abs(nodes[k, 1] - nodes[other, 1])
+            age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
+            score = age / (slots + further + _SLOTS_AT_NODE)
+            if other == k:
+                here = score
+            else:
+                beyond += score
+    return here + _BEYOND * beyond
 
 
 @inlined

@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 import policies
 from dess.batch import simulate_batch
+from dess.env.stepper import MissionStepper
 from dess.mission import simulate
 from dess.observations.guard import guard
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View
 from policies.registry import SHIPPED
-from tests.drawn import Checked, replications, seeds, spaces
+from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
 
 NAMES = tuple(name for name in SHIPPED if name != "random-unguarded")
 heuristics = st.sampled_from(NAMES).map(policies.load)
@@ -170,3 +171,28 @@ def test_the_best_heuristic_is_as_good_as_the_readme_says() -> None:
             assert missions["success"].mean() >= 0.99
     assert max(products.values()) >= 0.74
     assert min(products, key=lambda name: products[name]) == "random"
+
+
+def test_age_flies_to_the_stalest_node_for_the_distance() -> None:
+    # 2 cells to the north, age 30 at the end of the slot; 4 cells to the south, age 50 or 60.
+    scenario = {"grid": 16, "zone": [8, 8, 1, 1], "uavs": 1, "nodes": [[8, 6], [8, 12]]}
+    for age, data, action in ((50, 5, NORTH), (60, 5, SOUTH), (60, 0, NORTH)):
+        stepper = MissionStepper(Scenario.of(**scenario), 1, 1)
+        stepper.launch(stepper.indices)
+        state, here = stepper.state, np.zeros(1, int)
+        state.missions["slot"], state.residual[0] = 99, (5, data)
+        state.sensors["newest"][0] = 70, 100 - age
+        # 30 / 3 + 0.1 * 50 / 9 > 50 / 5 + 0.1 * 30 / 11, but 30 / 3 + ... < 60 / 5 + ...
+        (asked,) = policies.load("age").act(View(state, stepper.world, here, here))
+        assert asked == action
+
+
+def test_age_lowers_the_mean_age_of_information_against_greedy() -> None:
+    paper = load_scenario("paper", **{"age.measured": True})
+    for space in (paper, ScenarioSpace.of(paper, quota=1600)):  # some 110 and 440 slots
+        age, greedy = (
+            simulate_batch(space, policies.load(name), 5, 200).operations["age"]
+            for name in ("age", "greedy")
+        )
+        lower = greedy - age
+        assert lower.mean() > 3 * lower.std() / np.sqrt(len(lower))
