@@ -23,6 +23,7 @@ from analysis.results.tables import Results
 from analysis.stats.intervals import summary
 from dess import InputError
 from dess.scenario import SAMPLED, Scenario
+from dess.sections.fleet import types_of
 from policies.registry import check_no_files
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
@@ -210,11 +211,14 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
 
 
 def _uavs(mission: LoggedMission) -> pd.DataFrame:
-    uavs = mission.uavs
+    uavs, scenario = mission.uavs, mission.scenario
+    quotas = types_of(scenario.fleet, scenario.quota, scenario.uavs)["quota"][uavs["uav"]]
     columns = {
-        "UAVs": mission.scenario.uavs,
+        "UAVs": scenario.uavs,
         "UAV": uavs["uav"] + 1,
-        "Communications": [f"{filled} of {mission.scenario.quota}" for filled in uavs["quota"]],
+        "Communications": [
+            f"{n} of {quota}" for n, quota in zip(uavs["quota"], quotas, strict=True)
+        ],
         "Data collected": uavs["collected"].map("{:.1f}".format),
         "Slots flying": uavs["slots_flying"],
         "Slots charging": uavs["slots_charging"],
