@@ -59,6 +59,7 @@ MEASURES = {
     "latency_p99": Measure("99th percentile of the latency", _SLOTS),
     "generated": Measure("Packets generated", less_is_better=False),
     "delivered": Measure("Packets delivered", less_is_better=False),
+    "lost_packets": Measure("Packets lost"),
     "lost": Measure("Data lost", "data units"),
     "queue": Measure("UAVs waiting for a pad"),
     "waiting": Measure("Waiting time for a pad", _SLOTS),

@@ -1,0 +1,105 @@
+"""Changes from a reference value, and the answers that are made of them, on planted values."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis import run_study
+from analysis.names import AGE, PRODUCT
+from analysis.questions.operations import answers, effects
+from analysis.stats.paired import relative_change
+from dess import InputError
+from tests.analysis.small import grid, small_study
+
+
+def planted(results, metric, value):
+    """The results with the values that a function gives to every row of missions."""
+    values = results.missions.apply(value, axis="columns")
+    return replace(results, missions=results.missions.assign(**{metric: values}))
+
+
+@pytest.fixture(scope="module")
+def pads(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pads")
+    study = small_study(folder, policies=["greedy"], missions=40,
+                        design=grid(uavs=[2, 4], pads=[1, 2, 3, 4]))  # fmt: skip
+    return run_study(study, folder / "out")
+
+
+def test_a_change_is_the_paired_difference_from_the_same_setting(pads):
+    shifted = planted(pads, PRODUCT, lambda row: 0.5 + 0.001 * row["replication"]
+                      - 0.1 * (row["pads"] == 1) - 0.2 * (row["uavs"] == 4))  # fmt: skip
+    table = effects.changes(shifted, "pads", 4, PRODUCT).set_index(["uavs", "pads"])
+    assert len(table) == 6  # the reference has no row
+    for uavs in (2, 4):
+        assert table.loc[(uavs, 1), "mean"] == pytest.approx(-0.1)
+        assert table.loc[(uavs, 3), "mean"] == 0
+        assert table.loc[(uavs, 1), "n"] == 40
+    with pytest.raises(InputError, match="pads: is never 9"):
+        effects.changes(pads, "pads", 9, PRODUCT)
+
+
+def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
+    def value(row):
+        # Two UAVs need two pads. Four need four: three are worse, although two seem to be enough.
+        short = row["pads"] < 2 if row["uavs"] == 2 else row["pads"] in (1, 3)
+        return 0.9 - 0.3 * short
+
+    found = answers.enough_pads(planted(pads, PRODUCT, value), 0.05)
+    assert found[["uavs", "pads"]].to_numpy().tolist() == [[2, 2], [4, 4]]
+    assert found["mean"].tolist() == pytest.approx([-0.3, -0.3])
+    text = answers.pads(planted(pads, PRODUCT, value), 0.05)
+    assert text.startswith("**Charging pads: 2 UAVs need 2 and 4 UAVs need 4**")
+
+
+def test_one_pad_may_be_enough(pads):
+    found = answers.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.05)
+    assert found["pads"].tolist() == [1, 1]
+    assert found["mean"].isna().all()
+    assert "next smaller" not in answers.pads(planted(pads, PRODUCT, lambda row: 0.9), 0.05)
+
+
+def test_a_relative_change_is_that_of_the_means():
+    reference = np.array([100.0, 110.0, 90.0, 100.0])
+    assert relative_change(0.5 * reference, reference) == pytest.approx((-0.5, -0.5, -0.5))
+    values = np.array([60.0, 50.0, 45.0, 45.0])
+    change = relative_change(values, reference)
+    assert change.mean == pytest.approx(-0.5)
+    # By hand: residuals 10, -5, 0, -5, so their deviation is sqrt(50); t has 3 degrees of freedom.
+    half = 3.182446 * np.sqrt(50) / 2 / 100
+    assert (change.mean - change.low, change.high - change.mean) == pytest.approx((half, half))
+
+
+def test_a_relative_change_covers_the_true_one():
+    generator, covered = np.random.default_rng(3), 0
+    for _ in range(400):
+        common = generator.normal(100, 20, 60)
+        low, high = relative_change(0.6 * common + generator.normal(0, 5, 60), common)[1:]
+        covered += low <= -0.4 <= high
+    assert 0.91 < covered / 400 < 0.985
+
+
+def test_the_age_is_compared_with_the_published_effect(tmp_path):
+    study = small_study(tmp_path, policies=["greedy"], missions=5, set={"age.measured": True},
+                        design=grid(uavs=[1, 2, 3], arrival_rate=[0.1, 0.5]))  # fmt: skip
+    results = run_study(study, tmp_path / "out")
+    halved = planted(results, AGE, lambda row: (80 + row["replication"]) / row["uavs"])
+    table = answers.age_changes(halved)
+    assert table["mean"].tolist() == pytest.approx([-1 / 2, -1 / 2, -2 / 3, -2 / 3])
+    assert table["published"].dropna().tolist() == [-0.46, -0.46]
+    assert "from one to 2 UAVs by −50.0 % [−50.0, −50.0]" in answers.age(halved)
+    assert "arrival rate 0.5). Published for another model: −46 %." in answers.age(halved)
+
+
+def test_failures_are_compared_with_none(tmp_path):
+    fields = {"uavs": [2], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
+    study = small_study(tmp_path, policies=["greedy"], missions=5, design=grid(**fields))
+    results = run_study(study, tmp_path / "out")
+    fallen = planted(results, PRODUCT, lambda row: 0.8 - 30 * row["failures.uav_rate"]
+                     / (1 + row["failures.uav_repair"]) + 0.01 * row["replication"])  # fmt: skip
+    text = answers.failures(fallen)
+    assert (
+        "with probability 0.01 changes the product of 2 UAVs by −30.0 [−30.0, −30.0] points" in text
+    )
+    assert "if it is lost and by −5.0 [−5.0, −5.0] points if it is repaired in 5 slots" in text

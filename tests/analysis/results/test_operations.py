@@ -1,0 +1,133 @@
+"""What extended scenarios measure is stored, loaded, compared and simulated again."""
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis import load_results, run_study, summary
+from analysis.execution.evaluation import means
+from analysis.names import MEASURES, measured_in
+from analysis.questions import settings
+from analysis.questions.diff import diff
+from analysis.results.resimulate import difference, recorded, resimulate
+from analysis.stats.intervals import interval_of
+from analysis.stats.paired import compare
+from dess import load_scenario, simulate_batch
+from dess.record import OPERATIONS
+from policies import load
+from tests.analysis.small import files_of, grid, small_study
+
+MEASURED = {"charging.measured": True, "age.measured": True}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Missions of one and of two pads; with a failure rate of 0 too."""
+    folder = tmp_path_factory.mktemp("measured")
+    design = grid(**{"pads": [1, 2], "failures.uav_rate": [0.0, 0.01]})
+    return run_study(small_study(folder, set=MEASURED, design=design), folder / "out")
+
+
+def test_every_column_has_a_name_and_a_unit():
+    assert {*MEASURES} == {*OPERATIONS.names}
+
+
+def test_stored_values_are_those_of_the_engine(results):
+    for point in range(4):
+        rows = results.missions.query("policy == 'greedy' and point == @point")
+        records = simulate_batch(results.scenario(point), load("greedy"), 7, rows["replication"])
+        for name in measured_in(results.missions):
+            np.testing.assert_array_equal(rows[name], records.operations[name])
+    assert {"age", "queue", "utilisation", "failures"} <= {*measured_in(results.missions)}
+
+
+def test_a_mission_that_measures_nothing_has_nan(results):
+    at = results.missions.groupby("failures.uav_rate")["failures"]
+    assert at.apply(lambda values: values.isna().all()).tolist() == [True, False]
+
+
+def test_loaded_results_are_the_same_and_none_counts_as_damaged(results):
+    again = load_results(results.store.folder)
+    assert again.store.damaged == []
+    assert again.missions.equals(results.missions)
+    assert diff(results, again).identical
+
+
+def test_a_plain_study_stores_no_column_of_them(tmp_path):
+    plain = run_study(small_study(tmp_path), tmp_path / "out")
+    assert measured_in(plain.missions) == []
+    assert all(len(t.missions.schema) == 17 for t in plain.store._tables.values())
+
+
+def test_a_resumed_study_and_one_that_takes_over_missions_have_them(tmp_path, results):
+    design = grid(**{"pads": [1, 2], "failures.uav_rate": [0.0, 0.01]})
+    more = small_study(tmp_path, set=MEASURED, design=design, missions=13, name="more")
+    taken = run_study(more, tmp_path / "taken", reuse=[results.store.folder])
+    fresh = run_study(more, tmp_path / "fresh")
+    assert taken.missions.equals(fresh.missions)
+
+
+def test_a_mission_is_simulated_again_with_what_it_measured(results):
+    mission = resimulate(results, "greedy", 1, 3)
+    fields = recorded(results, "greedy", 1, 3)
+    assert fields["age"] == mission.record.age
+    assert not any(isinstance(v, float) and math.isnan(v) for v in fields.values())
+    assert "age is 1.0 and" in difference(mission.record, fields | {"age": 1.0})
+    without = {name: value for name, value in fields.items() if name != "age"}
+    assert "age is None and" in difference(mission.record, without)
+
+
+def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results):
+    missions = results.missions.copy()
+    missions.loc[missions["replication"] == 2, "waiting"] = np.nan
+    rows = summary(missions, by=["policy", "point"]).set_index(["policy", "point", "metric"])
+    mine = missions.query("policy == 'random' and point == 1")["waiting"].dropna()
+    row = rows.loc["random", 1, "waiting"]
+    assert row["n"] == len(mine) == 9
+    assert tuple(row[["mean", "low", "high"]]) == tuple(interval_of("waiting", mine))
+    assert ("greedy", 0, "failures") not in rows.index  # nothing can fail there
+    table = compare(missions[missions["point"] == 1], "greedy", ["waiting"])
+    assert table["n"].tolist() == [9]
+
+
+def test_less_age_ranks_first(results):
+    table = settings.ranked(results, "age")
+    assert table["age"].is_monotonic_increasing
+    assert table["tied"].iloc[0]
+
+
+def test_evaluations_have_them_beside_the_metrics_of_the_paper():
+    space = load_scenario("paper", quota=30, **MEASURED)
+    found = means(space, "greedy", 20, 5)
+    records = simulate_batch(space, load("greedy"), 5, 20).operations
+    for name in ("age", "peak_age", "utilisation"):
+        assert found.moments[name].interval(name) == interval_of(name, records[name])
+    assert "latency" not in found.moments
+    assert not {*means(load_scenario("paper", quota=30), "greedy", 5).moments} & {*MEASURES}
+
+
+def test_tables_of_sections_are_fields_of_a_study(tmp_path):
+    nested = small_study(tmp_path, set={"charging": {"measured": True}},
+                         design=grid(failures={"uav_rate": [0.0, 0.01]}))  # fmt: skip
+    plain = small_study(tmp_path, set={"charging.measured": True},
+                        design=grid(**{"failures.uav_rate": [0.0, 0.01]}))  # fmt: skip
+    assert nested.model_dump() == plain.model_dump()
+    assert [p.scenario.failures.uav_rate for p in nested.points] == [0.0, 0.01]
+    assert all(point.scenario.charging.measured for point in nested.points)
+
+
+def test_points_that_do_not_set_a_section_have_its_default(tmp_path):
+    rows = [{"pads": 1}, {"failures.uav_rate": 0.01}, {"fleet": [{"slots_per_cell": 2}]}]
+    study = small_study(tmp_path, design={"kind": "table", "rows": rows}, missions=2)
+    table = settings.points(run_study(study, tmp_path / "out"))
+    assert table["failures.uav_rate"].tolist() == [0.0, 0.01, 0.0]
+    assert table["fleet"].tolist()[:2] == ["none", "none"]
+    assert "slots_per_cell 2" in table["fleet"][2]
+
+
+def test_workers_change_no_file(tmp_path):
+    study = small_study(tmp_path, set=MEASURED, design=grid(**{"failures.uav_rate": [0.0, 0.01]}))
+    run_study(study, tmp_path / "one")
+    run_study(study, tmp_path / "two", workers=2)
+    assert files_of(tmp_path / "one") == files_of(tmp_path / "two")
