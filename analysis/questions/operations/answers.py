@@ -74,20 +74,20 @@ def age_changes(results: Results) -> pd.DataFrame:
 
 
 def age(results: Results) -> str:
-    """How the average age falls with the fleet, by the first policy and the highest rate."""
-    table = age_changes(results)
-    rate = table["arrival_rate"].max()
-    rows = table[(table["policy"] == results.policies[0]) & (table["arrival_rate"] == rate)]
-    rows = rows.dropna(subset=["published"])
-    parts = [
-        f"from one to {row.uavs} UAVs by {relative(row.mean, row.low, row.high)}"
-        for row in rows.itertuples()
-    ]
-    printed = numbers.words([f"{numbers.minus(f'{100 * of:+.0f}')} %" for of in rows["published"]])
+    """How the average age falls with the fleet, at every arrival rate, by the first policy."""
+    table = age_changes(results).dropna(subset=["published"])
+    table = table[table["policy"] == results.policies[0]]
+    parts = []
+    for uavs, rows in table.groupby("uavs"):
+        at_rates = [
+            f"{relative(row.mean, row.low, row.high)} (arrival rate {value_text(row.arrival_rate)})"
+            for row in rows.itertuples()
+        ]
+        parts.append(f"from one to {uavs} UAVs by {numbers.words(at_rates)}")
+    printed = [f"{numbers.minus(f'{100 * PUBLISHED[n]:+.0f}')} %" for n in table["uavs"].unique()]
     return (
-        f"**The average age of information changes {numbers.words(parts)}** (policy "
-        f"`{results.policies[0]}`, arrival rate {value_text(rate)}). Published for another model: "
-        f"{printed}."
+        f"**The average age of information changes {'; '.join(parts)}** (policy "
+        f"`{results.policies[0]}`). Published for another model: {numbers.words(printed)}."
     )
 
 
@@ -112,7 +112,7 @@ def failures(results: Results) -> str:
     )
     return (
         f"**A UAV that fails in a mission slot with probability {value_text(rate)} changes the "
-        f"product of {fleet:.0f} UAVs {numbers.words(parts)}** "
+        f"product of {fleet} UAVs {numbers.words(parts)}** "
         f"(policy `{results.policies[0]}`).{rest}"
     )
 

@@ -70,7 +70,8 @@ def changes(
             else:
                 tests = column_tests(both[[point]], both[partner], metric)
                 change = tests[["difference", "low", "high"]].iloc[0]
-            rows.append((policy, *table.loc[point], *change, len(both)))
+            fields = (column[point] for _, column in table.items())
+            rows.append((policy, *fields, *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, "mean", "low", "high", "n"])
 
 

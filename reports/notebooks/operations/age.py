@@ -40,7 +40,8 @@ html.say("{answer}", answer=html.composed(answers.age(study)))
 # ## What was simulated
 #
 # The fleet keeps watch: no UAV can fill its quota, so every mission lasts to its last slot, and
-# UAVs collect, charge and collect again. The rest is the paper's scenario with 25 nodes. The age of
+# UAVs collect, charge and collect again. The charging zone is in the middle of the grid, so that a
+# battery is enough for every node. The rest is the paper's scenario with 25 nodes. The age of
 # a node is the time since it was last emptied (it is 0 at the start of the mission), and the age of
 # a mission is its mean over time and nodes, exact from the areas under the sawtooth. The peak age
 # is the mean of the ages just before they fall. A node that no UAV empties has no peak, but a
@@ -67,9 +68,8 @@ html.gallery(
 #
 # Mathematics 13(21) 3564 reports for another model of UAVs that collect data that the average age
 # falls by 46 % from one to two UAVs, and by 79 % from one to ten. The comparison is of the size of
-# the effect only: scenario, channel and trajectories differ. More UAVs are no gain where they get
-# into each other's way at the single charging zone, and where the policy chooses nodes by their
-# data: it leaves far nodes aside, whose age then dominates the mean.
+# the effect only: scenario, channel and trajectories differ. `greedy` chooses nodes by their data for
+# the distance, `age` by their age for the distance.
 
 # %%
 change = answers.age_changes(study)

@@ -46,18 +46,18 @@ def test_the_fewest_pads_with_which_and_above_which_little_is_lost(pads):
         short = row["pads"] < 2 if row["uavs"] == 2 else row["pads"] in (1, 3)
         return 0.9 - 0.3 * short
 
-    found = answers.enough_pads(planted(pads, PRODUCT, value), 0.05)
+    found = answers.enough_pads(planted(pads, PRODUCT, value), 0.1)
     assert found[["uavs", "pads"]].to_numpy().tolist() == [[2, 2], [4, 4]]
     assert found["mean"].tolist() == pytest.approx([-0.3, -0.3])
-    text = answers.pads(planted(pads, PRODUCT, value), 0.05)
+    text = answers.pads(planted(pads, PRODUCT, value), 0.1)
     assert text.startswith("**Charging pads: 2 UAVs need 2 and 4 UAVs need 4**")
 
 
 def test_one_pad_may_be_enough(pads):
-    found = answers.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.05)
+    found = answers.enough_pads(planted(pads, PRODUCT, lambda row: 0.9), 0.1)
     assert found["pads"].tolist() == [1, 1]
     assert found["mean"].isna().all()
-    assert "next smaller" not in answers.pads(planted(pads, PRODUCT, lambda row: 0.9), 0.05)
+    assert "next smaller" not in answers.pads(planted(pads, PRODUCT, lambda row: 0.9), 0.1)
 
 
 def test_a_relative_change_is_that_of_the_means():
@@ -86,20 +86,20 @@ def test_the_age_is_compared_with_the_published_effect(tmp_path):
     results = run_study(study, tmp_path / "out")
     halved = planted(results, AGE, lambda row: (80 + row["replication"]) / row["uavs"])
     table = answers.age_changes(halved)
-    assert table["mean"].tolist() == pytest.approx([-1 / 2, -1 / 2, -2 / 3, -2 / 3])
+    assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
     assert table["published"].dropna().tolist() == [-0.46, -0.46]
-    assert "from one to 2 UAVs by −50.0 % [−50.0, −50.0]" in answers.age(halved)
-    assert "arrival rate 0.5). Published for another model: −46 %." in answers.age(halved)
+    text = answers.age(halved)
+    assert "from one to 2 UAVs by −50.0 % [−50.0, −50.0] (arrival rate 0.1) and −50.0 %" in text
+    assert "Published for another model: −46 %." in text
 
 
 def test_failures_are_compared_with_none(tmp_path):
-    fields = {"uavs": [2], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
+    fields = {"uavs": [2, 3], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
     study = small_study(tmp_path, policies=["greedy"], missions=5, design=grid(**fields))
     results = run_study(study, tmp_path / "out")
-    fallen = planted(results, PRODUCT, lambda row: 0.8 - 30 * row["failures.uav_rate"]
-                     / (1 + row["failures.uav_repair"]) + 0.01 * row["replication"])  # fmt: skip
+    fallen = planted(results, PRODUCT, lambda row: 0.5 + 0.001 * row["replication"]
+                     - 30 * row["failures.uav_rate"] / (1 + row["failures.uav_repair"]))  # fmt: skip
     text = answers.failures(fallen)
-    assert (
-        "with probability 0.01 changes the product of 2 UAVs by −30.0 [−30.0, −30.0] points" in text
-    )
-    assert "if it is lost and by −5.0 [−5.0, −5.0] points if it is repaired in 5 slots" in text
+    assert "with probability 0.01 changes the product of 2 UAVs by −30.0 [" in text
+    assert "points if it is lost and by −5.0 [" in text
+    assert "points if it is repaired in 5 slots" in text
