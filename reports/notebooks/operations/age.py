@@ -68,8 +68,8 @@ html.gallery(
 #
 # Mathematics 13(21) 3564 reports for another model of UAVs that collect data that the average age
 # falls by 46 % from one to two UAVs, and by 79 % from one to ten. The comparison is of the size of
-# the effect only: scenario, channel and trajectories differ. `greedy` chooses nodes by their data for
-# the distance, `age` by their age for the distance.
+# the effect only: scenario, channel and trajectories differ. `greedy` chooses nodes by their data
+# for the distance, `age` by their age for the distance.
 
 # %%
 change = answers.age_changes(study)

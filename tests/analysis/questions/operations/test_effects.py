@@ -97,8 +97,12 @@ def test_failures_are_compared_with_none(tmp_path):
     fields = {"uavs": [2, 3], "failures.uav_rate": [0.0, 0.01], "failures.uav_repair": [0.0, 5.0]}
     study = small_study(tmp_path, policies=["greedy"], missions=5, design=grid(**fields))
     results = run_study(study, tmp_path / "out")
-    fallen = planted(results, PRODUCT, lambda row: 0.5 + 0.001 * row["replication"]
-                     - 30 * row["failures.uav_rate"] / (1 + row["failures.uav_repair"]))  # fmt: skip
+
+    def value(row):
+        lost = 30 * row["failures.uav_rate"] / (1 + row["failures.uav_repair"])
+        return 0.5 + 0.001 * row["replication"] - lost
+
+    fallen = planted(results, PRODUCT, value)
     text = answers.failures(fallen)
     assert "with probability 0.01 changes the product of 2 UAVs by −30.0 [" in text
     assert "points if it is lost and by −5.0 [" in text
