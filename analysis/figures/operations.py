@@ -38,3 +38,29 @@ def against(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | Non
         title = parameter(line).label
         figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
     return figure
+
+
+def queue(rows: pd.DataFrame) -> Figure:
+    """The number of UAVs that wait for a pad over time: a panel per fleet, a band per pads.
+
+    Args:
+        rows: Rows of ``operations.queue.over_time``.
+    """
+    fleets = [*rows.groupby("uavs")]
+    looks = graded(sorted(rows["pads"].unique()))
+    with style.look():
+        figure, axes = style.panels(1.9 * len(fleets) + 0.9, len(fleets), "y", sharex=True,
+                                    squeeze=False)  # fmt: skip
+        for ax, (uavs, part) in zip(axes.flat, fleets, strict=True):
+            for pads, line in part.groupby("pads"):
+                colour = looks[value_text(pads)][0]
+                ax.fill_between(line["slot"], line["low"], line["high"], step="post", color=colour,
+                                alpha=0.25, linewidth=0)  # fmt: skip
+                ax.plot(line["slot"], line["mean"], color=colour, label=value_text(pads))
+            ax.set(title=f"UAVs that wait for a pad: {uavs} UAVs", ylim=(0, None))
+            style.round_ticks(ax.yaxis, 4)
+        axes.flat[-1].set_xlabel("mission slot")
+        handles = {h.get_label(): h for ax in axes.flat for h in ax.get_lines()}
+        figure.legend(handles.values(), handles, loc="outside lower center", ncols=4,
+                      title=parameter("pads").label)  # fmt: skip
+    return figure

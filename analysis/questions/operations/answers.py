@@ -45,6 +45,18 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["policy", "uavs", "pads", "mean", "low", "high"])
 
 
+def short_of_pads(results: Results, margin: float) -> list[int]:
+    """The design points with one pad, and with one pad less than is enough, for every fleet."""
+    table, found = settings.points(results), enough_pads(results, margin)
+    rows = found[found["policy"] == results.policies[0]]
+    shown = {
+        (row.uavs, max((p for p in table["pads"] if p < row.pads), default=1))
+        for row in rows.itertuples()
+    }
+    shown |= {(uavs, table["pads"].min()) for uavs in rows["uavs"]}
+    return [n for n, row in table.iterrows() if (row["uavs"], row["pads"]) in shown]
+
+
 def pads(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
     found = enough_pads(results, margin)

@@ -25,7 +25,7 @@ from IPython.display import display
 
 from analysis import load_results, names, numbers
 from analysis.figures import operations as figures
-from analysis.questions.operations import answers, effects
+from analysis.questions.operations import answers, effects, queue
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -90,6 +90,23 @@ html.gallery(
         )
         for metric in uses
     ]
+)
+
+# %% [markdown]
+# ### The queue over time
+#
+# All UAVs take off together, so their batteries reach the charging threshold at about the same time
+# and the queue comes in a wave. The first pads of every fleet, and one pad fewer than is enough:
+
+# %%
+waves = queue.over_time(study, study.policies[0], answers.short_of_pads(study, margin))
+low, high = map(numbers.level, queue.BAND)
+html.figure(
+    figures.queue(waves),
+    "The number of UAVs that wait for a pad over the slots of the mission",
+    f"The line is the mean of n = {waves['n'].min()} missions, the band has the missions between "
+    f"the {low} and the {high} quantile. A mission that is over has no queue.",
+    waves,
 )
 
 # %%
