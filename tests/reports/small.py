@@ -39,6 +39,26 @@ STUDIES: dict[str, dict[str, Any]] = {
         "selection": RULE,
         "design": {"kind": "grid", "values": {"uavs": [1, 3], "initial_data": [[5, 7.5], 10]}},
     },
+    "pads": {
+        "missions": 8,
+        "logged": 2,
+        "design": {"kind": "grid", "values": {"uavs": [2, 4], "pads": [1, 2, 4]}},
+    },
+    "age": {
+        "missions": 4,
+        "design": {"kind": "grid", "values": {"uavs": [1, 2], "arrival_rate": [0.1, 0.5]}},
+    },
+    "failures": {
+        "missions": 8,
+        "design": {
+            "kind": "grid",
+            "values": {
+                "uavs": [2, 3],
+                "failures.uav_rate": [0.0, 0.01],
+                "failures.uav_repair": [0.0, 20.0],
+            },
+        },
+    },
     "sensitivity": {
         "policies": ["greedy"],
         "design": {
