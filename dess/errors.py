@@ -109,7 +109,7 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if kind == "missing" and is_whole:
         return f"{place}: is missing; allowed: {field.description}"
     if kind == "literal_error" and is_whole:
-        return f"{place}: {shown(value)} is unknown{one_of(value, _choices(field))}"
+        return f"{place}: {shown(value)} is unknown{one_of(value, choices_of(field))}"
     problems = {kind: "is out of range" for kind in _OUT_OF_RANGE if is_whole}
     problems |= {kind: f"is not {kind_of(field)}" for kind in _OTHER_TYPE if is_whole}
     problems |= {kind: "has the wrong form" for kind in _WRONG_FORM}
@@ -120,7 +120,7 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
 
 def form_of(field: "FieldInfo") -> str:
     """What the value of a field of a model may be, in words, such as ``a number 0..100``."""
-    if choices := _choices(field):
+    if choices := choices_of(field):
         return ", ".join(choices)
     kind = kind_of(field)
     if kind == _WORDS[bool]:
@@ -137,7 +137,8 @@ def kind_of(field: "FieldInfo") -> str:
     return _WORDS.get(kinds[0], "") if len(kinds) == 1 else ""
 
 
-def _choices(field: "FieldInfo") -> list[str]:
+def choices_of(field: "FieldInfo") -> list[str]:
+    """The words that the value of a field may be; empty if it is no choice of words."""
     is_choice = get_origin(field.annotation) is Literal
     return [*map(str, get_args(field.annotation))] if is_choice else []
 

@@ -12,7 +12,7 @@ from decimal import Decimal, InvalidOperation
 from typing import Any
 
 from dess.errors import InputError, one_of
-from reports.cli.settings import check_words, setting
+from reports.cli.settings import check_words, choices, setting
 
 ALLOWED = (
     "a field of the scenario and its values: 2..5, 0.01..0.05:5 (five values), or 1,2,4 in TOML "
@@ -58,9 +58,11 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     try:
         listed = setting(f"{field}=[{values}]" if equals else text)[1]
     except InputError:
-        for word in filter(str.isidentifier, map(str.strip, values.split(","))):
-            check_words(field, word)
-        raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
+        listed = [word.strip() for word in values.split(",")]
+        if unknown := [word for word in listed if word not in choices(field)]:
+            for word in filter(str.isidentifier, unknown):
+                check_words(field, word)
+            raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
     return field, distinct(field, listed)
 
 

@@ -75,10 +75,21 @@ def setting(text: str, option: str = SET, allowed: str = FIELD) -> tuple[str, An
     except InputError:
         parsed = {}
     if not equals or parsed.keys() != {"value"} or not _is_plain(parsed["value"]):
+        if option == SET and value.strip() in choices(key.strip()):
+            return key.strip(), value.strip()
         if option == SET and value.strip():
             check_words(key.strip(), value.strip())
         raise InputError(f"{option}: {shown(text)} is not KEY=VALUE; allowed: {allowed}")
     return key.strip(), parsed["value"]
+
+
+def choices(field: str) -> list[str]:
+    """The words that a field of a scenario may be, which need no quotes; empty for all others."""
+    from dess.errors import choices_of
+    from dess.scenario import ScenarioSpace, fields_of
+
+    known = fields_of(ScenarioSpace).get(field)
+    return choices_of(known) if known is not None else []
 
 
 def check_words(field: str, value: str) -> None:
@@ -94,6 +105,8 @@ def check_words(field: str, value: str) -> None:
     if field not in fields:
         raise InputError(f"{SET}: {field}: unknown key{one_of(field, fields)}")
     known = fields[field]
+    if words := choices(field):
+        raise InputError(f"{SET}: {field}: {shown(value)} is unknown{one_of(value, words)}")
     problem = f"is not {kind_of(known)}" if kind_of(known) else "has the wrong form"
     raise InputError(f"{SET}: {field}: {shown(value)} {problem}; allowed: {form_of(known)}")
 

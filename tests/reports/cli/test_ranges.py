@@ -20,6 +20,8 @@ VALUES = {
     "initial_data=5, 20": (5, 20),
     "initial_data=[5, 10],[10, 20]": ([5, 10], [10, 20]),
     "forbid_swaps=false,true": (False, True),
+    "arrivals.service=newest, oldest": ("newest", "oldest"),
+    "arrivals.process=continuous": ("continuous",),
 }
 
 
@@ -34,6 +36,7 @@ def test_values(text):
 REFUSED = {
     "uavs": "'uavs' is not KEY=VALUES; allowed: a field",
     "uavs=": "uavs: has no values",
+    "arrivals.service=oldest,newst": "arrivals.service: 'newst' is unknown",
     "uavs=2,,3": "'uavs=2,,3' is not KEY=VALUES",
     "uavs=two": "--set: uavs: 'two' has the wrong form; allowed: an integer or [low, high]",
     "uavs=1]\nquota=[2": "is not KEY=VALUES",

@@ -121,6 +121,19 @@ def test_set_takes_toml_values(dess_json):
     assert mission["initial"] == 10.0
 
 
+def test_packets_in_continuous_time_are_measured_and_printed(dess, dess_json, tmp_path):
+    setting = ("--set", "arrivals.process=continuous", "--set", "age.measured=true")
+    operations = dess_json("simulate", "--scenario", "small.toml", *setting)["operations"]
+    assert operations["generated"] > operations["delivered"] > 0
+    files = ("--events", "log.parquet", "--figure", "mission.png", "--animation", "mission.html")
+    code, printed, _ = dess("simulate", "--scenario", "small.toml", *setting, *files)
+    assert code == 0
+    assert "Packets lost" in printed and "Latency [mission slots]" in printed
+    events = pq.read_table(tmp_path / "log.parquet")["event"].to_pylist()
+    assert events.count("delivery") == operations["delivered"]
+    assert (tmp_path / "mission.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_the_event_log_and_the_figure(dess, tmp_path):
     files = ("--events", "log.parquet", "--figure", "mission.png")
     code, *_ = dess("simulate", "--scenario", "small.toml", *files)
