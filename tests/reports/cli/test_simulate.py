@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis import load_results
+from dess.record import EventLog
 from tests.analysis.small import files_of
 
 SIMULATE_KEYS = [
@@ -139,7 +140,7 @@ def test_the_event_log_and_the_figure(dess, tmp_path):
     code, *_ = dess("simulate", "--scenario", "small.toml", *files)
     assert code == 0
     log = pq.read_table(tmp_path / "log.parquet")
-    assert log.column_names == ["time", "event", "uav", "node", "value", "x", "y"]
+    assert log.column_names == [*EventLog().columns()]
     assert {"mission_start", "move", "communication", "mission_end"} <= set(
         log["event"].to_pylist()
     )
