@@ -30,9 +30,11 @@ def against(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | Non
         for ax, (value, part) in zip(axes.flat, panels, strict=True):
             looks = graded(sorted(rows[line].unique()))
             curves(part.assign(policy=part[line].map(value_text)), x, looks, values, ax)
-            where = f": {parameter(panel).within} {value_text(value)}" if panel else ""
-            ax.set(title=f"{metric_label(metric)}{where}")
+            about = parameter(str(panel))
+            name = "" if panel in (None, "policy") else f"{about.name} "
+            ax.set_title(f"{name}{value_text(value)}".strip(), fontsize=10, fontweight="normal")
             of_metric(ax.yaxis, metric)
+        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(parameter(x).label)
         handles = axes.flat[0].get_legend_handles_labels()
         title = parameter(line).label
