@@ -50,10 +50,11 @@ def meeting(means: pd.DataFrame, targets: Mapping[str, float]) -> pd.DataFrame:
 
     Args:
         means: Rows of ``means``.
-        targets: Metric -> the least mean.
+        targets: Metric -> the least mean, or the largest of a metric of which less is better.
     """
-    for metric, least in targets.items():
-        passed = means[(means["metric"] == metric) & (means["low"] >= least)]
+    for metric, end in targets.items():
+        met = means["high"] <= end if metric in LESS_IS_BETTER else means["low"] >= end
+        passed = means[(means["metric"] == metric) & met]
         means = means.merge(passed[["policy", "point"]])
     return means
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from analysis.results.tables import Results
 
-TARGET = "a metric and its least mean, such as success=0.99"
+TARGET = "a metric and its least mean, such as success=0.99, or its largest, such as age=40"
 
 
 def show(
@@ -74,14 +74,18 @@ def show(
 
 
 def _targets(texts: Iterable[str]) -> dict[str, float]:
-    """Metric -> the least mean."""
-    from analysis.names import ALIASES, METRICS
+    """Metric -> the least mean, or the largest of a metric of which less is better."""
+    from analysis.names import ALIASES, MEASURES, METRICS
 
     targets = {}
     for name, share in all_settings(texts, "--target", TARGET).items():
-        if (metric := ALIASES.get(name, name)) not in METRICS:
-            raise InputError(f"--target: {name!r} is unknown{one_of(name, [*METRICS, *ALIASES])}")
-        if isinstance(share, bool) or not isinstance(share, int | float) or not 0 <= share <= 1:
+        if (metric := ALIASES.get(name, name)) not in METRICS | MEASURES:
+            known = one_of(name, [*METRICS, *ALIASES, *MEASURES])
+            raise InputError(f"--target: {name!r} is unknown{known}")
+        is_number = isinstance(share, int | float) and not isinstance(share, bool)
+        if metric in MEASURES and not (is_number and share >= 0):
+            raise InputError(f"--target: {name}: {share!r} is not allowed; allowed: 0 or more")
+        if metric in METRICS and not (is_number and 0 <= share <= 1):
             raise InputError(f"--target: {name}: {share!r} is not a share; allowed: 0..1")
         if metric in targets:
             raise InputError(f"--target: {metric} is given twice; allowed: once")

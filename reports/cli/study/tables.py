@@ -8,6 +8,7 @@ import pandas as pd
 from analysis import numbers
 from analysis.names import (
     COST,
+    LESS_IS_BETTER,
     MEASURES,
     PRODUCT,
     RATIO,
@@ -15,6 +16,7 @@ from analysis.names import (
     SUCCESS,
     measured_in,
     metric_label,
+    metric_name,
 )
 from analysis.questions import costs, summary
 from analysis.questions.head_to_head import new_training
@@ -154,11 +156,15 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
         targets: Metric -> the least mean.
     """
     points, policies = settings(results), len(results.policies)
-    asked = [f"{SHORT_METRICS[metric]} of {least:g} or more" for metric, least in targets.items()]
+    asked = [
+        f"{SHORT_METRICS.get(metric) or metric_name(metric).lower()} of {end:g} or "
+        + ("less" if metric in LESS_IS_BETTER else "more")
+        for metric, end in targets.items()
+    ]
     product = means[means["metric"] == PRODUCT].set_index(["policy", "point"])
     count = f"{len(product):,} of {len(points) * policies:,}"
     meet = "meets" if len(product) == 1 else "meet"
-    console.say(f"{count} settings {meet} {numbers.words(asked)}, by the lower end of the interval")
+    console.say(f"{count} settings {meet} {numbers.words(asked)}, by the whole interval")
     if product.empty:
         return
     cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], ["policy", "point"])

@@ -65,7 +65,7 @@ def test_targets_leave_what_meets_them_by_the_lower_end(shown, dess_json):
 def test_no_setting_may_meet_a_target(shown, dess_json):
     asked = ("study", "show", "out", "--target", "success=1")
     assert shown(*asked) == (
-        0, "0 of 8 settings meet success of 1 or more, by the lower end of the interval\n", ""
+        0, "0 of 8 settings meet success of 1 or more, by the whole interval\n", ""
     )  # fmt: skip
     assert dess_json(*asked)["means"] == []
 
