@@ -6,6 +6,7 @@ state.uavs[0, 0]["battery"], state.residual[0]
 """
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from operator import index
 from typing import NamedTuple
 
@@ -202,6 +203,11 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
 
     Sampled parameters have the low end of their range; ``draw_parameters`` overwrites them.
     """
+    return _constants_of(scenario).copy()
+
+
+@lru_cache(maxsize=8)
+def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
     mission = np.zeros(1, MISSION)
     for field in MISSION.fields or ():
         if field in SAMPLED:

@@ -14,10 +14,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis import load_results, run_study
-from analysis.results import parquet
+from analysis.results import event_log, parquet
 from analysis.results.chunks import name_of, short_hash
 from analysis.results.store import Store
 from dess import InputError
+from dess.record import PARAMETER_EVENTS
 from reports.cli import main
 from tests.analysis.small import files_of, small_study
 
@@ -105,6 +106,22 @@ def test_a_table_that_is_no_record_is_damaged_and_computed_anew(
     again = run_study(small_study(tmp_path, logged=1, policies=["greedy"]), folder)
     assert again.missions.equals(load_results(sound).missions)
     assert again.uavs.equals(load_results(sound).uavs) and not load_results(folder).store.damaged
+
+
+def test_event_logs_of_before_are_read_and_verified(sound: Path, tmp_path: Path) -> None:
+    """Logs had the first seven columns only, and no rows of parameters."""
+
+    def former(table: pa.Table) -> pa.Table:
+        rows = [name not in PARAMETER_EVENTS for name in table["event"].to_pylist()]
+        return table.filter(pa.array(rows)).select(parquet.FORMER_EVENTS.names)
+
+    folder = forged(sound, tmp_path / "out", "events", former)
+    log = load_results(folder).events("greedy")
+    assert [*log] == ["time", "event", "uav", "node", "value", "x", "y"]
+    assert len(event_log.uav_slots(log)) == (log["event"] == "move").sum()
+    assert main(["verify", str(folder)]) == 0
+    changed = forged(folder, tmp_path / "changed", "events", column("value", lambda v: v + 1))
+    assert main(["verify", str(changed)]) == 1
 
 
 def test_a_small_file_with_very_many_rows_is_refused_before_it_is_read(
