@@ -295,7 +295,7 @@ class _Auditor:
             chosen = {"node": self.next_row.node, "value": self.next_row.value}
             row = self.take_of_uav("communication", self.slot + n / m, i, x=x, y=y, **chosen)
             self._check_snr(row)
-            rate = self.c["slot_length"] / m * math.log2(1 + 10 ** (row.snr / 10))
+            rate = self.c["slot_length"] / m * math.log1p(10 ** (row.snr / 10)) / math.log(2)
             amount = min(rate, self.residual[row.node])
             self.require(math.isclose(row.value, amount, rel_tol=1e-9), "its SNR has another rate")
             self.residual[row.node] -= row.value
