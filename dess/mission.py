@@ -274,9 +274,9 @@ class MissionModel:
             return
         for i, u in enumerate(self._team()):
             if u.active and u.served >= 0:
-                flown = fleet.share_flown(m, u, n)
-                x = u.from_x + (u.x - u.from_x) * flown
-                y = u.from_y + (u.y - u.from_y) * flown
+                share = fleet.share_of_move(m, u, n)
+                x = u.from_x + (u.x - u.from_x) * share
+                y = u.from_y + (u.y - u.from_y) * share
                 self.log.add(
                     slot + n / m, "communication", i, u.served, u.amount, x, y, u.battery, snr=u.snr
                 )

@@ -147,7 +147,7 @@ def _nearest_free(mission, uavs, i, taken):
 def margin(mission, u):
     """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
 
-    A detour is flown forth and back, so the wind costs the most in one direction only.
+    A detour goes forth and back, so the wind costs the most in one direction only.
     """
     return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
 

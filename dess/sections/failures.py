@@ -126,7 +126,7 @@ def _strike_uav(mission, u, i, lost):
 
 @inlined
 def _strike_pad(mission, uavs, j):
-    """A UAV whose pad fails has to ask anew, but it keeps the time of its request."""
+    """A UAV whose pad fails has to ask again, but it keeps the time of its request."""
     out = mission.pads_out[j]
     probability = mission.pad_repair if out else mission.pad_rate
     if not _happens(mission, streams.PAD_FAILURE, j, probability):

@@ -109,7 +109,7 @@ def begins_move(u):
     return u.slots_left == u.slots_per_cell - 1
 
 
-def share_flown(m: int, u: Any, n: int) -> float:
-    """The share of its move that a UAV has flown at communication slot ``n`` = 1..m."""
+def share_of_move(m: int, u: Any, n: int) -> float:
+    """The share of its move that is behind a UAV at communication slot ``n`` = 1..m."""
     s = u.slots_per_cell
     return ((s - 1 - u.slots_left) * m + n) / (s * m)
