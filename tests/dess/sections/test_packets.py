@@ -213,3 +213,20 @@ def test_only_the_simpy_engine_has_continuous_arrivals() -> None:
     for refused in (lambda: simulate_batch(space, _Hover()), lambda: parallel_env(space)):
         with pytest.raises(InputError, match="arrivals.process: continuous needs the SimPy"):
             refused()
+
+
+@pytest.mark.parametrize("node_data", ["kept", "lost"])
+def test_packets_of_silent_nodes_wait_or_are_lost(node_data: str) -> None:
+    """A node falls silent after slot 0 for good: later packets arrive, and nobody gets them."""
+    scenario = _over_a_node(
+        slot_length=100,
+        arrival_rate=1.0,
+        **{"failures.node_rate": 1.0, "failures.node_data": node_data},
+    )
+    model, record = _flown(ScenarioSpace.of(scenario), _Hover(), 5, 0)
+    packets = model.packets.buffers.packets
+    assert (packets["generated"] > 1).sum() == (packets["status"] != DELIVERED).sum() > 20
+    expected = LOST if node_data == "lost" else WAITING
+    assert set(packets["status"][packets["generated"] > 1]) == {expected}
+    silent = (packets["generated"] > 1).sum()
+    assert (record.lost, record.residual) == ((silent, 0) if node_data == "lost" else (0, silent))
