@@ -1,6 +1,7 @@
 """What extended scenarios measure is stored, loaded, compared and simulated again."""
 
 import math
+import shlex
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from analysis.stats.paired import compare
 from dess import load_scenario, simulate_batch
 from dess.record import OPERATIONS
 from policies import load
+from reports.cli.settings import load_space
 from tests.analysis.small import files_of, grid, small_study
 
 MEASURED = {"charging.measured": True, "age.measured": True}
@@ -125,6 +127,17 @@ def test_points_that_do_not_set_a_section_have_its_default(tmp_path):
     assert table["failures.uav_rate"].tolist() == [0.0, 0.01, 0.0]
     assert table["fleet"].tolist()[:2] == ["none", "none"]
     assert "slots_per_cell 2" in table["fleet"][2]
+
+
+def test_the_command_of_a_mission_sets_sections_and_fleets(tmp_path):
+    rows = [
+        {"fleet": [{"slots_per_cell": 2}, {"quota": 5}], "charging": {"order": "lowest-battery"}}
+    ]
+    study = small_study(tmp_path, set=MEASURED, design={"kind": "table", "rows": rows}, missions=2)
+    results = run_study(study, tmp_path / "out")
+    words = shlex.split(results.command("greedy", 0, 1))
+    fields = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
+    assert load_space("paper", fields) == results.scenario(0)
 
 
 def test_workers_change_no_file(tmp_path):
