@@ -316,7 +316,7 @@ def communicate(
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
-        if not flies(u):
+        if not u.active or u.charging or u.grounded:  # faster here than a call of ``flies``
             continue
         if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
             channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)

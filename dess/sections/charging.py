@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from dess.code.kernels import inlined
+from dess.code.kernels import inlined, kernel
 from dess.sections.section import Integer, Section
 
 
@@ -55,7 +55,7 @@ def request_pad(mission, u):
     mission.pad_requests += 1
 
 
-@inlined
+@kernel
 def share_power(mission, uavs):
     """Charge the UAVs on the pads with the limited power, one after the other.
 
@@ -78,7 +78,7 @@ def share_power(mission, uavs):
         charged[first] = True
 
 
-@inlined
+@kernel
 def write_use(mission, uavs, out):
     """Write how the pads were used into an ``OPERATIONS`` record.
 

@@ -155,7 +155,7 @@ def _strike_node(mission, residual, sensor, k):
     residual[k] = 0.0
 
 
-@inlined
+@kernel
 def working_pads(mission):
     """The number of charging pads that are not out of order."""
     if mission.pad_rate == 0.0:
@@ -166,7 +166,7 @@ def working_pads(mission):
     return working
 
 
-@inlined
+@kernel
 def take_pad(mission, uavs, u):
     """Give a UAV the first pad that works and that no UAV holds; ``charging`` is set after."""
     for j in range(mission.pads):
@@ -179,7 +179,7 @@ def take_pad(mission, uavs, u):
             return
 
 
-@inlined
+@kernel
 def write_failures(mission, out):
     """Write what has failed into an ``OPERATIONS`` record."""
     out.failures = mission.uav_failures
