@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dess import InputError, load_scenario, simulate, simulate_batch
+from dess.observations.states import compact_states, masks
 from dess.record import MissionRecord
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, QUOTA, TRUNCATED
@@ -159,7 +160,10 @@ def test_a_uav_on_its_way_is_not_asked_and_may_only_hover() -> None:
     class Spy(Script):
         def act(self, view: View) -> np.ndarray:
             everyone = View(view.state, view.world, np.zeros(2, int), np.arange(2))
-            seen.append((view.uav.tolist(), everyone.legal.sum(1).tolist()))
+            legal = everyone.legal
+            states = compact_states(view.state, guarded=False)
+            assert (masks(states, everyone.mission, everyone.uav) == legal).all()
+            seen.append((view.uav.tolist(), legal.sum(1).tolist()))
             return super().act(view)
 
     row = ROW | {"zone": [2, 2, 2, 1], "uavs": 2, "max_slots": 3}
