@@ -58,6 +58,7 @@ MISSION = np.dtype(
         ("quota", np.int64),
         # charging (dess.sections.charging)
         ("has_charging", np.int64),
+        ("plans_waits", np.int64),  # whether the return guard allows for the wait for a pad
         ("lowest_battery_first", np.int64),
         ("power", np.int64),
         # failures (dess.sections.failures): probabilities per slot

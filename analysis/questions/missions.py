@@ -143,7 +143,8 @@ def _keep_log(results: Results, policy: str, replication: int, folder: str | Pat
         events = resimulate(results, policy, 0, replication).events
     except InputError:  # the record is another one, or the policy is a Python file
         return
-    table = pa.table({name: events[name] for name in events})
+    # Arrow would read the nan of a pandas column as a missing value.
+    table = pa.table({name: events[name].to_numpy() for name in events}, schema=parquet.EVENTS)
     parquet.write(Path(folder, FOLDER), _name(results, policy, replication), table)
 
 

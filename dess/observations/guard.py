@@ -167,7 +167,7 @@ def waiting_time(mission, uavs, i):
         i: Index of the UAV.
     """
     u = uavs[i]
-    if not (mission.has_charging or mission.pad_rate > 0.0) or u.pad_request >= 0:
+    if not (mission.plans_waits or mission.pad_rate > 0.0) or u.pad_request >= 0:
         return 0
     ahead = lacking = 0
     for j in range(mission.uavs):

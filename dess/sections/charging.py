@@ -12,8 +12,7 @@ from dess.sections.section import Integer, Section
 class Charging(Section):
     """The charging pads beyond their number (``pads``) and their rate (``charge_rate``).
 
-    With the section on, the records have the use of the pads, and the return guard allows for the
-    time that a UAV waits for a pad.
+    With the section on, the records have the use of the pads.
     """
 
     order: Literal["first-come", "lowest-battery"] = Field(
@@ -30,11 +29,17 @@ class Charging(Section):
     measured: bool = Field(
         False, description="whether records have the queue, waiting time and use of the pads"
     )
+    plan_waits: bool = Field(
+        False,
+        description="whether the return guard allows for the wait for a pad; always with another "
+        "order or a limit of power",
+    )
 
     def constants(self) -> dict[str, Any]:
         """The fields of ``MISSION`` that the section sets."""
         return {
             "has_charging": self.is_on,
+            "plans_waits": self.plan_waits or self.order != "first-come" or self.power > 0,
             "lowest_battery_first": self.order == "lowest-battery",
             "power": self.power,
         }

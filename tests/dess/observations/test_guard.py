@@ -155,7 +155,7 @@ def _wait(batteries: list[int], asked: list[int], quota: int = 440, **scenario: 
     return int(waiting_time(state.missions[0], team, 0))
 
 
-ON: dict[str, Any] = {"charging": {"measured": True}}
+ON: dict[str, Any] = {"charging": {"plan_waits": True}}
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
+import policies
 from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
@@ -144,10 +145,11 @@ def test_littles_law_holds_in_every_mission(
 @given(extended_spaces(charging={}), seeds, replications)
 def test_measuring_changes_nothing(space: ScenarioSpace, seed: int, replication: int) -> None:
     measured = ScenarioSpace.of(space, charging={"measured": True})
-    one = simulate_batch(space, Commuter(), seed, [replication])
-    other = simulate_batch(measured, Commuter(), seed, [replication])
-    assert one.missions.tobytes() == other.missions.tobytes()
-    assert one.uavs.tobytes() == other.uavs.tobytes()
+    for policy in (Commuter(), policies.load("greedy")):
+        one = simulate_batch(space, policy, seed, [replication])
+        other = simulate_batch(measured, policy, seed, [replication])
+        assert one.missions.tobytes() == other.missions.tobytes()
+        assert one.uavs.tobytes() == other.uavs.tobytes()
 
 
 @pytest.mark.parametrize(

@@ -329,7 +329,7 @@ def _reserves(early_returns: float) -> np.ndarray:
         "evaluate_every": 100,
     }
     training = Training(tiny(**settings, early_returns=early_returns, phases=[phase]), CPU)
-    missions, uavs, _ = training.stepper.state
+    missions, uavs, *_ = training.stepper.state
     begun = []
     for _ in range(74):
         before = uavs["battery"] - missions["charge_start"][:, None]
@@ -352,7 +352,7 @@ def test_early_returns_come_home_as_soon_as_they_may_charge() -> None:
 
 def test_low_starts_are_low_latched_and_near_their_quota() -> None:
     training = Training(tiny(low_battery_starts=1.0, num_envs=200), CPU)
-    missions, uavs, residual = training.stepper.state
+    missions, uavs, residual, *_ = training.stepper.state
     present = uavs["active"]
     start = np.broadcast_to(missions["charge_start"][:, None], present.shape)
     assert (uavs["battery"] <= start)[present].all()

@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from analysis import load_study, run_study
-from analysis.execution import jobs
+from analysis.execution import engines, jobs
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
 from analysis.verification.cross_check import simulate_missions, write
 from dess import simulate, simulate_batch
@@ -107,8 +107,11 @@ def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> P
         )
 
     with monkeypatch.context() as patch:
-        patch.setattr(jobs, "simulate_batch", lambda s, *a, **k: simulate_batch(other(s), *a, **k))
-        patch.setattr(jobs, "simulate", lambda s, *a, **k: simulate(other(s), *a, **k))
+        patch.setattr(
+            engines, "simulate_batch", lambda s, *a, **k: simulate_batch(other(s), *a, **k)
+        )
+        for module in (engines, jobs):
+            patch.setattr(module, "simulate", lambda s, *a, **k: simulate(other(s), *a, **k))
         study = run_study(load_study(NAME, **SMALL | {"policies": ["greedy"]}), folder / NAME)
     write(simulate_missions(study, 2), folder)
     return folder
