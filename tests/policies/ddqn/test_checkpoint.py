@@ -287,7 +287,7 @@ FORGED: dict[str, Callable[[Path], None]] = {
     "from_x": _record("stepper.uavs", "from_x", 32, UAV),
     "battery": _record("stepper.uavs", "battery", 10**12, UAV),
     "executed": _record("stepper.uavs", "executed", 77, UAV),
-    "end": _record("stepper.uavs", "end", 4, UAV),
+    "end": _record("stepper.uavs", "end", 5, UAV),
     "served": _record("stepper.uavs", "served", 25, UAV),
     "pad_request": _record("stepper.uavs", "pad_request", 10**6, UAV),
     "active UAV": _record("stepper.uavs", "active", False, UAV),
