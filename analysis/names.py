@@ -5,7 +5,6 @@ from collections.abc import Container
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from dess.errors import form_of, kind_of
 from dess.record import OPERATIONS
@@ -165,13 +164,13 @@ class Field(NamedTuple):
 
 def fields(space: ScenarioSpace) -> list[Field]:
     """Every field of a scenario, in the order of the model."""
-    default, plain = ScenarioSpace.of(), TypeAdapter(Any).dump_python
+    default = ScenarioSpace.of()
     return [
         Field(
             name,
             *_meaning(name),
             _allowed(space, name),
-            *(_single(plain(side.value(name), mode="json")) for side in (default, space)),
+            *(_single(side.plain_value(name)) for side in (default, space)),
         )
         for name in fields_of(ScenarioSpace)
     ]

@@ -15,6 +15,7 @@ from pydantic import (
     ConfigDict,
     Field,
     SerializerFunctionWrapHandler,
+    TypeAdapter,
     ValidationError,
     field_validator,
     model_serializer,
@@ -254,6 +255,10 @@ class _Constants(BaseModel):
         """The value of a field; ``failures.uav_rate`` is the field of a section."""
         section, _, name = field.rpartition(".")
         return getattr(getattr(self, section) if section else self, name)
+
+    def plain_value(self, field: str) -> Any:
+        """The value of a field as JSON has it: lists for tuples, a dictionary for a type of UAV."""
+        return TypeAdapter(Any).dump_python(self.value(field), mode="json")
 
     def to_toml(self) -> str:
         """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""

@@ -7,7 +7,6 @@ from pathlib import Path, PurePath
 from typing import Annotated, Any, NamedTuple, Self
 
 from pydantic import Field, model_validator
-from pydantic_core import to_jsonable_python
 
 import dess
 from analysis.results.provenance import (
@@ -230,7 +229,7 @@ class Manifest(Origin):
         """
         fields = dict.fromkeys(field for point in self.points for field in point.values)
         base = self.space({})
-        unset = {field: to_jsonable_python(base.value(field)) for field in fields}
+        unset = {field: base.plain_value(field) for field in fields}
         return [unset | point.values for point in self.points]
 
     @cached_property
