@@ -85,11 +85,8 @@ def simulate_batch(
     spaces = spaces_of([*distinct.values()])
     check_slotted(spaces)
     team = team_of(policy, spaces)
-    fleet, is_extended = (
-        max((s.uavs[1] for s in spaces), default=0),
-        any(s.is_extended for s in spaces),
-    )
-    records = empty_records(len(numbers), fleet, is_extended)
+    fleet = max((space.uavs[1] for space in spaces), default=0)
+    records = empty_records(len(numbers), fleet, any(space.is_extended for space in spaces))
     stop = Event()
 
     def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:

@@ -33,7 +33,8 @@ study = load_results(Path(results) / "failures")
 counts = ["failures", "slots_grounded", "lost"]
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
 means = effects.means(study, [*metrics, *(name for name in counts if name in study.missions)])
-missions, level = numbers.span(means["n"]), numbers.level(LEVEL)
+missions = numbers.span(means.loc[means["metric"].isin(metrics), "n"])
+level = numbers.level(LEVEL)
 rate, repair = answers.RATE, answers.REPAIR
 
 # %%
