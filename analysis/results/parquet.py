@@ -24,6 +24,7 @@ from dess import InputError
 from dess.code.memory import check_memory
 from dess.files import read_bytes, replacing, writable
 from dess.record import EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.scenario import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.state import END_NAMES
 from dess.streams import MAX_REPLICATION
 
@@ -35,8 +36,6 @@ Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
 # The columns of words, and the words.
 WORDS = {"end": END_NAMES, "event": EVENT_NAMES}
-# No event log has more UAVs, nodes, mission slots or cells (``dess.scenario``).
-MOST_UAVS, MOST_NODES, MOST_SLOTS, MOST_CELLS = 64, 1024, 100_000, 256
 
 
 def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:

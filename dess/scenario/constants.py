@@ -1,0 +1,191 @@
+"""The constants of a scenario that are never sampled, with their limits, and its sections."""
+
+from typing import Annotated, Any
+
+import tomli_w
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    field_validator,
+    model_serializer,
+)
+
+from dess.sea import Cell
+from dess.sections.age import Age
+from dess.sections.arrivals import Arrivals
+from dess.sections.charging import Charging
+from dess.sections.failures import Failures
+from dess.sections.fleet import UavType
+from dess.sections.section import Integer, Number, Section, tuples
+from dess.sections.wind import Wind
+
+# Section VI-A: all combinations of five columns and five rows.
+PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 26))
+
+# The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
+MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
+
+# The fields that go beyond the paper.
+EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
+
+# A reward per event. Sums of many of them are still finite, and so are their squares.
+Reward = Annotated[float, Field(ge=-(10**9), le=10**9, allow_inf_nan=False)]
+
+
+class Constants(BaseModel):
+    """The constants that are never sampled: the common base of both kinds of scenario."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    # World
+    grid: Integer = Field(
+        32, ge=2, le=MOST_CELLS, description="cells along one side of the square grid (M)"
+    )
+    cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
+    altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
+    nodes: tuple[Cell, ...] = Field(
+        PAPER_NODES,
+        min_length=1,
+        max_length=MOST_NODES,
+        description="cells of the sensor nodes: [x, y] for each",
+    )
+    zone: tuple[int, int, int, int] = Field(
+        (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
+    )
+    pads: Integer | None = Field(
+        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+    forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
+
+    # Time
+    slot_length: Number = Field(
+        1.0, ge=1e-6, le=1_000_000, description="length of a mission slot (delta_t)"
+    )
+    communication_slots: Integer = Field(
+        4, ge=1, le=64, description="communication slots in a mission slot (m)"
+    )
+    max_slots: Integer = Field(
+        500, ge=1, le=MOST_SLOTS, description="mission slots after which a mission is truncated"
+    )
+
+    # Energy
+    charge_rate: Integer = Field(
+        10, ge=1, le=100, description="battery gained in a charging slot [%]"
+    )
+    flight_cost: Integer = Field(
+        1,
+        ge=0,
+        le=1,
+        description="battery spent in a slot without charging [%]; 0 to fly without battery "
+        "decrease (Algorithm 1, phase I)",
+    )
+
+    # Channel
+    edge_snr: Number = Field(
+        -25.0, ge=-300, le=300, description="mean SNR at half the grid's diagonal [dB]"
+    )
+    path_loss_exponent: Number = Field(
+        2.27, ge=0.01, le=10, description="path loss exponent (alpha)"
+    )
+    shadowing_variance: Number = Field(
+        2.0, ge=0, le=400, description="variance of shadowing [dB^2]"
+    )
+
+    # Data
+    initial_data: tuple[Number, Number] = Field(
+        (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
+    )
+    arrival_rate: Number = Field(
+        0.02, ge=0, le=100, description="new data per node and mission slot [data units] (lambda)"
+    )
+    quota: Integer = Field(
+        440, ge=1, le=1_000_000, description="communication slots that a UAV must fill (U_C)"
+    )
+
+    # Reward (Table III)
+    reward_data: Reward = Field(
+        1.3, description="reward per data unit that the team collects (alpha)"
+    )
+    reward_overruled: Reward = Field(
+        -1.0, description="reward of an action that the safety controller overrules (beta)"
+    )
+    reward_depleted: Reward = Field(
+        -300.0, description="reward of a UAV whose battery is empty before its quota is filled (nu)"
+    )
+    reward_charging: Reward = Field(0.05, description="reward per charging slot (c)")
+    reward_quota: Reward = Field(100.0, description="reward of a UAV that fills its quota (omega)")
+    reward_step: Reward = Field(-0.1, description="reward per mission slot (zeta)")
+
+    # Beyond the paper; off by default
+    arrivals: Arrivals = Arrivals.off()
+    age: Age = Age.off()
+    charging: Charging = Charging.off()
+    failures: Failures = Failures.off()
+    wind: Wind = Wind.off()
+    fleet: tuple[UavType, ...] = Field(
+        (),
+        max_length=MOST_UAVS,
+        description="types of UAVs: a table for each; UAV i has type i modulo their number",
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out the sections that are off: so scenarios without them are stored as before."""
+        values = handler(self)
+        return {n: v for n, v in values.items() if n not in EXTENSIONS or self.has(n)}
+
+    @field_validator("nodes", "zone", "fleet", mode="before")
+    @classmethod
+    def _lists_to_tuples(cls, value: Any) -> Any:
+        return tuples(value)
+
+    @field_validator("initial_data", mode="before")
+    @classmethod
+    def _number_to_range(cls, value: Any) -> Any:
+        return (value, value) if is_number(value) else tuples(value)
+
+    @property
+    def zone_cells(self) -> int:
+        """Number of cells of the start and charging zone."""
+        return self.zone[2] * self.zone[3]
+
+    @property
+    def charging_pads(self) -> int:
+        """Number of charging pads: ``pads``, or as many as the zone has cells."""
+        return self.zone_cells if self.pads is None else self.pads
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether the scenario goes beyond the paper, so that records have ``OPERATIONS``."""
+        return any(self.has(name) for name in EXTENSIONS)
+
+    def has(self, extension: str) -> bool:
+        """Whether an extension is on."""
+        value = getattr(self, extension)
+        return value.is_on if isinstance(value, Section) else bool(value)
+
+    @property
+    def needs_events(self) -> bool:
+        """Whether only the SimPy engine can simulate the scenario."""
+        return self.arrivals.process != "slotted"
+
+    def value(self, field: str) -> Any:
+        """The value of a field; ``failures.uav_rate`` is the field of a section."""
+        section, _, name = field.rpartition(".")
+        return getattr(getattr(self, section) if section else self, name)
+
+    def plain_value(self, field: str) -> Any:
+        """The value of a field as JSON has it: lists for tuples, a dictionary for a type of UAV."""
+        return TypeAdapter(Any).dump_python(self.value(field), mode="json")
+
+    def to_toml(self) -> str:
+        """The scenario as TOML text that ``load_scenario`` reads back to an equal one."""
+        return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is an integer or a float, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
