@@ -1,0 +1,156 @@
+"""The auditor: it replays a mission slot by slot, and computes its record."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tests.dess.auditor import pads
+from tests.dess.auditor.failures import Failures
+from tests.dess.auditor.log import Log, Row
+from tests.dess.auditor.nodes import Nodes
+from tests.dess.auditor.pads import Pads
+from tests.dess.auditor.uavs import Fleet, Uav
+
+PARAMETERS = ("seed", "replication", "flying_time", "charge_start", "charge_complete")
+
+
+def audit(columns: Mapping[str, Sequence[Any]], constants: Mapping[str, Any]) -> dict[str, Any]:
+    """Replay a mission from its log; return its metrics and those of its UAVs.
+
+    Args:
+        columns: The columns of the log.
+        constants: The fields of the scenario; of its sections those that are on.
+
+    Returns:
+        ``metrics`` of the record, ``measured`` beyond the paper's, and for each of ``uavs`` what is
+        known of it.
+
+    Raises:
+        WrongLogError: If a row is not what the model makes of the rows before it.
+    """
+    rows = [Row(*values) for values in zip(*(columns[n] for n in Row._fields), strict=True)]
+    return _Auditor(Log(rows), constants).report()
+
+
+class _Auditor:
+    def __init__(self, log: Log, constants: Mapping[str, Any]):
+        self.log, self.c = log, constants
+        self.fleet = Fleet(log, constants)
+        self.pads = Pads(log, constants, self.fleet)
+        self.nodes = Nodes(log, constants, self.fleet)
+        self.failures = Failures(log, constants, self.fleet, self.pads, self.nodes)
+        self.parameters: dict[str, int] = {}
+
+    @property
+    def uavs(self) -> list[Uav]:
+        return self.fleet.uavs
+
+    def report(self) -> dict[str, Any]:
+        self._begin()
+        while self.fleet.active:
+            self._replay_slot()
+        for i in range(len(self.uavs)):
+            self.fleet.take("mission_end", self.log.slot, i)
+        self.nodes.end()
+        self.log.require(self.log.place == len(self.log.rows), "rows after the end")
+        return {
+            "metrics": self._metrics(),
+            "measured": self._measured(),
+            "uavs": [vars(u) for u in self.uavs],
+        }
+
+    def _begin(self) -> None:
+        self.fleet.begin()
+        self.nodes.begin()
+        for name in PARAMETERS:
+            value = self.log.next_row.value
+            self.log.take(f"mission_{name}", 0.0, value=value)
+            self.parameters[name] = int(value)
+        self.fleet.check_batteries(self.parameters["flying_time"])
+        self.pads.start = self.parameters["charge_start"]
+        self.pads.complete = self.parameters["charge_complete"]
+        for u in self.uavs:
+            self.pads.update_latch(u)
+
+    def _replay_slot(self) -> None:
+        log, active, begin = self.log, self.fleet.active, self.log.place
+        while log.next_is(log.slot, *pads.EVENTS):  # they depend on the moves, which come after
+            log.place += 1
+        self.fleet.read_moves()
+        after, log.place = log.place, begin
+        self.pads.replay()
+        self.pads.charge()
+        self.fleet.spend()
+        self.fleet.take_moves()
+        log.require(log.place == after, "the zone or the moves have other rows")
+        m = self.c["communication_slots"]
+        data = sum(self.nodes.communicate(n) for n in range(1, m + 1))
+        log.slot += 1
+        self.nodes.arrive()
+        for i, u in active:
+            self._settle(i, u, data)
+        self.failures.replay()
+
+    def _settle(self, i: int, u: Uav, data: float) -> None:
+        c, charged = self.c, u.charging
+        if u.communications >= u.quota:
+            u.end = "quota"
+        elif u.battery <= 0:
+            u.end = "battery"
+        elif self.log.slot >= c["max_slots"]:
+            u.end = "truncated"
+        u.reward += c["reward_data"] * data + c["reward_step"]
+        u.reward += c["reward_overruled"] * (u.other is not None) + c["reward_charging"] * charged
+        u.reward += c["reward_quota"] * (u.end == "quota")
+        u.reward += c["reward_depleted"] * (u.end == "battery")
+        u.reward += c.get("age", {}).get("reward", 0.0) * self.nodes.ages.mean_at(self.log.slot)
+        if charged and (u.battery >= self.pads.complete or u.end):
+            u.charging, u.requested = False, -1
+            self.fleet.take("charge_end", self.log.slot, i)
+        if u.end == "quota":
+            self.fleet.take("quota_filled", self.log.slot, i, value=u.communications)
+        if u.end == "battery":
+            self.fleet.take("battery_empty", self.log.slot, i)
+        self.pads.update_latch(u)
+
+    # --- the record ---
+
+    def _metrics(self) -> dict[str, Any]:
+        total = self.nodes.initial + self.nodes.arrived
+        success = int(all(u.end == "quota" for u in self.uavs))
+        collected = sum(u.collected for u in self.uavs)
+        ratio = min(collected / total, 1.0) if total > 0 else 1.0
+        return self.parameters | {
+            "uavs": len(self.uavs),
+            "slots": self.log.slot,
+            "uav_slots": sum(u.slots_flying + u.slots_charging for u in self.uavs),
+            "success": success,
+            "initial": self.nodes.initial,
+            "arrived": self.nodes.arrived,
+            "collected": collected,
+            "residual": sum(self.nodes.residual),
+            "collection_ratio": ratio,
+            "collection_ratio_and_communication": ratio * success,
+            "reward": sum(u.reward for u in self.uavs),
+        }
+
+    def _measured(self) -> dict[str, float]:
+        """What the record has beyond the paper's metrics, by the sections that are on."""
+        found: dict[str, float] = {}
+        buffers, slots = self.nodes.buffers, self.log.slot
+        if self.c.get("age", {}).get("measured"):
+            found |= self.nodes.ages.metrics(slots)
+        if buffers is not None:
+            found |= buffers.metrics()
+        if buffers is not None or "failures" in self.c:
+            found["lost"] = self.nodes.lost
+        if "failures" in self.c:
+            found["failures"] = self.failures.of_uavs
+            found["slots_grounded"] = sum(u.slots_grounded for u in self.uavs)
+        if "charging" in self.c:
+            waited = sum(u.slots_waiting for u in self.uavs)
+            charged, requests = sum(u.slots_charging for u in self.uavs), self.pads.requests
+            found["queue"] = waited / slots
+            found["waiting"] = waited / requests if requests else 0.0
+            found["pad_requests"] = requests
+            found["utilisation"] = charged / (self.pads.number * slots)
+        return found
