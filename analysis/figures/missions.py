@@ -1,9 +1,11 @@
-"""Figures of one mission: its map, batteries, residual data and charging zone.
+"""Figures of one mission: its map, batteries, residual data, age and charging zone.
 
 Each function takes the event log of the mission (a data frame, or the columns, of
 ``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure`` puts
 them together. Nothing touches pyplot's state.
 """
+
+from collections.abc import Callable
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +17,14 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from analysis.figures import style
-from analysis.results.event_log import Events, battery_levels, duration, residual_data, uav_slots
+from analysis.results.event_log import (
+    Events,
+    battery_levels,
+    duration,
+    mean_age,
+    residual_data,
+    uav_slots,
+)
 from dess.scenario import Scenario, ScenarioSpace
 
 # Width [cells] over which UAVs on the same path are drawn side by side.
@@ -101,6 +110,14 @@ def residual(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
+def age(events: Events, scenario: Scenario, ax: Axes) -> None:
+    """The mean age of information of all nodes [slots] over time."""
+    curve = mean_age(events)
+    ax.plot(curve["time"], curve["age"], color=style.INK, linewidth=1.2, gid="age")
+    ax.set(title="Mean age of the nodes", ylabel="slots", ylim=(0, None))
+    _time_axis(events, ax)
+
+
 def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
     slots, edges = uav_slots(events), np.arange(duration(events) + 1)
@@ -129,16 +146,23 @@ def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     _time_axis(events, ax)
 
 
+def curves(scenario: Scenario) -> dict[Callable[[Events, Scenario, Axes], None], float]:
+    """The figures over the time of a mission, from top to bottom, and their heights [inches]."""
+    ages = {age: 1.6} if scenario.age.measured else {}
+    return {battery: 1.6, residual: 1.6, **ages, occupancy: 1.1}
+
+
 def mission_figure(events: Events, scenario: Scenario) -> Figure:
-    """A mission: its map, and below it the batteries, residual data and charging over time."""
+    """A mission: its map, and below it its curves over time."""
+    panels = curves(scenario)
     with style.look():
-        figure = Figure(figsize=(5.6, 11), dpi=style.DPI)
+        figure = Figure(figsize=(5.6, 6.7 + sum(panels.values())), dpi=style.DPI)
         figure.set_layout_engine("constrained", rect=(0, 0, 0.94, 1))
-        axes = figure.subplots(4, height_ratios=(5.6, 1.6, 1.6, 1.1))
+        axes = figure.subplots(1 + len(panels), height_ratios=(5.6, *panels.values()))
         trajectories(events, scenario, axes[0])
         axes[0].set_title(_outcome(events, scenario))
         _map_legend(axes[0])
-        for panel, ax in zip((battery, residual, occupancy), axes[1:], strict=True):
+        for panel, ax in zip(panels, axes[1:], strict=True):
             panel(events, scenario, ax)
             ax.set_xlabel("")
         axes[-1].set_xlabel("time [mission slots]")

@@ -57,21 +57,74 @@ def residual_data(events: Events) -> pd.DataFrame:
     The last row is the end of the mission.
     """
     log = pd.DataFrame(events)
+    flows = _node_flows(log)
+    times = range(duration(log) + 1)
+    changes = flows["change"].groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).sum()
+    table = changes.unstack(fill_value=0.0).reindex(index=times, fill_value=0.0)
+    return table.cumsum().rename_axis(index="time", columns="node")
+
+
+def age_falls(events: Events) -> pd.DataFrame:
+    """When the ages of nodes fell, in order: ``time``, ``node``, ``newest``.
+
+    From this time on, the newest data collected from the node are those generated at ``newest``:
+    of packets, the time stamp of the newest that was delivered; otherwise the time itself, at which
+    the node was emptied.
+    """
+    log = pd.DataFrame(events)
     start = log[(log["event"] == "mission_start") & (log["node"] >= 0)]
-    flowing = log["event"].isin(["arrival", "communication", "data_lost", "loss"])
-    flows = log[flowing & (log["node"] >= 0)]
-    change = flows["value"].where(flows["event"] == "arrival", -flows["value"])
-    times, nodes = range(duration(log) + 1), start["node"].to_numpy()
-    changes = change.groupby([np.ceil(flows["time"]).astype(int), flows["node"]]).sum()
-    table = changes.unstack(fill_value=0.0).reindex(index=times, columns=nodes, fill_value=0.0)
-    table = table.cumsum() + start["value"].to_numpy()
-    return table.rename_axis(index="time", columns="node")
+    if (start["packet"] >= 0).any():
+        falls = log[log["event"] == "delivery"]
+        newest = falls["generated"].groupby(falls["node"]).cummax()
+        before = newest.groupby(falls["node"]).shift(fill_value=0.0)
+        falls, newest = falls[newest > before], newest[newest > before]
+    else:
+        flows = _node_flows(log)
+        # Summed in the order of the simulation, which finds a node empty where exactly 0 is left.
+        left = flows["change"].groupby(flows["node"]).transform(lambda c: np.cumsum(c.to_numpy()))
+        falls = flows[(flows["event"] == "communication") & (left == 0.0)]
+        newest = falls["time"]
+    return falls[["time", "node"]].assign(newest=newest).reset_index(drop=True)
+
+
+def ages(events: Events) -> pd.DataFrame:
+    """Age of information [slots] at every mission slot's start (rows) and node (columns).
+
+    The last row is the end of the mission.
+    """
+    log, falls = pd.DataFrame(events), age_falls(events)
+    nodes = log.loc[(log["event"] == "mission_start") & (log["node"] >= 0), "node"].to_numpy()
+    times = np.arange(duration(log) + 1)
+    newest = falls["newest"].groupby([np.ceil(falls["time"]).astype(int), falls["node"]]).max()
+    table = newest.unstack().reindex(index=times, columns=nodes).ffill().fillna(0.0)
+    return table.rsub(times, axis=0).rename_axis(index="time", columns="node")
+
+
+def mean_age(events: Events) -> pd.DataFrame:
+    """The corners of the sawtooth of the mean age of all nodes: ``time``, ``age`` [slots].
+
+    Between corners the age grows by 1 per slot; at a fall there are two, before and after it.
+    """
+    log, falls = pd.DataFrame(events), age_falls(events)
+    nodes = ((log["event"] == "mission_start") & (log["node"] >= 0)).sum()
+    before = falls.groupby("node")["newest"].shift(fill_value=0.0)
+    gains = (falls["newest"] - before).groupby(falls["time"]).sum().cumsum() / nodes
+    newest = np.concatenate([[0.0, 0.0], np.repeat(gains.to_numpy(), 2)])
+    times = np.concatenate([[0.0], np.repeat(gains.index.to_numpy(float), 2), [duration(log)]])
+    return pd.DataFrame({"time": times, "age": times - newest})
 
 
 def duration(events: Events) -> int:
     """The length of the mission [mission slots]."""
     log = pd.DataFrame(events)
     return int(log.loc[log["event"] == "mission_end", "time"].max())
+
+
+def _node_flows(log: pd.DataFrame) -> pd.DataFrame:
+    """The rows of the initial data and of all that changes the data of nodes, with ``change``."""
+    gains, losses = ("mission_start", "arrival"), ("communication", "data_lost", "loss")
+    flows = log[log["event"].isin(gains + losses) & (log["node"] >= 0)]
+    return flows.assign(change=flows["value"].where(flows["event"].isin(gains), -flows["value"]))
 
 
 def _of_uavs(log: pd.DataFrame, event: str) -> pd.DataFrame:

@@ -3,7 +3,7 @@
 from analysis.results.event_log import Events
 from dess.scenario import Scenario
 from reports.pages.template import fill
-from reports.player import READING, library, player
+from reports.player import library, player, reading
 
 
 def mission_page(events: Events, scenario: Scenario, title: str, outcome: str) -> str:
@@ -18,6 +18,6 @@ def mission_page(events: Events, scenario: Scenario, title: str, outcome: str) -
     Raises:
         InputError: If the log is not that of a whole mission of this scenario.
     """
-    played = player(events, scenario, "mission", caption=READING)
+    played = player(events, scenario, "mission", caption=reading(scenario))
     parts = {"library": library().data, "player": played.data}
     return fill("mission.html", scripts=True, title=title, outcome=outcome, **parts)

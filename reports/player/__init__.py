@@ -31,6 +31,17 @@ READING = (
     "did not."
 )
 
+AGE_READING = (
+    " The age of a node is the time since its newest collected data were generated; where data "
+    "have no time stamps, it is the time since the node was last emptied. The length of a stem is "
+    "the age of its node."
+)
+
+
+def reading(scenario: Scenario) -> str:
+    """How to read the player of a mission of this scenario."""
+    return READING + (AGE_READING if scenario.age.measured else "")
+
 
 def library() -> HTML:
     """The library plotly.js, which a page needs once, before its players."""
@@ -56,12 +67,13 @@ def player(
     Raises:
         InputError: If the log is not that of a complete mission of this scenario.
     """
+    playback = Playback(pd.DataFrame(events), scenario)
     html = to_html(
-        _figure(Playback(pd.DataFrame(events), scenario)),
+        _figure(playback),
         config={"displayModeBar": False},
         auto_play=False,
         include_plotlyjs=False,
-        post_script=layout.arranging(),
+        post_script=layout.arranging(playback),
         full_html=False,
         default_height="auto",
         validate=False,  # a test validates the figure

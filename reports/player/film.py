@@ -4,8 +4,8 @@
     film.show(20)
     film.figure.savefig("slot-20.png")
 
-It shows what the player shows: the map beside the batteries, the residual data and the charging
-zone over time.
+It shows what the player shows: the map beside the batteries, the residual data, the mean age if it
+is measured, and the charging zone over time.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,7 +25,9 @@ from dess.scenario import Scenario
 from reports.player.mission_map import TRAIL, statuses
 from reports.player.playback import Playback
 
-SIZE, DPI = (9, 4.8), 90  # inches, dots per inch; an even number of pixels, as videos need
+# Width, and height for each of the curves [inches]; dots per inch. Videos need even numbers of
+# pixels.
+SIZE, DPI = (9, 1.6), 90
 NODE, UAV, PAD, DOT = 140, 85, 170, 22  # areas of the fullest node and of other marks [points^2]
 
 Mover = Callable[[int], object]  # makes marks show the mission after a number of slots
@@ -53,14 +55,18 @@ class Film:
     def __init__(self, events: Events, scenario: Scenario, title: str = ""):
         playback = Playback(pd.DataFrame(events), scenario)
         self.end = playback.end
-        self.figure = Figure(figsize=SIZE, dpi=DPI)
+        curves = [*missions.curves(scenario)]
+        self.figure = Figure(figsize=(SIZE[0], SIZE[1] * len(curves)), dpi=DPI)
         self.figure.set_layout_engine("constrained", rect=(0, 0, 0.95, 1))  # notes at the right
         self.figure.suptitle(title, x=0.012, ha="left", fontsize=11)
-        grid = self.figure.add_gridspec(3, 2, width_ratios=(1.05, 1), height_ratios=(1.3, 1.3, 1))
-        sea = self.figure.add_subplot(grid[:, 0])
-        panels = [self.figure.add_subplot(grid[row, 1]) for row in range(3)]
+        heights = [1.3] * (len(curves) - 1) + [1]
+        grid = self.figure.add_gridspec(
+            len(curves), 2, width_ratios=(1.05, 1), height_ratios=heights
+        )
+        sea = self.figure.add_subplot(grid[:, 0], anchor="N" if playback.measures_age else "C")
+        panels = [self.figure.add_subplot(grid[row, 1]) for row in range(len(curves))]
         _draw_map(playback, sea)
-        for draw, ax in zip(_CURVES, panels, strict=True):
+        for draw, ax in zip(curves, panels, strict=True):
             draw(events, scenario, ax)
             if ax is not panels[-1]:
                 ax.set_xlabel("")
@@ -96,9 +102,6 @@ class _Picture(Artist):
 
     def draw(self, renderer: RendererBase) -> None:
         renderer.draw_image(renderer.new_gc(), 0, 0, self.pixels)
-
-
-_CURVES = (missions.battery, missions.residual, missions.occupancy)
 
 
 def _draw_map(playback: Playback, ax: Axes) -> None:

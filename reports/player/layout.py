@@ -5,8 +5,9 @@ from typing import Any, TypeAlias
 
 from analysis.figures.style import GRID, INK, MUTED, SEA, ZONE, ZONE_EDGE
 from dess.scenario import Scenario
+from reports.player import ages
 from reports.player.mission_map import STATUS, counted
-from reports.player.panels import BATTERY, CHARGING, PANELS, ranges
+from reports.player.panels import BATTERY, CHARGING, RESIDUAL, ranges
 from reports.player.playback import Playback
 from reports.player.trace import Json
 
@@ -56,6 +57,16 @@ _WIDE: tuple[int, _Boxes] = 584, {
     "5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "controls": (0.58, 1, 492, 584),
     "2": (0.58, 1, 24, 154), "3": (0.58, 1, 190, 320), "4": (0.58, 1, 356, 434),
 }  # fmt: skip
+# The same for a player that shows ages.
+_NARROW_AGES: tuple[int, _Boxes] = 1092, {
+    "5": (0, 1, 0, 18), "": (0, 1, 24, 312), "controls": (0, 1, 354, 440), "7": (0, 1, 470, 540),
+    "2": (0, 1, 608, 698), "3": (0, 1, 736, 840), "6": (0, 1, 874, 978), "4": (0, 1, 1014, 1092),
+}  # fmt: skip
+_WIDE_AGES: tuple[int, _Boxes] = 720, {
+    "5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "7": (0, 0.52, 640, 720),
+    "2": (0.58, 1, 24, 144), "3": (0.58, 1, 180, 300), "6": (0.58, 1, 336, 456),
+    "4": (0.58, 1, 492, 570), "controls": (0.58, 1, 628, 720),
+}  # fmt: skip
 
 
 def layout(playback: Playback) -> Json:
@@ -73,9 +84,10 @@ def layout(playback: Playback) -> Json:
     }
 
 
-def arranging() -> str:
+def arranging(playback: Playback) -> str:
     """The script that puts the curves beside the map if there is room, and otherwise below."""
-    layouts = {"narrow": _arrangement(*_NARROW), "wide": _arrangement(*_WIDE)}
+    narrow, wide = (_NARROW_AGES, _WIDE_AGES) if playback.measures_age else (_NARROW, _WIDE)
+    layouts = {"narrow": _arrangement(*narrow), "wide": _arrangement(*wide)}
     return f"""
         const plot = document.getElementById("{{plot_id}}"), layouts = {json.dumps(layouts)};
         let shown;
@@ -119,6 +131,8 @@ def _axes(playback: Playback) -> Json:
         x = {"range": [0, playback.end], "anchor": f"y{panel}", "showticklabels": panel == CHARGING}
         y = {"range": ends, "anchor": f"x{panel}", "showgrid": panel != CHARGING, "nticks": 5}
         axes |= {f"xaxis{panel}": x, f"yaxis{panel}": y}
+    if playback.measures_age:
+        axes |= ages.axes(playback)
     uavs = playback.scenario.uavs
     axes[f"xaxis{CHARGING}"]["title"] = {"text": "time [mission slots]"}
     axes[f"yaxis{CHARGING}"]["tickvals"] = list(range(1, uavs + 1, -(-uavs // 6)))
@@ -145,15 +159,17 @@ def _annotations(playback: Playback) -> list[Json]:
     """The titles of the panels, the thresholds of charging, and how each UAV ended."""
     scenario = playback.scenario
     queue = "; hollow: waiting" if playback.fleet["waiting"].any() else ""
-    titles = (
-        "Battery [%]",
-        "Residual data [data units], a band per node",
-        f"Charging, {counted(playback.pads, 'pad')}{queue}",
-    )
+    titles = {
+        BATTERY: "Battery [%]",
+        RESIDUAL: "Residual data [data units], a band per node",
+        CHARGING: f"Charging, {counted(playback.pads, 'pad')}{queue}",
+    }
+    if playback.measures_age:
+        titles |= ages.TITLES
     heading = {"yanchor": "bottom", "font": {"size": 12.5}}
     notes = [
         _note(f"<b>{title}</b>", (0, f"x{n} domain"), (1, f"y{n} domain"), **heading)
-        for n, title in zip(PANELS, titles, strict=True)
+        for n, title in titles.items()
     ]
     levels = {"S": scenario.charge_start, "C": scenario.charge_complete}
     for index, level in levels.items():

@@ -1,31 +1,35 @@
-"""The panels of a player, over the time of the mission: batteries, residual data, charging."""
+"""The panels of a player, over the time of the mission: batteries, residual data, age, charging."""
 
 from collections.abc import Iterator
 
 import pandas as pd
 
 from analysis.figures.style import INK
+from reports.player import ages
+from reports.player.ages import AGE
 from reports.player.playback import Playback
 from reports.player.trace import Json, Moving, lines, markers, rounded
 
-BATTERY, RESIDUAL, CHARGING = PANELS = (2, 3, 4)
+BATTERY, RESIDUAL, CHARGING = (2, 3, 4)
 
 
 def ranges(playback: Playback) -> dict[int, list[float]]:
-    """The ends of each panel's y axis, from its bottom to its top."""
+    """The panels from top to bottom, and the ends of each one's y axis, from bottom to top."""
     most = max(float(playback.residual.sum(axis=1).max()), 1.0)
     uavs = playback.scenario.uavs
     room = 0.6 + max(0, 3 - uavs) / 2  # so that a single row does not fill the panel
     return {
         BATTERY: [0, 103],
         RESIDUAL: [0, round(1.05 * most, 2)],
+        **({AGE: [0, ages.highest(playback)]} if playback.measures_age else {}),
         CHARGING: [uavs + room, 1 - room],
     }
 
 
 def at_rest(playback: Playback) -> list[Json]:
     """The curves, which do not change while the mission is played."""
-    return [*_battery(playback), *_residual(playback), *_charging(playback)]
+    age = [ages.sawtooth(playback)] if playback.measures_age else []
+    return [*_battery(playback), *_residual(playback), *age, *_charging(playback)]
 
 
 def moving(playback: Playback) -> list[Moving]:
@@ -41,7 +45,8 @@ def moving(playback: Playback) -> list[Moving]:
     look: Json = {"size": 9, "opacity": 1, "color": playback.uav_colours, "line": line}
     rows = enumerate(playback.fleet["battery"].tolist())
     frames = [{"x": [t] * len(levels), "y": levels} for t, levels in rows]
-    return [*cursors, Moving(markers("batteries", BATTERY, **look), frames)]
+    columns = ages.columns(playback) if playback.measures_age else []
+    return [*cursors, Moving(markers("batteries", BATTERY, **look), frames), *columns]
 
 
 def _battery(playback: Playback) -> Iterator[Json]:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.figures.style import node_colours, uav_colours
-from analysis.results.event_log import battery_levels, residual_data, uav_slots
+from analysis.results.event_log import ages, battery_levels, mean_age, residual_data, uav_slots
 from dess import InputError
 from dess.scenario import Scenario
 
@@ -18,6 +18,8 @@ class Playback:
         slots: ``uav_slots`` of the log.
         levels: ``battery_levels`` of the log.
         residual: (T + 1, K) ``residual_data`` of the log.
+        ages: (T + 1, K) ``ages`` of the log, empty unless the scenario measures them.
+        mean_age: ``mean_age`` of the log, empty likewise.
         filled: (I,) whether the UAV filled its quota.
         fleet: (T + 1, I) arrays, the state of the UAVs after every slot: ``x``, ``y``, ``battery``,
             ``node`` (served, -1 without), ``charging``, ``waiting``, and ``over`` if the UAV's
@@ -29,6 +31,10 @@ class Playback:
         self.scenario = scenario
         self.slots, self.levels, self.residual = (
             table(log) for table in (uav_slots, battery_levels, residual_data)
+        )
+        self.measures_age = scenario.age.measured
+        self.ages, self.mean_age = (
+            table(log) if self.measures_age else pd.DataFrame() for table in (ages, mean_age)
         )
         self.end = len(self.residual) - 1
         self.filled = np.isin(range(scenario.uavs), log.loc[log["event"] == "quota_filled", "uav"])

@@ -15,10 +15,17 @@ from plotly import graph_objects
 import dess
 import policies
 from analysis.figures.style import node_colours
-from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
+from analysis.results.event_log import (
+    ages,
+    battery_levels,
+    duration,
+    mean_age,
+    residual_data,
+    uav_slots,
+)
 from dess import InputError
 from dess.state import sample_scenario
-from reports.player import library, player
+from reports.player import AGE_READING, library, player, reading
 from reports.player.mission_map import TRAIL
 from tests.reports.browser import Visit
 
@@ -200,6 +207,33 @@ def test_bars_are_the_slots_of_charging_and_waiting(mission: Logged, shown: Show
             edges = zip(bars["x"][0::6], bars["x"][1::6], strict=True)
             busy = of_uav.loc[of_uav[state], "slot"]
             assert [slot for a, b in edges for slot in range(a, b)] == busy.tolist()
+
+
+AGED: dict[str, dict[str, Any]] = {
+    "slotted": {"uavs": 2, "age.measured": True},
+    "packets": {"uavs": 2, "age.measured": True, "arrivals.process": "continuous"},
+}
+
+
+@pytest.mark.parametrize("case", AGED)
+def test_ages_are_shown_where_the_scenario_measures_them(case: str) -> None:
+    log, scenario = simulated(**AGED[case])
+    shown, of_nodes, curve = Shown(Logged(log, scenario)), ages(log), mean_age(log)
+    for time in range(len(shown)):
+        heights = shown[time]["ages"]["y"]
+        assert np.allclose(heights, of_nodes.loc[time], atol=0.0051, rtol=0)
+        assert shown[time]["stems"]["y"] == [y for height in heights for y in (0, height, None)]
+        assert shown[time]["cursor 6"]["x"] == [time, time]
+    (tooth,) = (trace for trace in shown.traces if trace["name"] == "mean age")
+    assert np.allclose(tooth["x"], curve["time"], atol=0.0051, rtol=0)
+    assert np.allclose(tooth["y"], curve["age"], atol=0.0051, rtol=0)
+    assert AGE_READING in reading(scenario)
+
+
+def test_without_measured_ages_nothing_tells_of_them(mission: Logged, shown: Shown) -> None:
+    assert AGE_READING not in reading(mission.scenario)
+    assert not {"ages", "stems", "mean age"} & {trace["name"] for trace in shown.traces}
+    assert not {"xaxis6", "xaxis7"} & shown.figure["layout"].keys()
 
 
 def test_the_cases_cover_waiting_charging_and_short_missions(queue: Logged) -> None:

@@ -6,10 +6,19 @@ import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 import dess
 import policies
-from analysis.results.event_log import battery_levels, duration, residual_data, uav_slots
+from analysis.results.event_log import (
+    ages,
+    battery_levels,
+    duration,
+    mean_age,
+    residual_data,
+    uav_slots,
+)
+from dess.view import View
 from tests import drawn
 
 # A queue for one pad; an odd number of communication slots; a mission that is truncated.
@@ -54,6 +63,35 @@ def test_tables_agree_with_the_record(policy: str, fields: dict[str, Any]) -> No
 def test_tables_agree_on_any_scenario(space: dess.ScenarioSpace, seed: int) -> None:
     record = dess.simulate(space, policies.load("random"), seed, events=True)
     assert_agree(record, pd.DataFrame(record.events.columns()))
+
+
+class _Witness(drawn.Wanderer):
+    """A policy that keeps the ages that it sees at the starts of slots."""
+
+    def __init__(self) -> None:
+        self.seen: dict[int, np.ndarray] = {}
+
+    def act(self, view: View) -> np.ndarray:
+        self.seen[int(view.constants["slot"][0])] = view.age[0].copy()
+        return super().act(view)
+
+
+@given(
+    st.one_of(drawn.extended_spaces(age={"measured": True}), drawn.continuous_spaces()), drawn.seeds
+)
+def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(
+    space: dess.ScenarioSpace, seed: int
+) -> None:
+    witness = _Witness()
+    record = dess.simulate(space, witness, seed, events=True)
+    log = pd.DataFrame(record.events.columns())
+    of_nodes, curve = ages(log), mean_age(log)
+    for slot, seen in witness.seen.items():
+        assert np.allclose(of_nodes.loc[slot], seen, rtol=0, atol=1e-9)
+    time, age = curve["time"].to_numpy(), curve["age"].to_numpy()
+    area = ((age[1:] + age[:-1]) / 2 * np.diff(time)).sum()
+    assert area / duration(log) == pytest.approx(record.age, rel=1e-9)
+    assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
 
 
 def test_steps_are_one_cell_long_and_join() -> None:
