@@ -26,6 +26,7 @@ INITIAL_DATA = 2  # initial data per node
 SHADOWING = 3  # shadow fading per UAV, node and communication slot
 ARRIVAL = 4  # new data per node and mission slot
 POLICY = 5  # a policy's own randomness
+PLAN = 8  # the search of a planner
 ARRIVAL_TIME = 7  # candidates of arrivals in continuous time, per node
 WIND = 6  # gusts per cell; the seed is that of the wind
 UAV_FAILURE = 10  # failures and repairs per UAV and mission slot

@@ -1,7 +1,7 @@
 """Heuristic policies: random, nearest, greedy, tour and age under the guard, random without it.
 
 Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
-(``_step``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
+(``step_towards``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
 functions are compiled and work on the arrays of one mission.
 """
 
@@ -139,7 +139,7 @@ def _decide(
         )  # fmt: skip
         if node >= 0:
             home_x, home_y = nodes[node, 0], nodes[node, 1]
-        actions[row] = _step(mission, team, i, safe, home_x, home_y)
+        actions[row] = step_towards(mission, team, i, safe, home_x, home_y)
     return actions
 
 
@@ -163,7 +163,7 @@ def _random_action(mission, team, i, safe):
 
 
 @inlined
-def _step(mission, team, i, safe, goal_x, goal_y):
+def step_towards(mission, team, i, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
     best, least = HOVER, 1e18

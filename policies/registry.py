@@ -35,6 +35,8 @@ SHIPPED = {
     "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
     "age": ("policies.heuristics:Age", "the stalest data for the distance"),
+    "planner": ("policies.planner:Planner", "a plan for the whole team, improved in every slot"),
+    "planner-long": ("policies.planner:LongPlanner", "the same with a longer search"),
 }
 
 # One folder per trained policy, and the file that describes it.

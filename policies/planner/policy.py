@@ -1,0 +1,180 @@
+"""The planner as a policy: it plans for the whole team, and each UAV takes its first action.
+
+In slot 0 a plan is searched for from scratch. In each later slot the plan of the slot before is kept
+and improved from what has really happened. The return guard has the last word on every action.
+
+A plan must depend on nothing but its mission, so the policy itself keeps nothing. Plans belong to the
+arrays in which an engine or an environment holds its missions: row b of a memory to mission b. They go
+when these arrays go. In slot 0 every mission is planned anew.
+"""
+
+import weakref
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.code.kernels import kernel
+from dess.observations.guard import guard, must_charge
+from dess.rules import zone_cell
+from dess.state import HOVER, State
+from dess.view import View
+from policies.heuristics import step_towards
+from policies.planner.fluid import (
+    ACTION,
+    CELL_X,
+    CELL_Y,
+    CHARGE,
+    CHARGING,
+    MOST_WAYPOINTS,
+    NEXT,
+    STAY,
+    STAYED,
+    Plan,
+    begin,
+    empty_flight,
+    fly,
+)
+from policies.planner.rates import rates_of
+from policies.planner.search import improve, insert, remove
+
+# The temperature of the first step of a search [data units]: for a new plan, and for one that is kept.
+_NEW, _KEPT = 2.0, 0.3
+
+
+class Memory(NamedTuple):
+    """The plans of B missions with up to I UAVs.
+
+    Attributes:
+        made: (B, 3) the seed, the replication and the slot + 1 that each plan was made for; 0 for none.
+        waypoints, count: (B, ...) as in ``Plan``; what is left of the plan after the slot.
+        action: (B, I) the action of each UAV in the slot.
+        charging: (B, I) whether it is to charge in the slot.
+    """
+
+    made: np.ndarray
+    waypoints: np.ndarray
+    count: np.ndarray
+    action: np.ndarray
+    charging: np.ndarray
+
+
+# The memories by the identity of the arrays that they belong to, and the budget of the search.
+_MEMORIES: dict[tuple[int, int, int], tuple[weakref.ref, Memory]] = {}
+
+
+class Planner:
+    """Plan for the whole team by simulated annealing in a fluid model of the mission.
+
+    Attributes:
+        new, kept: How many edits of the plan the search tries: for a new plan, and in each later slot.
+    """
+
+    name = "planner"
+    new, kept = 60_000, 1_000
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose the (R,) actions for the rows of the view."""
+        state = view.state
+        return _decide(
+            state.missions, state.uavs, state.residual, view.world.nodes, rates_of(view),
+            memory_of(state, self.new, self.kept), view.mission, view.uav, guard(view),
+            self.new, self.kept,
+        )  # fmt: skip
+
+
+class LongPlanner(Planner):
+    """Plan as ``planner`` does, with a longer search."""
+
+    name = "planner-long"
+    new, kept = 600_000, 10_000
+
+
+def memory_of(state: State, new: int, kept: int) -> Memory:
+    """The plans of the missions in a state by a planner with this budget."""
+    missions = state.missions
+    key = (id(missions), new, kept)
+    if key not in _MEMORIES:
+        shape = state.uavs.shape
+        memory = Memory(
+            np.zeros((len(missions), 3), np.uint64),
+            np.zeros((*shape, MOST_WAYPOINTS, 4), np.int16),
+            *(np.zeros(shape, np.int64) for _ in range(3)),
+        )
+        _MEMORIES[key] = weakref.ref(missions, lambda _: _MEMORIES.pop(key)), memory
+    return _MEMORIES[key][1]
+
+
+@kernel
+def _decide(
+    missions, uavs, residual, nodes, rates, memory, rows_mission, rows_uav, safe, new, kept
+):  # fmt: skip
+    actions = np.empty(len(rows_mission), np.int64)
+    for row in range(len(rows_mission)):
+        b, i = rows_mission[row], rows_uav[row]
+        mission, team, made = missions[b], uavs[b], memory.made[b]
+        plan = Plan(memory.waypoints[b, : mission.uavs], memory.count[b, : mission.uavs])
+        slot = np.uint64(mission.slot + 1)
+        is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
+        if not is_same or made[2] != slot:
+            if is_same and 0 < made[2] < slot:
+                _take_up(mission, team, plan, memory.charging[b])
+                steps, hottest = kept, _KEPT
+            else:
+                _start(mission, team, residual[b].sum(), plan)
+                steps, hottest = new, _NEW
+            improve(mission, team, residual[b], nodes, rates, plan, steps, hottest)
+            _fly_first_slot(mission, team, residual[b], rates, plan, memory.action[b], memory.charging[b])
+            made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
+        action = memory.action[b, i]
+        if not safe[row, action]:
+            x, y = team[i].x, team[i].y
+            if plan.count[i] > 0:
+                x, y = plan.waypoints[i, 0, CELL_X], plan.waypoints[i, 0, CELL_Y]
+            action = step_towards(mission, team, i, safe[row], x, y)
+        actions[row] = action
+    return actions
+
+
+@kernel
+def _start(mission, uavs, data, plan):
+    """A plan in which the UAVs that must charge do so, each in its own cell of the zone."""
+    for i in range(mission.uavs):
+        plan.count[i] = 0
+        if uavs[i].active and must_charge(mission, uavs[i], data):
+            x, y = zone_cell(mission, i % (mission.zone_width * mission.zone_height))
+            insert(plan, i, 0, x, y, CHARGE, 0)
+
+
+@kernel
+def _take_up(mission, uavs, plan, charging):
+    """Fit what is left of a plan to what has happened since: UAVs have begun or ended to charge."""
+    for i in range(mission.uavs):
+        u = uavs[i]
+        if not u.active:
+            plan.count[i] = 0
+            continue
+        first = 0
+        while first < plan.count[i] and plan.waypoints[i, first, STAY] != CHARGE:
+            first += 1
+        if first == plan.count[i]:
+            continue
+        if u.charging and first > 0:
+            remove(plan, i, first)
+            insert(plan, i, 0, u.x, u.y, CHARGE, 0)
+        elif charging[i] and first == 0 and not u.charging and not u.latch:
+            remove(plan, i, 0)
+
+
+@kernel
+def _fly_first_slot(mission, uavs, residual, rates, plan, action, charging):
+    """Write what each UAV does in the present slot, and take it out of the plan."""
+    flight = empty_flight(1, mission.uavs, mission.nodes)
+    begin(mission, uavs, residual, flight)
+    fly(mission, uavs, rates, plan, flight, 0, flight, 1)
+    for i in range(mission.uavs):
+        u = flight.team[flight.last[0], i]
+        action[i], charging[i] = u[ACTION], u[CHARGING]
+        for _ in range(u[NEXT]):
+            remove(plan, i, 0)
+        if plan.count[i] > 0 and plan.waypoints[i, 0, STAY] != CHARGE:
+            plan.waypoints[i, 0, STAY] -= u[STAYED]

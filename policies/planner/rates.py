@@ -1,0 +1,83 @@
+"""The mean rates at which UAVs collect data, in tables that the planner reads.
+
+tables = rates_of(view)
+tables.ranks[place, 0]      # the node with the highest mean SNR at a place
+
+A place is a point on the way between neighbouring cells at which a communication slot may be.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.sections.wind import surcharges
+from dess.view import View
+
+# Nodes kept per place. The farther ones give next to no data, and nothing is planned with them.
+_RANKS = 32
+# Points of the Gauss-Hermite rule for the mean over the shadowing.
+_POINTS = 16
+
+
+class Rates(NamedTuple):
+    """What a UAV may collect at each place, and what its moves cost.
+
+    Attributes:
+        ranks: (2 * M * L, C) the nodes in descending order of mean SNR. The first M * L places are
+            those on the M rows of cells, counted along the row; the others those on the columns.
+        rates: (2 * M * L, C) their mean rates [data units per communication slot].
+        extra: (4, M, M) surcharges of moves in the wind [%], by action and the cell that it leads
+            to; (0, 0, 0) where there is no wind.
+    """
+
+    ranks: np.ndarray
+    rates: np.ndarray
+    extra: np.ndarray
+
+
+def rates_of(view: View) -> Rates:
+    """The tables of the sea that a view is about."""
+    mission, snr = view.state.missions[0], view.world.mean_snr
+    ranks, rates = _tables(
+        view.world.nodes.tobytes(),
+        snr.tobytes(),
+        len(snr),
+        float(mission["communication_slot_length"]),
+        float(mission["shadowing_deviation"]),
+    )
+    wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
+    still = np.zeros((0, 0, 0), np.int64)
+    return Rates(
+        ranks, rates, surcharges(len(snr), *wind) if mission["wind_most"] > 0 else still
+    )
+
+
+@lru_cache(maxsize=8)
+def _tables(
+    nodes: bytes, mean_snr: bytes, grid: int, length: float, deviation: float
+) -> tuple[np.ndarray, np.ndarray]:
+    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
+    snr = np.frombuffer(mean_snr).reshape(grid, -1)
+    mean_rate = _mean_rate(snr, length, deviation)
+    parts = (snr.shape[1] - 1) // (grid - 1)  # places per cell
+    places, kept = snr.shape[1], min(_RANKS, len(cells))
+    ranks = np.empty((2, grid, places, kept), np.int16)
+    rates = np.empty((2, grid, places, kept))
+    for axis in range(2):
+        along, across = cells[:, axis], cells[:, 1 - axis]
+        fine = np.abs(np.arange(places)[:, None] - parts * along)
+        for line in range(grid):
+            coarse = np.broadcast_to(np.abs(line - across), fine.shape)
+            best = np.argsort(-snr[coarse, fine], axis=1, kind="stable")[:, :kept]
+            ranks[axis, line] = best
+            rates[axis, line] = np.take_along_axis(mean_rate[coarse, fine], best, 1)
+    return ranks.reshape(-1, kept), rates.reshape(-1, kept)
+
+
+def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:
+    """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB]."""
+    points, weights = np.polynomial.hermite_e.hermegauss(_POINTS)
+    levels = snr[..., None] + deviation * points
+    rates = length * np.log2(1.0 + 10.0 ** (levels / 10.0))
+    return rates @ (weights / weights.sum())
