@@ -1,8 +1,8 @@
 """Heuristic policies: random, nearest, greedy, tour and age under the guard, random without it.
 
 Each policy has its own rule for choosing a goal (``_goal``). All share the rule for the next action
-(``step_towards``): the safe action that brings the UAV nearest to its goal and avoids teammates. These
-functions are compiled and work on the arrays of one mission.
+(``step_towards``): the safe action that brings the UAV nearest to its goal and avoids teammates.
+These functions are compiled and work on the arrays of one mission.
 """
 
 from functools import lru_cache

@@ -25,7 +25,7 @@ from policies.base import Policy
 GROUP = "dess.policies"
 
 # Name -> (module and class, description).
-SHIPPED = {
+HEURISTICS = {
     "random": ("policies.heuristics:Random", "a random safe move, clear of teammates"),
     "random-unguarded": (
         "policies.heuristics:RandomUnguarded",
@@ -35,9 +35,12 @@ SHIPPED = {
     "greedy": ("policies.heuristics:Greedy", "the best residual data for the distance"),
     "tour": ("policies.heuristics:Tour", "a fixed circuit through the nodes, split among the UAVs"),
     "age": ("policies.heuristics:Age", "the stalest data for the distance"),
+}
+PLANNERS = {
     "planner": ("policies.planner:Planner", "a plan for the whole team, improved in every slot"),
     "planner-long": ("policies.planner:LongPlanner", "the same with a longer search"),
 }
+SHIPPED = HEURISTICS | PLANNERS
 
 # One folder per trained policy, and the file that describes it.
 TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"

@@ -1,4 +1,4 @@
-"""A planner for one to six UAVs: a fluid model of the mission, and a search for the best plan in it."""
+"""A planner: a fluid model of the mission, and a search for the best plan in it."""
 
 from policies.planner.policy import LongPlanner, Planner
 

@@ -3,10 +3,10 @@
     value = fly(mission, rates, plan, flight, 0, flight)     # the whole plan
     value = fly(mission, rates, other, flight, 5, trial)     # again, from the sixth snapshot on
 
-The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move, batteries,
-the charging latch, pads, quotas, and communication slots in which each UAV serves the node with the
-highest mean SNR among those with data. Flights are resumed from snapshots, so a plan that differs
-in its last waypoints from one that was flown is flown from there on.
+The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
+batteries, the charging latch, pads, quotas, and communication slots in which each UAV serves the
+node with the highest mean SNR among those with data. Flights are resumed from snapshots, so a plan
+that differs in its last waypoints from one that was flown is flown from there on.
 """
 
 import math
@@ -20,7 +20,7 @@ from dess.rules import in_zone
 from dess.sections.failures import working_pads
 from dess.state import HOVER, STEP_X, STEP_Y
 
-# Columns of a waypoint: its cell, the slots to stay there, and whether the leg to it begins along y.
+# Columns of a waypoint: its cell, the slots to stay there, and 1 if the leg to it begins along y.
 # A stay of ``CHARGE`` means: hover until charged.
 CELL_X, CELL_Y, STAY, ORDER = range(4)
 CHARGE = -1
@@ -47,11 +47,11 @@ class Plan(NamedTuple):
 
     Attributes:
         waypoints: (I, ``MOST_WAYPOINTS``, 4) the columns are named above.
-        count: (I,) how many of them there are.
+        lengths: (I,) how many of them there are.
     """
 
     waypoints: np.ndarray
-    count: np.ndarray
+    lengths: np.ndarray
 
 
 class Flight(NamedTuple):
@@ -65,7 +65,7 @@ class Flight(NamedTuple):
         data: (S, K) residual data of the nodes [data units].
         since: (S, K) from which slot on the nodes have data.
         sums: (S, 2) data collected, and penalties [data units].
-        begun: (I, W + 1) the slot in which the leg to each waypoint begins, ``NEVER`` if it does not.
+        begun: (I, W + 1) the slot in which the leg to each waypoint begins, or ``NEVER``.
         last: (2,) the snapshot of the end, and the slots flown until then.
     """
 
@@ -135,7 +135,7 @@ def fly(mission, uavs, rates, plan, source, first, flight, slots):
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records, of which the constants are read.
         rates: ``Rates``.
-        plan: ``Plan``. Its waypoints before those on the way at the snapshot are those of ``source``.
+        plan: ``Plan``, the same as that of ``source`` until the snapshot.
         source: The flight with the snapshot.
         first: The number of the snapshot.
         flight: The flight that is written, from that snapshot on; it may be ``source``.
@@ -176,7 +176,9 @@ def fly(mission, uavs, rates, plan, source, first, flight, slots):
         data_left = present + rate * nodes * t - collected
         for i in range(count):
             if team[i, ACTIVE]:
-                penalty += _act(mission, uavs, extra, plan, flight.begun, team, i, t, active, data_left)
+                penalty += _act(
+                    mission, uavs, extra, plan, flight.begun, team, i, t, active, data_left
+                )
                 v = team[i]
                 part = parts // (m * uavs[i].slots_per_cell)
                 if STEP_Y[v[ACTION]] == 0:
@@ -234,7 +236,7 @@ def _act(mission, uavs, extra, plan, begun, team, i, t, active, data_left):
         v[LEFT] -= 1
         return penalty
     v[ACTION] = HOVER
-    while v[NEXT] < plan.count[i] and not ahead:
+    while v[NEXT] < plan.lengths[i] and not ahead:
         w = plan.waypoints[i, v[NEXT]]
         if v[X] != w[CELL_X] or v[Y] != w[CELL_Y]:
             penalty += _move(mission, u, extra, team, i, w)
@@ -266,7 +268,7 @@ def _act(mission, uavs, extra, plan, begun, team, i, t, active, data_left):
 @inlined
 def _unplanned(mission, u, plan, v, i, active, data_left):
     """The penalty if the guard would send a UAV home for a charge that is not in its plan."""
-    for w in range(v[NEXT], plan.count[i]):
+    for w in range(v[NEXT], plan.lengths[i]):
         if plan.waypoints[i, w, STAY] == CHARGE:
             return 0.0
     m, lacking = mission.communication_slots, u.quota - v[COUNTED]
@@ -303,12 +305,15 @@ def _move(mission, u, extra, team, i, w):
 
 @inlined
 def _is_blocked(mission, team, i, x, y):
-    """Whether a cell is taken: UAVs of a lower index have moved, the others move unless they charge."""
+    """Whether a teammate keeps UAV ``i`` out of a cell.
+
+    Those of a lower index have moved; the others will move away, unless they charge.
+    """
     for j in range(mission.uavs):
         o = team[j]
-        if j != i and o[ACTIVE] and o[X] == x and o[Y] == y:
-            if j < i or o[CHARGING] or (o[LATCH] and in_zone(mission, x, y)):
-                return True
+        stays = j < i or o[CHARGING] or (o[LATCH] and in_zone(mission, x, y))
+        if j != i and o[ACTIVE] and stays and o[X] == x and o[Y] == y:
+            return True
     return False
 
 
@@ -326,7 +331,7 @@ def _settle(mission, u, plan, begun, v, i, t):
         v[LATCH] = 0
         if v[CHARGING]:
             v[CHARGING] = 0
-            if v[NEXT] < plan.count[i] and plan.waypoints[i, v[NEXT], STAY] == CHARGE:
+            if v[NEXT] < plan.lengths[i] and plan.waypoints[i, v[NEXT], STAY] == CHARGE:
                 v[NEXT] += 1
                 v[STAYED] = 0
                 begun[i, v[NEXT]] = t + 1

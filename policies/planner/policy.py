@@ -1,11 +1,11 @@
 """The planner as a policy: it plans for the whole team, and each UAV takes its first action.
 
-In slot 0 a plan is searched for from scratch. In each later slot the plan of the slot before is kept
-and improved from what has really happened. The return guard has the last word on every action.
+In slot 0 a plan is searched for from scratch. In each later slot the plan of the slot before is
+kept and improved from what has really happened. The return guard has the last word on every action.
 
-A plan must depend on nothing but its mission, so the policy itself keeps nothing. Plans belong to the
-arrays in which an engine or an environment holds its missions: row b of a memory to mission b. They go
-when these arrays go. In slot 0 every mission is planned anew.
+A plan must depend on nothing but its mission, so the policy itself keeps nothing. Plans belong to
+the arrays in which an engine or an environment holds its missions: row b of a memory to mission b.
+They go when these arrays go. In slot 0 every mission is planned anew.
 """
 
 import weakref
@@ -16,7 +16,7 @@ import numpy as np
 from dess.code.kernels import kernel
 from dess.observations.guard import guard, must_charge
 from dess.rules import zone_cell
-from dess.state import HOVER, State
+from dess.state import State
 from dess.view import View
 from policies.heuristics import step_towards
 from policies.planner.fluid import (
@@ -37,7 +37,7 @@ from policies.planner.fluid import (
 from policies.planner.rates import rates_of
 from policies.planner.search import improve, insert, remove
 
-# The temperature of the first step of a search [data units]: for a new plan, and for one that is kept.
+# The temperature of the first step of a search [data units], for a new plan and for a kept one.
 _NEW, _KEPT = 2.0, 0.3
 
 
@@ -45,15 +45,15 @@ class Memory(NamedTuple):
     """The plans of B missions with up to I UAVs.
 
     Attributes:
-        made: (B, 3) the seed, the replication and the slot + 1 that each plan was made for; 0 for none.
-        waypoints, count: (B, ...) as in ``Plan``; what is left of the plan after the slot.
+        made: (B, 3) the seed, replication and slot + 1 that each plan was made for; 0 for none.
+        waypoints, lengths: (B, ...) as in ``Plan``; what is left of the plan after the slot.
         action: (B, I) the action of each UAV in the slot.
         charging: (B, I) whether it is to charge in the slot.
     """
 
     made: np.ndarray
     waypoints: np.ndarray
-    count: np.ndarray
+    lengths: np.ndarray
     action: np.ndarray
     charging: np.ndarray
 
@@ -66,7 +66,7 @@ class Planner:
     """Plan for the whole team by simulated annealing in a fluid model of the mission.
 
     Attributes:
-        new, kept: How many edits of the plan the search tries: for a new plan, and in each later slot.
+        new, kept: How many edits the search tries, for a new plan and for a kept one.
     """
 
     name = "planner"
@@ -112,7 +112,7 @@ def _decide(
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team, made = missions[b], uavs[b], memory.made[b]
-        plan = Plan(memory.waypoints[b, : mission.uavs], memory.count[b, : mission.uavs])
+        plan = Plan(memory.waypoints[b], memory.lengths[b])
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
         if not is_same or made[2] != slot:
@@ -123,12 +123,14 @@ def _decide(
                 _start(mission, team, residual[b].sum(), plan)
                 steps, hottest = new, _NEW
             improve(mission, team, residual[b], nodes, rates, plan, steps, hottest)
-            _fly_first_slot(mission, team, residual[b], rates, plan, memory.action[b], memory.charging[b])
+            _fly_first_slot(
+                mission, team, residual[b], rates, plan, memory.action[b], memory.charging[b]
+            )
             made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
         action = memory.action[b, i]
         if not safe[row, action]:
             x, y = team[i].x, team[i].y
-            if plan.count[i] > 0:
+            if plan.lengths[i] > 0:
                 x, y = plan.waypoints[i, 0, CELL_X], plan.waypoints[i, 0, CELL_Y]
             action = step_towards(mission, team, i, safe[row], x, y)
         actions[row] = action
@@ -139,7 +141,7 @@ def _decide(
 def _start(mission, uavs, data, plan):
     """A plan in which the UAVs that must charge do so, each in its own cell of the zone."""
     for i in range(mission.uavs):
-        plan.count[i] = 0
+        plan.lengths[i] = 0
         if uavs[i].active and must_charge(mission, uavs[i], data):
             x, y = zone_cell(mission, i % (mission.zone_width * mission.zone_height))
             insert(plan, i, 0, x, y, CHARGE, 0)
@@ -151,12 +153,12 @@ def _take_up(mission, uavs, plan, charging):
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
-            plan.count[i] = 0
+            plan.lengths[i] = 0
             continue
         first = 0
-        while first < plan.count[i] and plan.waypoints[i, first, STAY] != CHARGE:
+        while first < plan.lengths[i] and plan.waypoints[i, first, STAY] != CHARGE:
             first += 1
-        if first == plan.count[i]:
+        if first == plan.lengths[i]:
             continue
         if u.charging and first > 0:
             remove(plan, i, first)
@@ -176,5 +178,5 @@ def _fly_first_slot(mission, uavs, residual, rates, plan, action, charging):
         action[i], charging[i] = u[ACTION], u[CHARGING]
         for _ in range(u[NEXT]):
             remove(plan, i, 0)
-        if plan.count[i] > 0 and plan.waypoints[i, 0, STAY] != CHARGE:
+        if plan.lengths[i] > 0 and plan.waypoints[i, 0, STAY] != CHARGE:
             plan.waypoints[i, 0, STAY] -= u[STAYED]

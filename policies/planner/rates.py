@@ -48,9 +48,7 @@ def rates_of(view: View) -> Rates:
     )
     wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
     still = np.zeros((0, 0, 0), np.int64)
-    return Rates(
-        ranks, rates, surcharges(len(snr), *wind) if mission["wind_most"] > 0 else still
-    )
+    return Rates(ranks, rates, surcharges(len(snr), *wind) if mission["wind_most"] > 0 else still)
 
 
 @lru_cache(maxsize=8)

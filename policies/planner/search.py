@@ -3,8 +3,8 @@
     value = improve(mission, uavs, residual, nodes, rates, plan, 20_000, 2.0)
 
 Each step edits the plan, flies it in the fluid model from the first slot that the edit can change,
-and keeps the edit or takes it back (S. Kirkpatrick, C. Gelatt, M. Vecchi, *Optimization by simulated
-annealing*, 1983). All random numbers are functions of the mission, the slot and the step.
+and keeps the edit or takes it back (S. Kirkpatrick, C. Gelatt, M. Vecchi, *Optimization by
+simulated annealing*, 1983). All random numbers are functions of the mission, the slot and the step.
 """
 
 import math
@@ -46,16 +46,16 @@ _HIGH = np.uint64(16)
 
 @kernel
 def empty_plan(uavs):
-    """A plan without waypoints."""
+    """A plan of that many UAVs without waypoints."""
     return Plan(np.zeros((uavs, MOST_WAYPOINTS, 4), np.int16), np.zeros(uavs, np.int64))
 
 
 @kernel
 def copy_plan(source, target):
     """Make one plan equal to another."""
-    for i in range(len(source.count)):
-        target.count[i] = source.count[i]
-        for w in range(source.count[i]):
+    for i in range(len(source.lengths)):
+        target.lengths[i] = source.lengths[i]
+        for w in range(source.lengths[i]):
             for column in range(4):
                 target.waypoints[i, w, column] = source.waypoints[i, w, column]
 
@@ -79,7 +79,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
     trial_flight = empty_flight(slots, mission.uavs, mission.nodes)
     begin(mission, uavs, residual, flight)
     value = fly(mission, uavs, rates, plan, flight, 0, flight, slots)
-    best, present, trial = value, empty_plan(mission.uavs), empty_plan(mission.uavs)
+    best, present, trial = value, empty_plan(len(plan.lengths)), empty_plan(len(plan.lengths))
     copy_plan(plan, present)
     copy_plan(plan, trial)
     words = np.empty(4, np.uint64)
@@ -99,9 +99,9 @@ def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         if new >= value or new - value > heat * math.log(luck):
             value = new
-            _keep(trial_flight, flight, slot // STRIDE)
+            _keep(mission, trial_flight, flight, slot // STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
-                trial.count[i] = min(trial.count[i], flight.team[flight.last[0], i, NEXT] + 1)
+                trial.lengths[i] = min(trial.lengths[i], flight.team[flight.last[0], i, NEXT] + 1)
             copy_plan(trial, present)
             if value > best:
                 best = value
@@ -112,13 +112,13 @@ def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
 
 
 @kernel
-def _keep(trial, flight, first):
+def _keep(mission, trial, flight, first):
     """Make a flight that of a trial, which was flown from a snapshot on."""
     for s in range(first, trial.last[0] + 1):
         copy_snapshot(trial, s, flight, s)
         flight.sums[s, 0], flight.sums[s, 1] = trial.sums[s, 0], trial.sums[s, 1]
     flight.last[0], flight.last[1] = trial.last[0], trial.last[1]
-    for i in range(len(flight.begun)):
+    for i in range(mission.uavs):
         for w in range(flight.begun.shape[1]):
             flight.begun[i, w] = trial.begun[i, w]
 
@@ -141,12 +141,12 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     kind, i = _KINDS[_pick(words[0], len(_KINDS))], _pick(words[1], mission.uavs)
     if not uavs[i].active:
         return _NO_EDIT
-    p = _pick_low(words[1], plan.count[i] + (kind == _INSERT or kind == _CHARGE))
+    p = _pick_low(words[1], plan.lengths[i] + (kind in (_INSERT, _CHARGE)))
     if kind == _INSERT:
         return _insert_node(mission, uavs, nodes, flight, plan, i, p, words)
     if kind == _CHARGE:
         return _edit_charge(mission, flight, plan, i, p, words)
-    if plan.count[i] == 0:
+    if plan.lengths[i] == 0:
         return _NO_EDIT
     slot = flight.begun[i, p]
     way = plan.waypoints[i]
@@ -165,7 +165,7 @@ def _edit(mission, uavs, nodes, flight, plan, words):
             return _NO_EDIT
         way[p, CELL_X], way[p, CELL_Y] = x, y
     elif kind == _REVERSE:
-        q = min(p + 1 + _pick(words[2], 5), plan.count[i] - 1)
+        q = min(p + 1 + _pick(words[2], 5), plan.lengths[i] - 1)
         while p < q:
             _swap(way, p, way, q)
             p, q = p + 1, q - 1
@@ -183,17 +183,17 @@ def _exchange(mission, flight, plan, kind, i, p, j, words):
     slot = flight.begun[i, p]
     x, y, stay, order = plan.waypoints[i, p]
     if kind == _MOVE:
-        if j != i and (stay == CHARGE or plan.count[j] == MOST_WAYPOINTS):
+        if j != i and (stay == CHARGE or plan.lengths[j] == MOST_WAYPOINTS):
             return _NO_EDIT
         remove(plan, i, p)
-        q = _pick(words[3], plan.count[j] + 1)
+        q = _pick(words[3], plan.lengths[j] + 1)
         if stay != CHARGE and _pick_low(words[2], 1 << 16) < _SHORTEST:
             q = _shortest_detour(mission, flight, plan, j, x, y)
         insert(plan, j, q, x, y, stay, order)
     else:
-        if plan.count[j] == 0:
+        if plan.lengths[j] == 0:
             return _NO_EDIT
-        q = _pick(words[3], plan.count[j])
+        q = _pick(words[3], plan.lengths[j])
         if j != i and (stay == CHARGE or plan.waypoints[j, q, STAY] == CHARGE):
             return _NO_EDIT
         _swap(plan.waypoints[i], p, plan.waypoints[j], q)
@@ -203,7 +203,7 @@ def _exchange(mission, flight, plan, kind, i, p, j, words):
 @kernel
 def _insert_node(mission, uavs, nodes, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
-    if plan.count[i] == MOST_WAYPOINTS:
+    if plan.lengths[i] == MOST_WAYPOINTS:
         return _NO_EDIT
     data = flight.data[flight.last[0]]
     k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
@@ -222,9 +222,9 @@ def _edit_charge(mission, flight, plan, i, p, words):
     """Let UAV ``i`` charge before waypoint ``p``, or charge in another cell if it charges there."""
     x, y = zone_cell(mission, _pick(words[2], mission.zone_width * mission.zone_height))
     slot = flight.begun[i, p]
-    if p < plan.count[i] and plan.waypoints[i, p, STAY] == CHARGE:
+    if p < plan.lengths[i] and plan.waypoints[i, p, STAY] == CHARGE:
         plan.waypoints[i, p, CELL_X], plan.waypoints[i, p, CELL_Y] = x, y
-    elif plan.count[i] == MOST_WAYPOINTS or mission.flight_cost == 0:
+    elif plan.lengths[i] == MOST_WAYPOINTS or mission.flight_cost == 0:
         return _NO_EDIT
     else:
         insert(plan, i, p, x, y, CHARGE, words[3] & np.uint64(1))
@@ -236,9 +236,9 @@ def _shortest_detour(mission, flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
     way, least, place = plan.waypoints[i], 1 << 40, 0
     from_x, from_y = flight.team[0, i, 0], flight.team[0, i, 1]
-    for p in range(plan.count[i] + 1):
+    for p in range(plan.lengths[i] + 1):
         detour = abs(x - from_x) + abs(y - from_y)
-        if p < plan.count[i]:
+        if p < plan.lengths[i]:
             to_x, to_y = way[p, CELL_X], way[p, CELL_Y]
             detour += abs(x - to_x) + abs(y - to_y) - abs(from_x - to_x) - abs(from_y - to_y)
             from_x, from_y = to_x, to_y
@@ -251,19 +251,19 @@ def _shortest_detour(mission, flight, plan, i, x, y):
 def insert(plan, i, p, x, y, stay, order):
     """Insert a waypoint before number ``p`` of UAV ``i``."""
     way = plan.waypoints[i]
-    for q in range(plan.count[i], p, -1):
+    for q in range(plan.lengths[i], p, -1):
         for column in range(4):
             way[q, column] = way[q - 1, column]
     way[p, CELL_X], way[p, CELL_Y], way[p, STAY], way[p, ORDER] = x, y, stay, order
-    plan.count[i] += 1
+    plan.lengths[i] += 1
 
 
 @kernel
 def remove(plan, i, p):
     """Take out waypoint ``p`` of UAV ``i``."""
     way = plan.waypoints[i]
-    plan.count[i] -= 1
-    for q in range(p, plan.count[i]):
+    plan.lengths[i] -= 1
+    for q in range(p, plan.lengths[i]):
         for column in range(4):
             way[q, column] = way[q + 1, column]
 

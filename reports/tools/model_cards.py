@@ -21,7 +21,7 @@ from analysis.replication import paper
 from analysis.stats.intervals import interval_of, mean_interval
 from dess import load_scenario, simulate_batch
 from policies.ddqn.config import MISSION_SEED, config_of, load_config
-from policies.registry import SHIPPED
+from policies.registry import HEURISTICS
 
 BEGIN, END = (
     "<!-- computed by reports/tools/model_cards.py -->",
@@ -92,7 +92,7 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     )
     others = {
         name: simulate_batch(space, policies.load(name), EVALUATION_SEED, missions).missions
-        for name in SHIPPED
+        for name in HEURISTICS
     }
     rows = [_row(folder.name, learned)]
     rows += [_row(f"{n} UAV(s)", learned[learned["uavs"] == n]) for n in np.unique(learned["uavs"])]

@@ -15,10 +15,10 @@ from dess.observations.guard import guard
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.state import HOVER
 from dess.view import View
-from policies.registry import SHIPPED
+from policies.registry import HEURISTICS
 from tests.drawn import NORTH, SOUTH, Checked, replications, seeds, spaces
 
-NAMES = tuple(name for name in SHIPPED if name != "random-unguarded")
+NAMES = tuple(name for name in HEURISTICS if name != "random-unguarded")
 heuristics = st.sampled_from(NAMES).map(policies.load)
 
 
@@ -53,7 +53,7 @@ def test_heuristics_are_legal_safe_and_without_memory(
 
 @given(
     spaces(),
-    st.lists(st.sampled_from([*SHIPPED]).map(policies.load), min_size=1, max_size=3),
+    st.lists(st.sampled_from([*HEURISTICS]).map(policies.load), min_size=1, max_size=3),
     seeds,
     st.lists(replications, min_size=1, max_size=4),
     st.integers(1, 4),

@@ -25,7 +25,7 @@ def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> Non
         assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)
 
 
-def test_shipped_heuristics_have_a_look_of_their_own() -> None:
+def test_shipped_policies_have_a_look_of_their_own() -> None:
     assert set(SHIPPED) <= set(KNOWN_POLICIES)
 
 

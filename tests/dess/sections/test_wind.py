@@ -13,11 +13,11 @@ from dess.observations.reach import reach_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections.wind import Wind, surcharges
 from dess.state import BATTERY, constants_of
-from policies.registry import SHIPPED
+from policies.registry import HEURISTICS
 from tests.drawn import Script, Wanderer, replications, seeds, spaces
 
 OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
-GUARDED = st.sampled_from([name for name in SHIPPED if name != "random-unguarded"])
+GUARDED = st.sampled_from([name for name in HEURISTICS if name != "random-unguarded"])
 winds = st.builds(
     Wind,
     strength=st.floats(0, 6),
