@@ -25,9 +25,8 @@ from dess.scenario import Scenario
 from reports.player.mission_map import TRAIL, statuses
 from reports.player.playback import Playback
 
-# Width, and height for each of the curves [inches]; dots per inch. Videos need even numbers of
-# pixels.
-SIZE, DPI = (9, 1.6), 90
+# The width, and the height for each of the curves [px], even as videos need; dots per inch.
+WIDTH, HEIGHT, DPI = 810, 144, 90
 NODE, UAV, PAD, DOT = 140, 85, 170, 22  # areas of the fullest node and of other marks [points^2]
 
 Mover = Callable[[int], object]  # makes marks show the mission after a number of slots
@@ -56,7 +55,7 @@ class Film:
         playback = Playback(pd.DataFrame(events), scenario)
         self.end = playback.end
         curves = [*missions.curves(scenario)]
-        self.figure = Figure(figsize=(SIZE[0], SIZE[1] * len(curves)), dpi=DPI)
+        self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)
         self.figure.set_layout_engine("constrained", rect=(0, 0, 0.95, 1))  # notes at the right
         self.figure.suptitle(title, x=0.012, ha="left", fontsize=11)
         heights = [1.3] * (len(curves) - 1) + [1]
