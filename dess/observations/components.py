@@ -3,11 +3,12 @@
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.observations.extensions import encode_extensions, extension_names, extensions_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import State, spaces_of
 
 # The UAV's own state, the scenario's parameters and the time. The residual data of the nodes
-# follow, then the teammates in the order of their indices.
+# follow, then the teammates in the order of their indices, then what is beyond the paper.
 _OWN = (
     "active",
     "x",
@@ -33,11 +34,15 @@ def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
     end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has fewer
     UAVs than the largest fleet, the other rows are zeros.
+
+    Scenarios beyond the paper have more components at the end: the share of the pads that are out
+    of order, the surcharge of each move by the wind divided by 100, and ages divided by
+    ``max_slots``.
     """
     space = spaces_of([scenario])[0]
     nodes = [f"residual_{k}" for k in range(len(space.nodes))]
     mates = [f"mate_{j}_{name}" for j in range(1, space.uavs[1]) for name in _MATE]
-    return [*_OWN, *nodes, *mates]
+    return [*_OWN, *nodes, *mates, *extension_names(space)]
 
 
 def component_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
@@ -63,6 +68,10 @@ class Components:
 
     def __init__(self, space: ScenarioSpace):
         self.shapes = ((len(component_names(space)),),)
+        self._extensions, self._common = (
+            extensions_of(space),
+            self.shapes[0][0] - len(extension_names(space)),
+        )
 
     def encode(
         self, state: State, missions: np.ndarray, uavs: np.ndarray
@@ -72,21 +81,23 @@ class Components:
         Where ``uavs[r]`` is -1, they are zeros.
         """
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
-        _encode(state, missions, uavs, out)
+        _encode(state, missions, uavs, self._extensions, self._common, out)
         return (out,)
 
 
 @kernel
-def _encode(state, missions, uavs, out):
+def _encode(state, missions, uavs, has, common, out):
     for row in range(len(missions)):
         b, i = missions[row], uavs[row]
         if i >= 0:
-            _encode_uav(state.missions[b], state.uavs[b], i, state.residual[b], out[row])
+            mission, team = state.missions[b], state.uavs[b]
+            _encode_uav(mission, team, i, state.residual[b], out[row])
+            encode_extensions(has, mission, team, i, state.sensors[b], out[row, common:])
 
 
 @kernel
 def _encode_uav(mission, uavs, i, residual, out):
-    """One UAV's observation, in the order of ``component_names``."""
+    """What every observation has of one UAV, in the order of ``component_names``."""
     u = uavs[i]
     cell = 1.0 / (mission.grid - 1)
     out[0] = u.active
