@@ -18,7 +18,7 @@ FLOORS = ("dess", "policies", "analysis", "reports")  # from the ground up
 # The rooms of a floor; each imports only from those before it.
 ROOMS = {
     "analysis": (
-        *("names", "numbers", "stats", "study", "results", "execution", "questions"),
+        *("names", "numbers", "stats", "bound", "study", "results", "execution", "questions"),
         *("replication", "verification", "figures", "sweeps"),
     ),
     "reports": (

@@ -1,0 +1,184 @@
+"""What a flying slot can be worth at given prices: the expected best of all nodes.
+
+In a communication slot a UAV serves one node. If a data unit of node k is worth ``w_k >= 0``, the
+slot is worth at most ``E[max_k w_k R_k]``. The rate R_k is a convex function of the shadowing of
+node k, and so is the maximum. Therefore shadowing with a few values, whose distribution is a
+mean-preserving spread of the normal one, gives an upper bound (docs/concepts/bound.md,
+inequality 5). The expectation over these few values is computed exactly.
+"""
+
+import math
+
+import numpy as np
+
+from dess.channel import rate
+from dess.code.kernels import inlined, kernel
+from dess.state import EAST, HOVER, NORTH, SOUTH, STEP_X, STEP_Y, WEST
+from dess.streams import MAX_NORMAL
+
+_HALF = (0.4, 0.9, 1.5, 2.2, 3.2, MAX_NORMAL)
+POINTS = np.array([*(-z for z in _HALF[::-1]), 0.0, *_HALF])  # standard normal deviates
+
+
+def spread(points: np.ndarray) -> np.ndarray:
+    """(J + 1,) distribution on J points, a mean-preserving spread of the standard normal one.
+
+    Entry j is the probability of the points before j.
+
+    The part of the distribution between two neighbouring points moves to these two, without a
+    change of its mean (Edmundson and Madansky). What is beyond the outer points moves to them; no
+    deviate of the simulator is there.
+    """
+    below = np.array([0.5 * math.erfc(-z / math.sqrt(2.0)) for z in points])
+    density = np.exp(-(points**2) / 2) / math.sqrt(2.0 * math.pi)
+    mass, moment = np.diff(below), -np.diff(density)
+    upper = (moment - points[:-1] * mass) / np.diff(points)
+    probabilities = np.zeros(len(points))
+    probabilities[1:] += upper
+    probabilities[:-1] += mass - upper
+    probabilities[0] += below[0]
+    probabilities[-1] += 1 - below[-1]
+    return np.concatenate([[0.0], np.cumsum(probabilities)])
+
+
+@kernel
+def rates_of(mission, mean_snr, points):
+    """(M, F * (M - 1) + 1, J) rates [data units per communication slot] at the points.
+
+    The first two axes are the relative positions of ``World.mean_snr``.
+    """
+    rates = np.empty((*mean_snr.shape, len(points)))
+    for a in range(mean_snr.shape[0]):
+        for b in range(mean_snr.shape[1]):
+            for j in range(len(points)):
+                snr = mean_snr[a, b] + mission.shadowing_deviation * points[j]
+                rates[a, b, j] = rate(mission, snr)
+    return rates
+
+
+@inlined
+def _levels_at(x, y, offset, along_x, nodes, rates, levels):
+    """Set the rates of all nodes at a place: a cell, plus ``offset`` communication slots."""
+    places = (rates.shape[1] - 1) // (rates.shape[0] - 1)  # per cell
+    for k in range(len(nodes)):
+        dx, dy = x - nodes[k, 0], y - nodes[k, 1]
+        fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
+        row = rates[abs(coarse), abs(fine + offset)]
+        for j in range(rates.shape[2]):
+            levels[k, j] = row[j]
+
+
+@inlined
+def _best_of(levels, worth, without, below, values, chances, winners, rank):
+    """The distribution of ``max_k w_k R_k``: its values downwards, their chances, who has them.
+
+    Returns the number of values. Node ``without`` is left out. Without any worth there is the one
+    value 0, of no node.
+    """
+    top = levels.shape[1] - 1
+    floor, lowest, count = 0.0, -1, 0  # the maximum is never below the floor
+    for k in range(len(worth)):
+        if k != without and worth[k] * levels[k, 0] > floor:
+            floor, lowest = worth[k] * levels[k, 0], k
+    for k in range(len(worth)):
+        rank[k] = top if k != without and worth[k] * levels[k, top] > floor else -1
+    left = 1.0  # chance that the maximum is smaller than the values so far
+    while left > 1e-9:
+        best, node = floor, -1
+        for k in range(len(worth)):
+            if rank[k] >= 0 and worth[k] * levels[k, rank[k]] > best:
+                best, node = worth[k] * levels[k, rank[k]], k
+        values[count], winners[count] = best, node
+        if node < 0:
+            chances[count], winners[count] = left, lowest
+            return count + 1
+        smaller = left * below[rank[node]] / below[rank[node] + 1]
+        chances[count] = left - smaller
+        left = smaller
+        rank[node] -= 1
+        count += 1
+    chances[count - 1] += left
+    return count
+
+
+@inlined
+def _place_values(x, y, offset, along_x, home, worth, local, nodes, rates, below, scratch,
+                  result):  # fmt: skip
+    """Add to ``result`` (Q,) the worth of a communication slot, for each local price."""
+    levels, values, chances, winners, rank = scratch
+    _levels_at(x, y, offset, along_x, nodes, rates, levels)
+    count = _best_of(levels, worth, home, below, values, chances, winners, rank)
+    for q in range(local.shape[1]):
+        own = max(worth[home] - local[home, q], 0.0)
+        above, mass, i, total = 0.0, 0.0, 0, 0.0
+        for j in range(levels.shape[1] - 1, -1, -1):
+            value = own * levels[home, j]
+            while i < count and values[i] > value:
+                above += values[i] * chances[i]
+                mass += chances[i]
+                i += 1
+            total += (below[j + 1] - below[j]) * (above + value * (1.0 - mass))
+        result[q] += total
+
+
+@kernel
+def step_values(worth, local, nodes, block, rates, below, values):
+    """What each step is worth in a flying slot at given prices.
+
+    Args:
+        worth: (S, K) worth of a data unit of each node, per period between cuts.
+        local: (K, Q) local prices of a node while it is the home node.
+        nodes: (K, 2) cells of the nodes.
+        block: (M, M) home node of each cell ``x, y``.
+        rates: From ``rates_of``.
+        below: (J + 1,) From ``spread``.
+        values: (S, 5, M, M, Q) worth of the step with an action to a cell ``x, y``, overwritten.
+    """
+    grid, count, levels = len(block), len(nodes), rates.shape[2]
+    m = (rates.shape[1] - 1) // (grid - 1)
+    scratch = (
+        np.empty((count, levels)), np.empty(count * levels + 1), np.empty(count * levels + 1),
+        np.empty(count * levels + 1, np.int64), np.empty(count, np.int64),
+    )  # fmt: skip
+    for s in range(len(worth)):
+        values[s] = 0.0
+        for x in range(grid):
+            for y in range(grid):
+                cell = values[s, HOVER, x, y]
+                _place_values(x, y, 0, True, block[x, y], worth[s], local, nodes, rates,
+                              below, scratch, cell)  # fmt: skip
+                for action in range(4):
+                    values[s, action, x, y] += cell
+                cell *= m
+        for x in range(grid):
+            for y in range(grid):
+                for along_x in (True, False):
+                    x2, y2 = x + along_x, y + (not along_x)
+                    if x2 == grid or y2 == grid:
+                        continue
+                    there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
+                    between = np.zeros((2, local.shape[1]))
+                    homes = block[x2, y2], block[x, y]
+                    for way in range(2 if homes[0] != homes[1] else 1):
+                        for n in range(1, m):
+                            _place_values(x, y, n, along_x, homes[way], worth[s], local, nodes,
+                                          rates, below, scratch, between[way])  # fmt: skip
+                    values[s, there, x2, y2] += between[0]
+                    values[s, back, x, y] += between[1 if homes[0] != homes[1] else 0]
+
+
+@kernel
+def step_takings(x, y, action, worth, nodes, rates, below, takings):
+    """Add to ``takings`` (K,) what the step to cell ``x, y`` takes of each node at its best."""
+    count, levels = len(nodes), rates.shape[2]
+    m = (rates.shape[1] - 1) // (rates.shape[0] - 1)
+    rows = np.empty((count, levels))
+    values, chances = np.empty(count * levels + 1), np.empty(count * levels + 1)
+    winners, rank = np.empty(count * levels + 1, np.int64), np.empty(count, np.int64)
+    for n in range(1, m + 1):
+        offset = (n - m) * (STEP_X[action] + STEP_Y[action])
+        _levels_at(x, y, offset, action in (EAST, WEST), nodes, rates, rows)
+        found = _best_of(rows, worth, -1, below, values, chances, winners, rank)
+        for i in range(found):
+            if winners[i] >= 0:
+                takings[winners[i]] += values[i] * chances[i] / worth[winners[i]]

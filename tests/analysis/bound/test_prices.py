@@ -1,0 +1,64 @@
+"""The bound lies above every policy, and what it refuses."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import policies
+from analysis.bound import upper_bound
+from dess import load_scenario, simulate_batch
+from dess.errors import InputError
+from dess.scenario import ScenarioSpace
+
+TINY = {"grid": 6, "nodes": ((1, 1), (4, 2), (2, 5)), "zone": (2, 1, 2, 2), "max_slots": 60}
+
+
+def tiny(**values: object) -> ScenarioSpace:
+    return load_scenario("paper", **TINY | values)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    uavs=st.integers(1, 4),
+    quota=st.integers(1, 120),
+    flying_time=st.integers(1, 40),
+    charge=st.tuples(st.integers(10, 30), st.integers(1, 30)),
+    arrival_rate=st.sampled_from([0.0, 0.02, 0.5]),
+    initial=st.sampled_from([0.0, 3.0, (5.0, 20.0)]),
+    edge_snr=st.sampled_from([-25.0, 0.0, 10.0]),
+    flight_cost=st.integers(0, 1),
+    policy=st.sampled_from(["greedy", "nearest", "tour", "random"]),
+    seed=st.integers(0, 2**32),
+)
+def test_no_policy_collects_more_without_shadowing(
+    uavs, quota, flying_time, charge, arrival_rate, initial, edge_snr, flight_cost, policy, seed
+) -> None:
+    space = tiny(
+        uavs=uavs, quota=quota, flying_time=flying_time, charge_start=charge[0],
+        charge_complete=sum(charge), arrival_rate=arrival_rate, initial_data=initial,
+        edge_snr=edge_snr, flight_cost=flight_cost, shadowing_variance=0.0,
+    )  # fmt: skip
+    ratio = simulate_batch(space, policies.load(policy), seed).missions["collection_ratio"][0]
+    assert ratio <= upper_bound(space, seed, 0, iterations=6).ratio
+
+
+def test_no_policy_has_a_higher_mean_with_shadowing() -> None:
+    values = {"uavs": (1, 2), "quota": 40, "initial_data": (40.0, 60.0)}
+    space = tiny(**values, flying_time=8, charge_start=10, charge_complete=30)
+    bounds = [upper_bound(space, 3, r, iterations=6).ratio for r in range(20)]
+    for policy in ("greedy", "tour"):
+        ratios = simulate_batch(space, policies.load(policy), 3, 20).missions["collection_ratio"]
+        assert ratios.mean() <= np.mean(bounds)
+    assert min(bounds) < 1
+
+
+def test_the_same_mission_has_the_same_bound() -> None:
+    first, second = (upper_bound(tiny(), 5, 2, iterations=4) for _ in range(2))
+    assert first.ratio == second.ratio
+    assert first.prices.tobytes() == second.prices.tobytes()
+
+
+def test_sections_beyond_the_paper_are_refused() -> None:
+    with pytest.raises(InputError, match="bound: the scenario has sections"):
+        upper_bound(tiny(**{"wind.strength": 0.5}), 0, 0)
