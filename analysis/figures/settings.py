@@ -229,7 +229,10 @@ def curves(
     half_width = min(0.12 * gap, 0.02 * float(np.ptp(places)))
     style.policy_means(rows.assign(spot=spots), "spot", looks, half_width, ax)
     if names or len(values) <= MOST_TICKS:
-        ax.set_xticks(places, names or [*map(value_text, values)])
+        names = names or [*map(value_text, values)]
+        ax.set_xticks(places, names)
+        if max(map(len, names)) * np.ptp(places) / gap > _room(ax):
+            ax.xaxis.set_tick_params(rotation=30)
 
 
 def _cells(
@@ -292,9 +295,14 @@ def _name_ticks(axis: XAxis | YAxis, values: Sequence[Any], most: int, first: fl
     places = range(0, len(values), ceil(len(values) / most))
     names = [value_text(values[place]) for place in places]
     axis.set_ticks([place + first for place in places], names)
-    spec = axis.axes.get_subplotspec()
-    if isinstance(axis, XAxis) and spec and sum(map(len, names)) > 44 / spec.get_gridspec().ncols:
+    if isinstance(axis, XAxis) and sum(map(len, names)) > _room(axis.axes):
         axis.set_tick_params(rotation=30)
+
+
+def _room(ax: Axes) -> float:
+    """The characters that fit below an axis."""
+    spec = ax.get_subplotspec()
+    return 44 / (spec.get_gridspec().ncols if spec else 1)
 
 
 def _places(column: pd.Series, values: Sequence[Any]) -> pd.Series:

@@ -95,7 +95,7 @@ def age(results: Results) -> str:
             f"{relative(row.mean, row.low, row.high)} (arrival rate {value_text(row.arrival_rate)})"
             for row in rows.itertuples()
         ]
-        parts.append(f"from one to {uavs} UAVs by {numbers.words(at_rates)}")
+        parts.append(f"from 1 to {uavs} UAVs by {numbers.words(at_rates)}")
     printed = [f"{numbers.minus(f'{100 * PUBLISHED[n]:+.0f}')} %" for n in table["uavs"].unique()]
     return (
         f"**The average age of information changes {'; '.join(parts)}** (policy "

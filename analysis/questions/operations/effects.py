@@ -1,6 +1,7 @@
 """Means at every design point, and their changes from a reference value of a field."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import isnan
 from typing import Any
 
 import pandas as pd
@@ -82,7 +83,7 @@ def listed(
     columns: str,
     write: Callable[[float, float, float], str] | None = None,
 ) -> pd.DataFrame:
-    """Estimates as a table of text.
+    """Estimates as a table of text; nothing stands where there is no estimate.
 
     Args:
         rows: Rows of ``means`` or ``changes``.
@@ -94,7 +95,12 @@ def listed(
     if metric is not None:
         rows = rows[rows["metric"] == metric]
     write = write or (numbers.interval if metric in METRICS else numbers.quantities)
-    table = numbers.wide(rows, [*index], columns, write).fillna("").reset_index()
+
+    def cell(mean: float, low: float, high: float) -> str:
+        return "" if isnan(mean) else write(mean, low, high)
+
+    table = numbers.wide(rows, [*index], columns, cell).fillna("").reset_index()
+    table[[*index]] = table[[*index]].map(value_text)
     heads = {field: parameter(field).name for field in index} | {"policy": "Policy"}
     values = {value: value_text(value) for value in table.columns[len(index) :]}
     return table.rename(columns=heads | values)

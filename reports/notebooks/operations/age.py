@@ -74,9 +74,9 @@ html.gallery(
 # %%
 change = answers.age_changes(study)
 html.table(
-    effects.listed(change, None, ["policy", rates], "uavs", answers.relative),
+    effects.listed(change, None, ["policy", "uavs"], rates, answers.relative),
     f"Change of the average age of information from one UAV, with {level} intervals of the ratio "
-    "of means over common replications, by number of UAVs",
+    "of means over common replications, by arrival rate",
     data=change,
 )
 
@@ -85,8 +85,8 @@ html.table(
 
 # %%
 html.table(
-    effects.listed(means, names.AGE, ["policy", rates], "uavs"),
-    f"{names.metric_label(names.AGE)}: means with {level} intervals, by number of UAVs",
+    effects.listed(means, names.AGE, ["policy", "uavs"], rates),
+    f"{names.metric_label(names.AGE)}: means with {level} intervals, by arrival rate",
     data=means,
 )
 

@@ -30,9 +30,10 @@ from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "failures")
-counts = ["failures", "slots_grounded", "lost"]
+columns = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
+counts = [c for c in columns if study.missions[c].max() > 0]
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
-means = effects.means(study, [*metrics, *(name for name in counts if name in study.missions)])
+means = effects.means(study, [*metrics, *counts])
 missions = numbers.span(means.loc[means["metric"].isin(metrics), "n"])
 level = numbers.level(LEVEL)
 rate, repair = answers.RATE, answers.REPAIR
@@ -91,7 +92,6 @@ display(
             "rate per mission slot; nothing where nothing can fail",
         )
         for metric in counts
-        if metric in study.missions
     )
 )
 

@@ -67,9 +67,9 @@ html.gallery(
 # %%
 lost = effects.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
 html.table(
-    effects.listed(lost, None, ["policy", "uavs"], "pads", numbers.points),
+    effects.listed(lost, None, ["policy", "pads"], "uavs", numbers.points),
     "Collection ratio and communication with fewer pads, minus that with the most pads: paired "
-    f"differences in percentage points with {level} intervals, by number of pads",
+    f"differences in percentage points with {level} intervals, by number of UAVs",
     data=lost,
 )
 
@@ -96,7 +96,8 @@ html.gallery(
 # ### The queue over time
 #
 # All UAVs take off together, so their batteries reach the charging threshold at about the same time
-# and the queue comes in a wave. The first pads of every fleet, and one pad fewer than is enough:
+# and the queue comes in a wave. The figure shows, for every fleet, a single pad, and the largest
+# number of pads that is not enough.
 
 # %%
 waves = queue.over_time(study, study.policies[0], answers.short_of_pads(study, margin))
@@ -113,8 +114,8 @@ html.figure(
 display(
     *(
         html.table(
-            effects.listed(means, metric, ["policy", "uavs"], "pads"),
-            f"{names.metric_label(metric)}: means with {level} intervals, by number of pads",
+            effects.listed(means, metric, ["policy", "pads"], "uavs"),
+            f"{names.metric_label(metric)}: means with {level} intervals, by number of UAVs",
         )
         for metric in uses
     )

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
 from analysis import run_study
 from analysis.figures import settings as figures
+from analysis.figures import style
 from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import settings
 from dess import InputError
@@ -50,6 +52,20 @@ def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
             assert y == pytest.approx(own["mean"])
     assert [t.get_text() for t in drawing.axes[-1].get_xticklabels()] == ["5–7", "10"]
     assert len(figures.plot(results, "uavs", hue="quota", policy="random").axes) == 1
+
+
+def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
+    rates = [0, 0.001, 0.002, 0.005, 0.01]
+    for values, angle in ((rates, 30), ([1, 2, 3, 10], 0)):
+        rows = pd.DataFrame({"rate": values, "policy": "greedy", "mean": 0.5, "low": 0.4})
+        figure, ax = style.panels(3)
+        looks = figures.graded(["greedy"])
+        figures.curves(rows.assign(high=0.6), "rate", looks, values, ax)
+        assert [t.get_rotation() for t in ax.get_xticklabels()] == [angle] * len(values)
+        figure.draw_without_rendering()
+        boxes = [t.get_tightbbox() for t in ax.get_xticklabels()]
+        if not angle:
+            assert all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:], strict=False))
 
 
 @pytest.mark.parametrize("facet", [None, "uavs"])

@@ -89,8 +89,17 @@ def test_the_age_is_compared_with_the_published_effect(tmp_path):
     assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
     assert table["published"].dropna().tolist() == [-0.46, -0.46]
     text = answers.age(halved)
-    assert "from one to 2 UAVs by −50.0 % [−50.0, −50.0] (arrival rate 0.1) and −50.0 %" in text
+    assert "from 1 to 2 UAVs by −50.0 % [−50.0, −50.0] (arrival rate 0.1) and −50.0 %" in text
     assert "Published for another model: −46 %." in text
+
+
+def test_a_table_has_a_row_per_setting_and_nothing_where_nothing_is_known(pads):
+    gaps = planted(pads, AGE, lambda row: np.nan if row["pads"] == 2 else 10.0 * row["pads"])
+    table = effects.listed(effects.means(gaps, [AGE]), AGE, ["policy", "pads"], "uavs")
+    assert table.columns.tolist() == ["Policy", "Number of charging pads", "2", "4"]
+    known = [[str(n), *[f"{10 * n} [{10 * n}, {10 * n}]"] * 2] for n in (1, 3, 4)]
+    expected = [known[0], ["2", "", ""], *known[1:]]
+    assert table.to_numpy().tolist() == [["greedy", *row] for row in expected]
 
 
 def test_failures_are_compared_with_none(tmp_path):
