@@ -22,7 +22,7 @@ def uav_slots(events: Events) -> pd.DataFrame:
         One row per UAV and slot, in that order: ``uav``, ``slot``; ``from_x, from_y`` and ``x, y``,
         the cells before and after the action; ``battery`` [%] at the end of the slot; ``node``, the
         one served in most of the slot's communication slots (the last of them on a tie), -1
-        without; ``moved``, ``charging``, ``waiting`` (for a pad).
+        without; ``moved``, ``charging``, ``waiting`` (for a pad), ``grounded`` (under repair).
     """
     log = pd.DataFrame(events)
     moves = log[log["event"] == "move"].astype({"time": int, "x": int, "y": int, "value": int})
@@ -36,8 +36,9 @@ def uav_slots(events: Events) -> pd.DataFrame:
         table.insert(2, f"from_{axis}", before)
     table["node"] = _served(log, table)
     table["moved"] = (table["x"] != table["from_x"]) | (table["y"] != table["from_y"])
-    table["charging"] = _charging(log, table)
+    table["charging"] = _between(log, table, "charge_start", "charge_end")
     table["waiting"] = _waiting(log, table)
+    table["grounded"] = _between(log, table, "uav_failure", "uav_repair")
     return table
 
 
@@ -140,14 +141,14 @@ def _served(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
     return node.fillna(-1).astype(int).to_numpy()
 
 
-def _charging(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:
-    """A session holds the slots from its ``charge_start`` to before its ``charge_end``."""
-    steps = {"charge_start": 1, "charge_end": -1}
+def _between(log: pd.DataFrame, table: pd.DataFrame, start: str, end: str) -> np.ndarray:
+    """Whether a slot of a UAV is one from an event ``start`` on to before the next ``end``."""
+    steps = {start: 1, end: -1}
     edges = log[log["event"].isin(steps)]
-    charging = np.zeros(len(table), int)
+    between = np.zeros(len(table), int)
     for uav, time, event in zip(edges["uav"], edges["time"], edges["event"], strict=True):
-        charging[(table["uav"] == uav) & (table["slot"] >= time)] += steps[event]
-    return charging > 0
+        between[(table["uav"] == uav) & (table["slot"] >= time)] += steps[event]
+    return between > 0
 
 
 def _waiting(log: pd.DataFrame, table: pd.DataFrame) -> np.ndarray:

@@ -11,10 +11,14 @@ from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, Check
 from analysis.verification.logs import Log
 from dess import InputError
+from dess.scenario import Scenario
+from dess.sections.fleet import type_of
+from dess.sections.wind import surcharges
+from dess.state import EAST, NORTH, SOUTH, WEST
 
 EPSILON = np.finfo(float).eps
 
-_KEPT = "initial + arrived = collected + residual"
+_KEPT = "initial + arrived = collected + residual (+ lost)"
 
 
 def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list[str]]:
@@ -61,9 +65,12 @@ def _imbalances(results: Results) -> pd.DataFrame:
     m = missions["point"].map([space.communication_slots for space in spaces].__getitem__)
     nodes = missions["point"].map([len(space.nodes) for space in spaces].__getitem__)
     whole = missions["initial"] + missions["arrived"]
-    error = (whole - missions["collected"] - missions["residual"]).abs()
-    # Two additions per communication (node and mission), then arrivals and nodes.
+    lost = missions["lost"] if "lost" in missions else pd.Series(np.nan, missions.index)
+    error = (whole - missions["collected"] - missions["residual"] - lost.fillna(0.0)).abs()
+    # Two additions per communication (node and mission), then arrivals and nodes; where data can be
+    # lost, also what silent nodes hide, and each packet when it comes and when it goes.
     additions = 2 * m * missions["uav_slots"] + 2 * nodes * (missions["slots"] + 1)
+    additions += (additions + 2 * missions["arrived"]).where(lost.notna(), 0)
     return pd.DataFrame(
         {"error": error / whole.where(whole > 0, 1.0), "bound": EPSILON * additions}
     )
@@ -91,18 +98,53 @@ def battery_check(logs: Sequence[Log]) -> Check:
 
 
 def battery_errors(log: Log) -> np.ndarray:
-    """For each of the N UAV slots of a log, whether it breaks a rule of the battery."""
+    """For each of the N UAV slots of a log, whether it breaks a rule of the battery.
+
+    What the wind costs in a cell is taken from the field of the scenario. How UAVs on pads share
+    limited power is not checked, only that they take all of it, and none more than it can.
+    """
     s, table = log.scenario, log.uav_slots
-    before = table.groupby("uav")["battery"].shift().fillna(s.flying_time)
-    charging = table["charging"]
-    begins = charging & ~charging.groupby(table["uav"]).shift(fill_value=False)
-    last = table["slot"] == s.max_slots - 1
-    ends = charging & ~charging.groupby(table["uav"]).shift(-1, fill_value=False) & ~last
+    uavs, charging = table.groupby("uav"), table["charging"]
+    before = uavs["battery"].shift().fillna(table["uav"].map(_first_battery(s)))
+    flown = (before - s.flight_cost * (1 + _surcharges(s, table))).clip(lower=0)
+    flown = flown.where(~table["grounded"], before)
+    right = (table["battery"] == flown).where(~charging, _charges_rightly(s, table, before))
     x, y, width, height = s.zone
     parked = table["x"].between(x, x + width - 1) & table["y"].between(y, y + height - 1)
-    charged = (before + s.charge_rate).clip(upper=s.charge_complete)
-    right = np.where(charging, charged, before - s.flight_cost) == table["battery"]
     right &= ~charging | (parked & ~table["moved"])
-    right &= ~begins | (before <= s.charge_start)
-    right &= ~ends | (table["battery"] == s.charge_complete)
+    level = np.select([before >= s.charge_complete, before <= s.charge_start], [0, 1], np.nan)
+    latch = pd.Series(level).groupby(table["uav"]).ffill() == 1
+    begins = charging & ~charging.groupby(table["uav"]).shift(fill_value=False)
+    right &= ~begins | latch
+    last = table["slot"] == s.max_slots - 1
+    ends = charging & ~charging.groupby(table["uav"]).shift(-1, fill_value=False) & ~last
+    failures = log.events.loc[log.events["event"] == "pad_failure", "time"]
+    right &= ~ends | (table["battery"] == s.charge_complete) | (table["slot"] + 1).isin(failures)
     return (~right).to_numpy()
+
+
+def _first_battery(scenario: Scenario) -> dict[int, int]:
+    """The battery of each UAV at the start [%]."""
+    types = [type_of(scenario.fleet, i) for i in range(scenario.uavs)]
+    return {i: kind.flying_time or scenario.flying_time for i, kind in enumerate(types)}
+
+
+def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
+    """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
+    wind = scenario.wind
+    field = surcharges(scenario.grid, *wind.push(), wind.gusts, wind.seed)
+    x, y = table["x"].to_numpy(), table["y"].to_numpy()
+    step_x, step_y = x - table["from_x"], y - table["from_y"]
+    action = np.select([step_y < 0, step_x > 0, step_y > 0], [NORTH, EAST, SOUTH], WEST)
+    return np.where(table["moved"], field[action, y, x], 0)
+
+
+def _charges_rightly(scenario: Scenario, table: pd.DataFrame, before: pd.Series) -> pd.Series:
+    """Whether a UAV that charges gains what it can, or all UAVs together gain the shared power."""
+    s, charging, slot = scenario, table["charging"], table["slot"]
+    wanted = (s.charge_complete - before).clip(upper=s.charge_rate).where(charging, 0)
+    gain = (table["battery"] - before).where(charging, 0)
+    power = s.charging.power or s.charging_pads * s.charge_rate
+    of_all = gain.groupby(slot).transform("sum")
+    shared = wanted.groupby(slot).transform("sum").clip(upper=power)
+    return gain.between(0, wanted) & (of_all == shared)

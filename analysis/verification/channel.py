@@ -14,6 +14,7 @@ from analysis.verification import closed_forms
 from analysis.verification.checks import CHANNEL, Check
 from analysis.verification.logs import Log
 from dess import streams
+from dess.sections.fleet import type_of
 
 # Units in the last place by which two ways to compute a rate may differ. Each has few steps, and
 # the conversion of the SNR from dB to a ratio increases the rounding error most.
@@ -88,7 +89,9 @@ def communications(log: Log, seed: int) -> pd.DataFrame:
     residual = log.residuals[served.to_numpy()]
     best = np.where(residual > 0, snr, -np.inf).argmax(1)
     row = np.arange(len(rows))
-    rate, left = closed_forms.rate(scenario, snr[row, best]), residual[row, best]
+    factor = rows["uav"].map(lambda i: type_of(scenario.fleet, int(i)).rate).to_numpy()
+    rate = factor * closed_forms.rate(scenario, snr[row, best])
+    left = residual[row, best]
     columns = (rows["node"].array, rows["value"].array, best, np.minimum(rate, left), left)
     return pd.DataFrame(dict(zip(_COMMUNICATIONS, columns, strict=True)))
 

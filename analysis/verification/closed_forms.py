@@ -1,4 +1,4 @@
-"""Closed forms of what a simulation estimates: channel, draws, coverage of intervals, queues.
+"""Closed forms of what a simulation estimates: channel, draws, coverage of intervals.
 
 The functions are written from the equations with numpy and scipy; they use no code of the
 simulator.
@@ -101,44 +101,3 @@ def t_coverage(missions: int, block: int, level: float = LEVEL) -> float:
     """
     end = stats.t.ppf((1 + level) / 2, block - 1) / np.sqrt(1 - block / missions)
     return float(1 - 2 * stats.t.sf(end, block - 1))
-
-
-def erlang_c(servers: int, load: float) -> float:
-    """The probability that a customer of an M/M/c queue has to wait (Erlang 1917).
-
-    Args:
-        servers: c.
-        load: Arrival rate times mean service time (a), below c.
-    """
-    blocking = 1.0  # Erlang B, by its recursion over the servers
-    for count in range(1, servers + 1):
-        blocking = load * blocking / (count + load * blocking)
-    return servers * blocking / (servers - load * (1 - blocking))
-
-
-def waiting_of_mmc(arrivals: float, service: float, servers: int) -> float:
-    """The mean time that a customer of an M/M/c queue waits for a server.
-
-    Args:
-        arrivals: Arrival rate.
-        service: Mean service time.
-        servers: c.
-    """
-    return erlang_c(servers, arrivals * service) / (servers / service - arrivals)
-
-
-def waiting_of_mg1(arrivals: float, service: Moments) -> float:
-    """The mean time that a customer of an M/G/1 queue waits (Pollaczek 1930, Khinchine 1932)."""
-    second = service.mean**2 + service.deviation**2
-    return arrivals * second / (2 * (1 - arrivals * service.mean))
-
-
-def loss_of_mm1k(load: float, places: int) -> float:
-    """The share of the customers of an M/M/1/K queue that find all K places taken.
-
-    Args:
-        load: Arrival rate times mean service time.
-        places: K, the one in service included.
-    """
-    weights = load ** np.arange(places + 1)
-    return float(weights[-1] / weights.sum())

@@ -1,7 +1,8 @@
 """Missions that only the page on verification needs: simulated before the page, kept in a file.
 
-``dess report`` simulates missions of the study ``verification`` again with the SimPy engine, and
-missions of a single UAV with both engines. The page reads them and simulates nothing::
+``dess report`` simulates missions of the study ``verification`` again with the SimPy engine,
+missions of a single UAV with both engines, and queues that theory knows. The page reads them and
+simulates nothing::
 
     make("results", results)
     missions = read("results", results)
@@ -18,6 +19,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from analysis.questions.missions import FOLDER
 from analysis.results.tables import Results
 from analysis.verification import lone_uav
+from analysis.verification.queues.suite import Measured
+from analysis.verification.queues.suite import simulate as simulate_queues
 from dess import InputError, simulate
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
@@ -42,6 +45,7 @@ class CrossCheck(BaseModel):
         uavs: The records of their UAVs, each with ``policy``, ``replication`` and ``uav``.
         rates: The result of ``lone_uav.simulate_rates``.
         slots: The result of ``lone_uav.simulate_slots``.
+        queues: The result of ``queues.suite.simulate``.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -51,6 +55,7 @@ class CrossCheck(BaseModel):
     uavs: list[Fields]
     rates: list[float]
     slots: list[float]
+    queues: Measured
 
 
 def simulate_missions(
@@ -60,7 +65,8 @@ def simulate_missions(
 
     Args:
         results: The results of the study.
-        count: Missions of every policy to simulate again; all of them if there are fewer.
+        count: Missions of every policy to simulate again, all of them if there are fewer; and
+            batches of each queue, at least 2.
         progress: Called after every mission.
     """
     space, seed = results.scenario(), results.store.manifest.seed
@@ -79,6 +85,7 @@ def simulate_missions(
         uavs=uavs,
         rates=lone_uav.simulate_rates(space, seed),
         slots=lone_uav.simulate_slots(space, seed),
+        queues=simulate_queues(space, seed, max(count, 2)),
     )
 
 

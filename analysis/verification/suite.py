@@ -21,6 +21,8 @@ from analysis.verification import logs as event_logs
 from analysis.verification.checks import Check
 from analysis.verification.cross_check import STUDY, CrossCheck
 from analysis.verification.logs import Log
+from analysis.verification.queues import suite as queues
+from dess import InputError
 from dess.scenario import ScenarioSpace
 
 
@@ -45,9 +47,16 @@ class Suite:
         """Load a folder that contains a results folder per study.
 
         Raises:
-            InputError: If the study or its cross-check is missing or damaged.
+            InputError: If the study or its cross-check is missing or damaged, or if its scenario
+                has failures or arrivals in continuous time, which the checks of logs do not know.
         """
         study = load_results(Path(folder) / STUDY)
+        for section in ("failures", "arrivals"):
+            if getattr(study.scenario(), section).is_on:
+                raise InputError(
+                    f"{Path(folder) / STUDY}: its scenario has {section}, which this page cannot "
+                    "check; allowed: a study without them"
+                )
         again = cross_check.read(folder, study)
         return cls(study, *budgets.studies_in(Path(folder), but=STUDY), again)
 
@@ -124,6 +133,7 @@ class Suite:
             channel.rate_check(self.rates),
             *channel.shadowing_checks(lone_uav.deviates(space, self.again.slots)),
             *channel.communication_checks(logs, seed),
+            *queues.checks(self.again.queues, space),
             budgets.conservation_check(self.studies),
             budgets.balance_check(logs),
             budgets.battery_check(logs),

@@ -11,9 +11,9 @@
 # %% [markdown]
 # # Verification
 #
-# This page compares the simulator with exact theory: the random draws, the channel, the
-# conservation of data, the batteries, both engines, and the coverage of the confidence intervals on
-# all pages. It also describes the model according to the STRESS-DES checklist.
+# This page compares the simulator with exact theory: the random draws, the channel, queues and the
+# age of information, the conservation of data, the batteries, both engines, and the coverage of all
+# confidence intervals. It also describes the model according to the STRESS-DES checklist.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder of the results folder verification and of those beside it
@@ -39,9 +39,8 @@ band = f"the band below, which contains all dots in {level} of such figures."
 # %% [markdown]
 # ## What was checked
 #
-# There are two kinds of checks. An exact check fails if an error is above its bound, which is zero
-# or the largest possible rounding error. A statistical check fails if its p-value, corrected for
-# the number of these checks (Holm), is too small.
+# An exact check fails if an error is above its bound: zero or the largest possible rounding error.
+# A statistical one fails if its p-value, corrected for their number (Holm), is too small.
 
 # %%
 display(html.say("{text}", text=html.composed(checks.overall(judged))))
@@ -52,10 +51,8 @@ html.table(checks.as_text(judged), caption, wrap=True)
 # ## Arrivals
 #
 # The data units that arrive at a node in a slot are Poisson distributed, and independent of other
-# nodes and slots. Three counts are compared with this distribution: of a node in a slot, of all
-# nodes in a slot (which would show dependence between nodes), and of a node over many slots (which
-# would show dependence between slots). The counts come from one event log per replication, since
-# all policies meet the same arrivals.
+# nodes and slots: so are those at all nodes in a slot, and at a node over many slots. The counts
+# come from one event log per replication, since all policies meet the same arrivals.
 
 # %%
 html.say(
@@ -81,21 +78,16 @@ html.gallery(figures)
 # %% [markdown]
 # ## The channel
 #
-# A UAV serves the node with the highest SNR, so the data that it collects are not a random sample
-# of the channel. Two kinds of checks avoid this problem. First, a single UAV hovers near a single
-# node and has no choice; its mean rate must equal the integral of δ log<sub>2</sub>(1 + SNR) over
-# the distribution of shadowing. Second, every communication in the event logs is computed again
-# from the formula, with the shadowing of that communication slot for every node: which node has the
-# highest SNR, and how much data it sends.
+# A UAV serves the node with the highest SNR, so its data are not a random sample of the channel.
+# First, therefore, a single UAV hovers near a single node; its mean rate must equal the integral of
+# δ log<sub>2</sub>(1 + SNR) over the distribution of shadowing. Second, every communication in the
+# event logs is computed again with the shadowing of that communication slot for every node: which
+# node has the highest SNR, and how much data it sends.
 
 # %%
-html.say(
-    "{verdicts} The logs have {n:,} communications.",
-    verdicts=html.composed(checks.on_topics(judged, checks.CHANNEL)),
-    n=sum((log.events["event"] == "communication").sum() for log in suite.logs),
-)
-
-# %%
+verdicts = html.composed(checks.on_topics(judged, checks.CHANNEL))
+n = sum((log.events["event"] == "communication").sum() for log in suite.logs)
+display(html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n))
 html.figure(
     drawings.rates(suite.rates, space),
     "Mean rate of a lone UAV against its distance from the node",
@@ -104,11 +96,22 @@ html.figure(
 )
 
 # %% [markdown]
+# ## Queues and the age of information
+#
+# UAVs come to the charging zone as a Poisson process, and charge for exponential (M/M/c) or fixed
+# times (M/D/1). Packets fill a node's buffer, which a server empties in exponential times (M/M/1;
+# with K places, M/M/1/K), or a UAV of a mission at fixed times (M/D/1). The age is known for M/M/1
+# and for visits at fixed or exponential gaps. Thinned arrivals must fit the integrated rate.
+
+# %%
+html.say("{verdicts}", verdicts=html.composed(checks.on_topics(judged, checks.QUEUES)))
+
+# %% [markdown]
 # ## Conservation, batteries and engines
 #
-# These checks show that data are neither created nor lost, that every battery follows its rules in
-# every slot of the event logs, that the logs add up to the records, that all policies meet the same
-# random draws in a replication, and that missions simulated again with SimPy give the same records.
+# Data are neither created nor lost, every battery follows its rules in every slot of the logs, the
+# logs add up to the records, all policies meet the same random draws in a replication, and missions
+# simulated again with SimPy give the same records.
 
 # %%
 kept = checks.on_topics(judged, *checks.BOOKKEEPING)
@@ -118,13 +121,10 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 # %% [markdown]
 # ## The draws of a mission
 #
-# Every mission draws its parameters, and the initial data of every node, independently from uniform
-# distributions.
+# Every mission draws its parameters and the initial data of every node from uniform distributions.
 
 # %%
-html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS)))
-
-# %%
+display(html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS))))
 figures = [
     (
         drawings.fit(fit, parameter(field).label, "value"),
@@ -139,19 +139,18 @@ figures = [
 if space.initial_data[0] < space.initial_data[1]:
     initial = suite.missions["initial"].to_numpy()
     caption = "The bars should follow the curve, the density of a sum of uniform variables."
-    figure = drawings.initial_data(initial, space)
     alt = "Initial data per mission, and the density of their sum"
-    figures.append((figure, alt, f"{caption} n = {len(initial):,} missions."))
+    caption += f" n = {len(initial):,} missions."
+    figures.append((drawings.initial_data(initial, space), alt, caption))
 html.gallery(figures)
 
 # %% [markdown]
 # ## Coverage of the confidence intervals
 #
-# The missions are divided into blocks, and an interval is computed from each block. The share of
-# intervals that contain the mean of all missions is their coverage. For Student's t it should be a
-# little above the level, because a block is itself a part of all missions. For Wilson's interval,
-# used for success, the coverage differs from the level because a block has a whole number of
-# successes; the exact coverage is known from the hypergeometric distribution, and is compared here.
+# An interval is computed from each block of missions. The share of intervals that contain the mean
+# of all missions is their coverage. For Student's t it should be a little above the level, because
+# a block is itself a part of all missions. For Wilson's interval, used for success, the exact
+# coverage is known from the hypergeometric distribution, and is compared here.
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))

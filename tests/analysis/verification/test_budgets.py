@@ -4,19 +4,39 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import given
 
 from analysis import load_results
 from analysis.results.tables import Results
 from analysis.verification import budgets
 from analysis.verification.logs import Log
+from dess.mission import simulate
+from dess.scenario import ScenarioSpace
+from dess.state import sample_scenario
 from tests.analysis.verification.changes import altered, with_records
 from tests.analysis.verification.verdicts import fails
+from tests.drawn import extended_spaces, policies, replications, seeds
 
 
 @pytest.mark.parametrize("by", [1, -1])
 def test_a_battery_that_is_off_by_one_is_noticed(logs: list[Log], by: int) -> None:
     assert fails(budgets.battery_check(altered(logs, "move", 3, value=lambda value: value + by)))
+
+
+@given(extended_spaces(), policies, seeds, replications)
+def test_the_batteries_of_every_scenario_follow_the_rules(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> None:
+    """With wind, fleets, shared power and failures; a battery that is off by one is noticed."""
+    record = simulate(space, policy, seed, replication, events=True)
+    assert record.events is not None
+    events = pd.DataFrame(record.events.columns())
+    log = Log("", sample_scenario(space, seed, replication), pd.Series(), pd.DataFrame(), events)
+    assert not budgets.battery_errors(log).any()
+    (changed,) = altered([log], "move", -1, value=lambda value: value + 1)
+    assert budgets.battery_errors(changed).any()
 
 
 def charging(logs: list[Log]) -> list[Log]:
@@ -42,6 +62,15 @@ def test_charging_that_ends_too_early_is_noticed(logs: list[Log]) -> None:
     fuller = first.scenario.charge_complete + 1
     longer = replace(first, scenario=first.scenario.model_copy(update={"charge_complete": fuller}))
     assert fails(budgets.battery_check([longer, *rest]))
+
+
+def test_data_that_are_recorded_as_lost_are_no_imbalance(results: Results) -> None:
+    lost = results.missions["collected"].where(results.missions.index == 3, 0.0) / 2
+    missions = results.missions.assign(lost=lost)
+    missions["collected"] -= lost
+    assert not fails(budgets.conservation_check({"trial": replace(results, missions=missions)}))
+    missions["lost"] = 0.0
+    assert fails(budgets.conservation_check({"trial": replace(results, missions=missions)}))
 
 
 @pytest.mark.parametrize("name", ["collected", "residual", "initial", "arrived"])

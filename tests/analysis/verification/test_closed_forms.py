@@ -104,37 +104,3 @@ def test_coverage_of_t_agrees_with_a_simulation() -> None:
 
 
 # --- queues ---
-
-
-def test_the_probability_of_waiting_by_hand() -> None:
-    """a = 2, c = 3: B = 2/3, 2/5, 4/19 by the recursion; C = 3 B / (3 - 2 (1 - B)) = 4/9."""
-    assert closed_forms.erlang_c(3, 2.0) == pytest.approx(4 / 9)
-    assert closed_forms.erlang_c(1, 0.7) == pytest.approx(0.7)  # M/M/1: the server is busy
-
-
-@pytest.mark.parametrize(("servers", "load"), [(1, 0.9), (2, 1.5), (7, 5.0), (30, 28.0)])
-def test_the_probability_of_waiting_is_that_of_the_states(servers: int, load: float) -> None:
-    """The stationary probabilities of the birth-death chain, summed from c customers on."""
-    n = np.arange(5000)
-    log_weights = np.concatenate([[0.0], np.cumsum(np.log(load / np.minimum(n[1:], servers)))])
-    weights = np.exp(log_weights - log_weights.max())
-    assert closed_forms.erlang_c(servers, load) == pytest.approx(
-        weights[servers:].sum() / weights.sum()
-    )
-
-
-def test_waiting_times_by_hand() -> None:
-    # M/M/1 with load 0.8 and service 2: rho / (mu - lambda) = 0.8 / 0.1
-    assert closed_forms.waiting_of_mmc(0.4, 2.0, 1) == pytest.approx(8.0)
-    exponential = closed_forms.Moments(2.0, 2.0)
-    assert closed_forms.waiting_of_mg1(0.4, exponential) == pytest.approx(8.0)
-    # M/D/1 waits half as long
-    assert closed_forms.waiting_of_mg1(0.4, closed_forms.Moments(2.0, 0.0)) == pytest.approx(4.0)
-    # M/M/3 with a = 2, service 1: C / (c mu - lambda) = (4/9) / 1
-    assert closed_forms.waiting_of_mmc(2.0, 1.0, 3) == pytest.approx(4 / 9)
-
-
-def test_losses_by_hand() -> None:
-    assert closed_forms.loss_of_mm1k(1.0, 4) == pytest.approx(1 / 5)
-    assert closed_forms.loss_of_mm1k(0.5, 2) == pytest.approx(1 / 7)  # 1, 1/2, 1/4
-    assert closed_forms.loss_of_mm1k(0.5, 1) == pytest.approx(1 / 3)  # Erlang B of one server

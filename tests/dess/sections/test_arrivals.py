@@ -1,6 +1,5 @@
 """Poisson processes in continuous time: their gaps, thinning, and what is refused."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest, poisson
 
+from analysis.verification.queues.sources import arrivals_of, integrated
 from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
-from dess.sections.arrivals import draw_arrival, factors_of, sources_of
-from dess.state import constants_of
 from tests.drawn import replications, seeds
 
 
@@ -22,21 +20,9 @@ def _space(**arrivals: Any) -> ScenarioSpace:
     return load_scenario("paper", **{"arrivals.process": "continuous"} | values)
 
 
-def _times(space: ScenarioSpace, k: int, seed: int = 1, replication: int = 0) -> np.ndarray:
-    """All arrivals at node ``k`` until the last slot."""
-    missions = constants_of(space)
-    missions["seed"], missions["replication"] = seed, replication
-    sources = sources_of(space.arrivals, space.arrival_rate, len(space.nodes))
-    found = []
-    while sources["time"][k] < np.inf:
-        draw_arrival(missions, sources, *factors_of(space.arrivals), k)
-        found.append(sources["time"][k])
-    return np.array(found[:-1])
-
-
 def test_gaps_are_exponential() -> None:
     space = ScenarioSpace.of(_space(), arrival_rate=0.5, max_slots=20_000)
-    times = _times(space, 3)
+    times = arrivals_of(space, 3)
     assert kstest(np.diff(times, prepend=0.0) * 0.5, "expon").pvalue > 0.01
     assert 0.01 < poisson.cdf(len(times), 10_000) < 0.99
     assert times[-1] < 20_000
@@ -45,20 +31,13 @@ def test_gaps_are_exponential() -> None:
 SCHEDULE = ((100.0, 3.0), (400.0, 0.0), (500.0, 0.25), (1500.0, 2.0))
 
 
-def _integrated(times: np.ndarray, schedule: Sequence[tuple[float, float]]) -> np.ndarray:
-    """The integral of the factor from 0 to each time."""
-    edges = np.array([0.0, *(slot for slot, _ in schedule), 3000.0])
-    factors = np.array([1.0, *(factor for _, factor in schedule)])
-    return np.interp(times, edges, np.concatenate([[0.0], (factors * np.diff(edges)).cumsum()]))
-
-
 def test_thinned_arrivals_fit_the_integrated_rate() -> None:
     """In the time of the integrated rate, arrivals are a Poisson process of rate 1."""
     space = ScenarioSpace.of(_space(schedule=SCHEDULE), arrival_rate=2.0, max_slots=3000)
-    times = _times(space, 7)
+    times = arrivals_of(space, 7)
     assert not ((times >= 400) & (times < 500)).any()
-    own_time = 2.0 * _integrated(times, SCHEDULE)
-    total = 2.0 * _integrated(np.array([3000.0]), SCHEDULE)[0]
+    own_time = 2.0 * integrated(times, SCHEDULE, 3000.0)
+    total = 2.0 * integrated(np.array([3000.0]), SCHEDULE, 3000.0)[0]
     assert kstest(np.diff(own_time, prepend=0.0), "expon").pvalue > 0.01
     assert kstest(own_time / total, "uniform").pvalue > 0.01
     assert 0.01 < poisson.cdf(len(times), total) < 0.99
@@ -67,26 +46,26 @@ def test_thinned_arrivals_fit_the_integrated_rate() -> None:
 def test_a_node_has_its_own_rate() -> None:
     rates = [0.0, 5.0, *[0.1] * 23]
     space = ScenarioSpace.of(_space(rates=rates), max_slots=1000)
-    assert len(_times(space, 0)) == 0
-    assert 0.01 < poisson.cdf(len(_times(space, 1)), 5000) < 0.99
-    assert 0.01 < poisson.cdf(len(_times(space, 2)), 100) < 0.99
+    assert len(arrivals_of(space, 0)) == 0
+    assert 0.01 < poisson.cdf(len(arrivals_of(space, 1)), 5000) < 0.99
+    assert 0.01 < poisson.cdf(len(arrivals_of(space, 2)), 100) < 0.99
 
 
 @given(seeds, replications, st.integers(0, 24))
 def test_a_schedule_of_ones_and_other_rates_change_no_arrival(
     seed: int, replication: int, k: int
 ) -> None:
-    plain = _times(_space(), k, seed, replication)
+    plain = arrivals_of(_space(), k, seed, replication)
     others = [0.5] * 25
     others[k] = 0.02
     space = _space(rates=others, schedule=[[10, 1], [20.5, 1]])
-    assert _times(space, k, seed, replication).tolist() == plain.tolist()
+    assert arrivals_of(space, k, seed, replication).tolist() == plain.tolist()
     assert (np.diff(plain) > 0).all()
 
 
 def test_a_schedule_that_ends_at_zero_ends_the_arrivals() -> None:
-    assert (_times(_space(schedule=[[0, 50], [100, 0]]), 4) < 100).all()
-    assert len(_times(_space(schedule=[[0, 0]]), 4)) == 0
+    assert (arrivals_of(_space(schedule=[[0, 50], [100, 0]]), 4) < 100).all()
+    assert len(arrivals_of(_space(schedule=[[0, 0]]), 4)) == 0
 
 
 # --- scenarios ---

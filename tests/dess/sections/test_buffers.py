@@ -1,4 +1,4 @@
-"""Buffers of packets by hand, against laws of queues, and driven with other service times."""
+"""Buffers of packets by hand, and against laws of queues."""
 
 import math
 from typing import Any
@@ -116,28 +116,6 @@ def test_laws_of_every_queue(steps: list[Any], limit: int, newest_first: bool) -
     assert buffers.counts[LOST] == (buffers.packets["status"] == LOST).sum()
 
 
-def test_a_single_server_with_exponential_times_has_the_mean_latency_of_theory() -> None:
-    """M/M/1 with arrival rate 0.5 and service rate 1: the mean time in the system is 2."""
-    random = np.random.default_rng(1)
-    arrivals = random.exponential(2.0, 40_000).cumsum()
-    work = random.exponential(1.0, len(arrivals))
-    buffers, free = Buffers(1), 0.0
-    ends = []
-    for time, needed in zip(arrivals, work, strict=True):
-        free = max(free, time) + needed
-        ends.append(free)
-    events = sorted([(t, 1.0) for t in arrivals] + [(t, 0.0) for t in ends])
-    for time, arrived in events:
-        if arrived:
-            buffers.store(0, time, 1.0)
-        else:
-            buffers.serve(0, time, 1.0)
-    done = buffers.packets
-    latency = done["left"] - done["generated"]
-    means = latency[2000:].reshape(38, 1000).mean(1)  # batches, nearly independent
-    assert abs(means.mean() - 2.0) < 4 * means.std(ddof=1) / math.sqrt(38)
-
-
 # --- age ---
 
 
@@ -174,12 +152,3 @@ def test_the_age_of_visits_at_fixed_gaps() -> None:
     mean, percentile = age_of_teeth(lows, highs, np.ones(len(lows)))
     assert (mean, percentile) == pytest.approx((1.5, 2.97))
     assert highs[:peaks].mean() == pytest.approx(3.0)
-
-
-def test_the_age_of_visits_at_exponential_gaps() -> None:
-    """The mean age is E[X^2] / (2 E[X]) = E[X] = 3, and the age is exponential, too."""
-    times = np.random.default_rng(2).exponential(3.0, 50_000).cumsum()
-    lows, highs, _ = teeth_of(_done(*((0, t, t) for t in times)), 1, times[-1])
-    mean, percentile = age_of_teeth(lows, highs, np.ones(len(lows)))
-    assert mean == pytest.approx(3.0, rel=0.03)  # the deviation is 0.7 %
-    assert percentile == pytest.approx(3.0 * math.log(100), rel=0.05)

@@ -1,0 +1,1 @@
+"""The queues of the simulator, and the ages of its data, compared with queueing theory."""

@@ -1,0 +1,263 @@
+"""What is known of queues and ages in closed form, and what the simulator makes of it::
+
+    checks(simulate(space, seed=1, batches=50), space)
+
+A check compares the mean of several batches with the closed form by Student's t. The batches of the
+charging zone follow one another, and are long enough to be nearly independent; one more is left out
+at the beginning, since its first customers come to an empty zone. All other batches are runs of
+their own, of so many customers that the first ones do not matter.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+from analysis.numbers import decimals
+from analysis.stats.intervals import mean_interval
+from analysis.verification.checks import QUEUES, Check
+from analysis.verification.closed_forms import Moments
+from analysis.verification.queues import theory
+from analysis.verification.queues.pads import Station
+from analysis.verification.queues.server import Server, ages_of, mission_above, visited
+from analysis.verification.queues.sources import arrivals_of, integrated
+from dess.scenario import ScenarioSpace
+
+CUSTOMERS = 1000  # in a batch
+SLOTS = 400  # of a mission; each mission is a batch
+BUSY, LOAD = 0.7, 0.5  # arrivals per service: of the charging zone, and of buffers
+CHARGING = 6.0  # mean time on a pad [slots]
+PLACES = 3  # of the finite buffers
+GAP = 3.0  # mean time between visits of a node [slots]
+RATE = 2.0  # packets per slot of the thinned process, where the factor is 1
+SCHEDULE = ((100.0, 3.0), (400.0, 0.0), (500.0, 0.25), (1500.0, 2.0))
+END = 3000.0  # of the thinned process [slots]
+
+_VISITED = "Node visited at fixed gaps"
+_THINNED = "Thinned arrivals"
+
+Measured = dict[str, list[float]]
+
+
+class System(NamedTuple):
+    """A system, what is known of it, and how it is simulated.
+
+    Attributes:
+        name: What it is.
+        known: The closed forms, by what is measured.
+        run: Simulates that many batches; returns for each of ``known`` a value per batch.
+    """
+
+    name: str
+    known: dict[str, float]
+    run: Callable[[int], tuple[np.ndarray, ...]]
+
+
+def systems(space: ScenarioSpace, seed: int) -> Iterator[System]:
+    """All systems whose batches are compared with closed forms.
+
+    Args:
+        space: The scenario whose channel and communication slots the missions have.
+        seed: Seed of all draws.
+    """
+    for pads in (1, 2, 5):
+        yield _zone(f"Charging zone, M/M/{pads}", pads, "exponential", seed)
+    yield _zone("Charging zone, M/D/1", 1, "fixed", seed)
+    yield _buffer(space, seed)
+    yield _finite_buffer(space, seed)
+    yield _mission(space, seed)
+    yield _finite_mission(space, seed)
+    yield System(
+        "Node visited at exponential gaps",
+        {"age": GAP, "peak age": GAP},  # E[X^2] / (2 E[X]) and E[X] of the gaps X
+        lambda batches: _visits(seed, batches),
+    )
+
+
+def _zone(name: str, pads: int, charging: str, seed: int) -> System:
+    arrivals = BUSY * pads / CHARGING
+    if charging == "exponential":
+        waiting = theory.waiting_of_mmc(arrivals, CHARGING, pads)
+    else:
+        waiting = theory.waiting_of_mg1(arrivals, Moments(CHARGING, 0.0))
+
+    def run(batches: int) -> tuple[np.ndarray, ...]:
+        generator, count = np.random.default_rng([seed, pads]), (batches + 1) * CUSTOMERS
+        gaps = generator.exponential(1 / arrivals, count)
+        times = np.full(count, CHARGING)
+        if charging == "exponential":
+            times = generator.exponential(CHARGING, count)
+        station = Station(pads, gaps, times)
+        return _batches(station.waits), _batches(station.queues) / _batches(gaps)
+
+    return System(name, {"waiting time": waiting, "queue length": arrivals * waiting}, run)
+
+
+def _buffer(space: ScenarioSpace, seed: int) -> System:
+    known = {
+        "time in the buffer": theory.waiting_of_mmc(LOAD, 1.0, 1) + 1.0,
+        "age": theory.age_of_mm1(LOAD, 1.0),
+    }
+
+    def run(batches: int) -> tuple[np.ndarray, ...]:
+        ages, latencies = [], []
+        for replication in range(batches):
+            server, _ = _served(space, seed, replication, 0)
+            packets = server.buffers.packets
+            ages.append(ages_of(server.buffers, packets["left"].max())[0])
+            latencies.append((packets["left"] - packets["generated"]).mean())
+        return np.array(latencies), np.array(ages)
+
+    return System("Buffer with a server, M/M/1", known, run)
+
+
+def _finite_buffer(space: ScenarioSpace, seed: int) -> System:
+    loss, number = theory.loss_of_mm1k(LOAD, PLACES), theory.number_in_mm1k(LOAD, PLACES)
+    known = {
+        "share of packets lost": loss,
+        "packets in the buffer": number,
+        "time in the buffer": number / (LOAD * (1 - loss)),
+    }
+
+    def run(batches: int) -> tuple[np.ndarray, ...]:
+        rows = []
+        for replication in range(batches):
+            server, times = _served(space, seed, replication, PLACES)
+            packets, counts = server.buffers.packets, server.buffers.counts
+            done = packets[server.buffers.delivered]
+            latency = (done["left"] - done["generated"]).mean()
+            rows.append((counts[2] / counts[0], server.numbers.sum() / times[-1], latency))
+        return tuple(np.array(rows).T)
+
+    return System(f"Buffer with a server, M/M/1/{PLACES}", known, run)
+
+
+def _served(
+    space: ScenarioSpace, seed: int, replication: int, limit: int
+) -> tuple[Server, np.ndarray]:
+    """A buffer whose packets arrive as in the model, and are served in exponential times of mean 1.
+
+    Returns:
+        The server, and the times of the arrivals.
+    """
+    world = _continuous(space, arrival_rate=LOAD, max_slots=round(CUSTOMERS / LOAD))
+    times = arrivals_of(world, 0, seed, replication)
+    work = np.random.default_rng([seed, replication]).exponential(1.0, len(times))
+    return Server(times, work, limit), times
+
+
+def _mission(space: ScenarioSpace, seed: int) -> System:
+    gap = 1 / space.communication_slots
+    known = {"latency": theory.latency_of_slotted_md1(LOAD / gap, gap)}
+
+    def run(batches: int) -> tuple[np.ndarray, ...]:
+        records = _missions(space, seed, batches, 0)
+        return (np.array([record.latency for record in records]),)
+
+    return System("Mission of a UAV above a node, M/D/1", known, run)
+
+
+def _finite_mission(space: ScenarioSpace, seed: int) -> System:
+    known = {"share of packets lost": theory.loss_of_slotted_md1k(LOAD, PLACES)}
+
+    def run(batches: int) -> tuple[np.ndarray, ...]:
+        records = _missions(space, seed, batches, PLACES)
+        return (np.array([record.lost_packets / record.generated for record in records]),)
+
+    return System(f"Mission of a UAV above a node, M/D/1/{PLACES}", known, run)
+
+
+def _missions(space: ScenarioSpace, seed: int, batches: int, buffer: int) -> list[Any]:
+    arrivals = {"process": "continuous", "buffer": buffer}
+    return [
+        mission_above(space, LOAD, seed, replication, max_slots=SLOTS, arrivals=arrivals)
+        for replication in range(batches)
+    ]
+
+
+def _visits(seed: int, batches: int) -> tuple[np.ndarray, ...]:
+    gaps = np.random.default_rng([seed, 99]).exponential(GAP, (batches, CUSTOMERS))
+    ages = [ages_of(visited(times), times[-1])[:2] for times in gaps.cumsum(1)]
+    return tuple(np.array(ages).T)
+
+
+def _continuous(space: ScenarioSpace, **changes: Any) -> ScenarioSpace:
+    return ScenarioSpace.of(space, **{"arrivals": {"process": "continuous"}} | changes)
+
+
+def _batches(values: np.ndarray) -> np.ndarray:
+    """The means of the batches, without the first one."""
+    return values.reshape(-1, CUSTOMERS)[1:].mean(1)
+
+
+def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
+    """Simulate all systems.
+
+    Args:
+        space: The scenario whose channel and communication slots the missions have.
+        seed: Seed of all draws.
+        batches: Number of batches, at least 2.
+
+    Returns:
+        For each check a value per batch; of the visits at fixed gaps the ages, and of the thinned
+        process the times of all arrivals.
+    """
+    measured = {
+        _test(system, what): values.tolist()
+        for system in systems(space, seed)
+        for what, values in zip(system.known, system.run(batches), strict=True)
+    }
+    times = np.arange(1, CUSTOMERS + 1) * GAP
+    measured[_VISITED] = [*ages_of(visited(times), times[-1])]
+    schedule = {"process": "continuous", "schedule": SCHEDULE}
+    thinned = _continuous(space, arrival_rate=RATE, max_slots=int(END), arrivals=schedule)
+    measured[_THINNED] = arrivals_of(thinned, 0, seed).tolist()
+    return measured
+
+
+def checks(measured: Measured, space: ScenarioSpace) -> list[Check]:
+    """Compare what ``simulate`` has measured with the closed forms."""
+    known = {
+        _test(system, what): value
+        for system in systems(space, 0)
+        for what, value in system.known.items()
+    }
+    of_batches = [_batch_check(test, known[test], measured[test]) for test in known]
+    thinned = _thinning_checks(np.array(measured[_THINNED]))
+    return [*of_batches, _visits_check(measured[_VISITED]), *thinned]
+
+
+def _test(system: System, what: str) -> str:
+    return f"{system.name}: {what}"
+
+
+def _batch_check(test: str, known: float, values: list[float]) -> Check:
+    seen = decimals(*mean_interval(values), digits=4)
+    p = float(stats.ttest_1samp(values, known).pvalue)
+    return Check(QUEUES, test, f"{known:.4f}", seen, len(values), p)
+
+
+def _visits_check(ages: list[float]) -> Check:
+    """The age is uniform from 0 to the gap."""
+    known = (GAP / 2, GAP, 0.99 * GAP)
+    error = max(abs(age - value) for age, value in zip(ages, known, strict=True))
+    test = f"{_VISITED}: mean, peak and 99th percentile of the age"
+    seen, expected = (", ".join(f"{age:.4g}" for age in row) for row in (ages, known))
+    return Check.exact(QUEUES, test, expected, seen, CUSTOMERS, error, bound=1e-9)
+
+
+def _thinning_checks(times: np.ndarray) -> list[Check]:
+    """In the integrated rate, arrivals are a Poisson process of rate 1; none comes at rate 0."""
+    own, total = (RATE * integrated(t, SCHEDULE, END) for t in (times, np.array([END])))
+    gaps = np.diff(own, prepend=0.0)
+    p, n = float(stats.kstest(gaps, "expon").pvalue), len(times)
+    test, seen = (
+        f"{_THINNED}: gaps in the integrated rate, Kolmogorov-Smirnov",
+        f"{gaps.mean():.4f}",
+    )
+    whole = float(total[0])
+    return [
+        Check(QUEUES, test, "exponential, mean 1", f"mean {seen}", n, p),
+        Check.normal(QUEUES, f"{_THINNED}: number", whole, n, np.sqrt(whole), n, digits=0),
+    ]

@@ -1,0 +1,48 @@
+"""Buffers with a server, and missions as queues: by hand, and with Little's law."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.verification.queues.server import Server, ages_of, mission_above, visited
+from dess.scenario import load_scenario
+
+times = st.integers(1, 40).map(lambda eighths: eighths / 8)
+
+
+def test_three_packets_by_hand() -> None:
+    """They come at 1, 2 and 3 and take 1.5, 1.5 and 1 to serve: they leave at 2.5, 4 and 5."""
+    server = Server(np.array([1.0, 2.0, 3.0]), np.array([1.5, 1.5, 1.0]))
+    assert server.buffers.packets["left"].tolist() == [2.5, 4.0, 5.0]
+    assert server.numbers.tolist() == [0.0, 1.0, 0.5 * 2 + 0.5 + 1.0 * 2 + 1.0]
+
+
+def test_a_packet_in_service_takes_a_place_of_the_buffer() -> None:
+    server = Server(np.array([1.0, 2.0, 3.0]), np.array([1.5, 1.5, 1.0]), limit=1)
+    assert server.buffers.counts.tolist() == [3, 2, 1]  # the second is refused
+    assert server.buffers.packets["left"].tolist() == [2.5, 2.0, 4.5]
+
+
+@given(st.integers(0, 3), st.lists(st.tuples(times, times), min_size=1, max_size=60))
+def test_littles_law(limit: int, packets: list[tuple[float, float]]) -> None:
+    gaps, work = np.array(packets).T
+    server = Server(gaps.cumsum(), work, limit)
+    stays = server.buffers.packets["left"] - server.buffers.packets["generated"]
+    assert server.numbers.sum() == pytest.approx(stays.sum())
+
+
+def test_the_ages_of_two_visits_by_hand() -> None:
+    """At 2 and 5, watched until 5: teeth of 2 and 3 slots."""
+    mean, peak, percentile = ages_of(visited(np.array([2.0, 5.0])), 5.0)
+    assert (mean, peak) == pytest.approx(((2.0 + 4.5) / 5, 2.5))
+    assert percentile == pytest.approx(3.0 - 0.05)
+
+
+@pytest.mark.parametrize("m", [1, 4])
+def test_a_uav_above_a_node_collects_a_packet_per_communication_slot(m: int) -> None:
+    """With more arrivals than that, so many are delivered, and the others are still there."""
+    space = load_scenario("paper", communication_slots=m)
+    record = mission_above(space, 5.0, 1, 0, max_slots=40)
+    assert record.slots == 40
+    assert record.delivered == pytest.approx(40 * m, abs=2)  # the first slots may find none
