@@ -26,7 +26,7 @@ from dess.scenario import ScenarioSpace
 
 CUSTOMERS = 1000  # in a batch
 SLOTS = 400  # of a mission; each mission is a batch
-BUSY, LOAD = 0.7, 0.5  # arrivals per service: of the charging zone, and of buffers
+LOAD = 0.5  # arrivals per service, of all systems with a queue
 CHARGING = 6.0  # mean time on a pad [slots]
 PLACES = 3  # of the finite buffers
 GAP = 3.0  # mean time between visits of a node [slots]
@@ -61,7 +61,7 @@ def systems(space: ScenarioSpace, seed: int) -> Iterator[System]:
         space: The scenario whose channel and communication slots the missions have.
         seed: Seed of all draws.
     """
-    for pads in (1, 2, 5):
+    for pads in (1, 2, 3):
         yield _zone(f"Charging zone, M/M/{pads}", pads, "exponential", seed)
     yield _zone("Charging zone, M/D/1", 1, "fixed", seed)
     yield _buffer(space, seed)
@@ -76,7 +76,7 @@ def systems(space: ScenarioSpace, seed: int) -> Iterator[System]:
 
 
 def _zone(name: str, pads: int, charging: str, seed: int) -> System:
-    arrivals = BUSY * pads / CHARGING
+    arrivals = LOAD * pads / CHARGING
     if charging == "exponential":
         waiting = theory.waiting_of_mmc(arrivals, CHARGING, pads)
     else:

@@ -102,8 +102,8 @@ def loss_of_slotted_md1k(load: float, places: int) -> float:
     before, after = np.arange(places)[:, None], np.arange(places)
     change = after + 1 - before  # arrivals that fit, if the server takes one
     chain = np.where(change >= 0, arrived.pmf(change), 0.0)
-    chain[0, 0] += arrived.pmf(0)  # nobody came, nobody was taken
-    chain[:, -1] += 1 - chain.sum(1)  # who did not fit was refused
+    chain[0, 0] += arrived.pmf(0)  # no customer came, so none was taken
+    chain[:, -1] += 1 - chain.sum(1)  # the others did not fit
     values, vectors = np.linalg.eig(chain.T)
     stationary = np.real(vectors[:, np.argmax(np.real(values))])
     empty = stationary[0] / stationary.sum() * arrived.pmf(0)
