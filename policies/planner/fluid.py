@@ -15,23 +15,58 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.observations.guard import SCARCE_SLOTS
+from dess.observations.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.rules import in_zone
 from dess.sections.failures import working_pads
 from dess.state import HOVER, STEP_X, STEP_Y
 
-# Columns of a waypoint: its cell, the slots to stay there, and 1 if the leg to it begins along y.
-# A stay of ``CHARGE`` means: hover until charged.
-CELL_X, CELL_Y, STAY, ORDER = range(4)
-CHARGE = -1
-# The most waypoints of a UAV.
+# The data of a flight are records: the compiled code passes them on without counting references,
+# which would take longer than the model itself.
+WAYPOINT = np.dtype(
+    [
+        ("x", np.int64),
+        ("y", np.int64),
+        ("stay", np.int64),  # slots to hover there; ``CHARGE`` means: until it is charged
+        ("turned", np.int64),  # 1 if the leg to it begins along y
+        ("begun", np.int64),  # slot in which that leg begins, ``NEVER`` if it does not
+    ]
+)
+CHARGE, NEVER = -1, 1 << 40
+# The most waypoints of a UAV. One record more tells when the last one is done with.
 MOST_WAYPOINTS = 48
-# Columns of a UAV in the fluid model.
-(X, Y, BATTERY, COUNTED, CHARGING, LATCH, NEXT, STAYED, LEFT, ACTION, ACTIVE) = range(11)
+
+# A UAV in the model.
+CRAFT = np.dtype(
+    [
+        ("x", np.int64),
+        ("y", np.int64),
+        ("battery", np.int64),
+        ("counted", np.int64),  # communication slots counted toward the quota
+        ("active", np.int64),
+        ("latch", np.int64),
+        ("charging", np.int64),
+        ("next", np.int64),  # its waypoint
+        ("stayed", np.int64),  # slots that it has hovered there
+        ("action", np.int64),
+        ("left", np.int64),  # slots of its move, after the present one
+        # of the slot
+        ("place", np.int64),
+        ("pace", np.int64),  # places per communication slot
+        # of the plan
+        ("waypoints", np.int64),
+        ("last_charge", np.int64),  # the last waypoint to charge at, -1 without one
+        # constants
+        ("quota", np.int64),
+        ("slots_per_cell", np.int64),
+        ("part", np.int64),  # places that it flies per communication slot
+        ("rate", np.float64),
+    ]
+)
+# A node: in slot t it holds ``base + arrival_rate * t`` data units, if t is not before ``since``.
+NODE = np.dtype([("base", np.float64), ("since", np.int64)])
+
 # The slots between two snapshots, and the most slots that are planned.
-STRIDE = 8
-MOST_SLOTS = 2048
-NEVER = 1 << 40
+STRIDE, MOST_SLOTS = 8, 2048
 
 # An emptied node has data again when so much is expected to have arrived [data units]. If it had
 # some at once, UAVs would serve crumbs instead of the data of other nodes.
@@ -46,7 +81,7 @@ class Plan(NamedTuple):
     """Waypoints of I UAVs.
 
     Attributes:
-        waypoints: (I, ``MOST_WAYPOINTS``, 4) the columns are named above.
+        waypoints: (I, ``MOST_WAYPOINTS`` + 1) ``WAYPOINT`` records.
         lengths: (I,) how many of them there are.
     """
 
@@ -54,69 +89,89 @@ class Plan(NamedTuple):
     lengths: np.ndarray
 
 
-class Flight(NamedTuple):
-    """A plan as flown by the model: its state every ``STRIDE`` slots, and at the end.
-
-    Slots are counted from the present one. The residual data of a node with data are
-    ``data + arrival_rate * slot``; it has data from the slot ``since`` on.
-
-    Attributes:
-        team: (S, I, 11) the UAVs; the columns are named above.
-        data: (S, K) residual data of the nodes [data units].
-        since: (S, K) from which slot on the nodes have data.
-        sums: (S, 2) data collected, and penalties [data units].
-        begun: (I, W + 1) the slot in which the leg to each waypoint begins, or ``NEVER``.
-        last: (2,) the snapshot of the end, and the slots flown until then.
-    """
-
-    team: np.ndarray
-    data: np.ndarray
-    since: np.ndarray
-    sums: np.ndarray
-    begun: np.ndarray
-    last: np.ndarray
+def empty_plan(uavs: int) -> Plan:
+    """A plan of that many UAVs without waypoints."""
+    return Plan(np.zeros((uavs, MOST_WAYPOINTS + 1), WAYPOINT), np.zeros(uavs, np.int64))
 
 
 @kernel
-def empty_flight(slots, uavs, nodes):
+def copy_plan(mission, source, target):
+    """Make one plan equal to another."""
+    for i in range(mission.uavs):
+        target.lengths[i] = source.lengths[i]
+        for number in range(source.lengths[i] + 1):
+            target.waypoints[i, number] = source.waypoints[i, number]
+
+
+@kernel
+def insert(plan, i, place, x, y, stay, turned):
+    """Insert a waypoint of UAV ``i`` before one of its."""
+    for number in range(plan.lengths[i], place, -1):
+        w = plan.waypoints[i, number - 1]
+        set_waypoint(plan.waypoints[i, number], w.x, w.y, w.stay, w.turned)
+    set_waypoint(plan.waypoints[i, place], x, y, stay, turned)
+    plan.lengths[i] += 1
+
+
+@kernel
+def remove(plan, i, place):
+    """Take out a waypoint of UAV ``i``."""
+    plan.lengths[i] -= 1
+    for number in range(place, plan.lengths[i]):
+        w = plan.waypoints[i, number + 1]
+        set_waypoint(plan.waypoints[i, number], w.x, w.y, w.stay, w.turned)
+
+
+@inlined
+def set_waypoint(w, x, y, stay, turned):
+    """Set all of a waypoint but when its leg begins, which belongs to its place in the plan."""
+    w.x, w.y, w.stay, w.turned = x, y, stay, turned
+
+
+class Flight(NamedTuple):
+    """A plan as flown by the model: its state every ``STRIDE`` slots, and at the end.
+
+    Slots are counted from the present one. The last of the S snapshots is working memory.
+
+    Attributes:
+        team: (S, I) ``CRAFT`` records.
+        sea: (S, K) ``NODE`` records.
+        sums: (S, 2) data collected, and penalties [data units].
+        last: (2,) the number of the snapshot of the end, and the slots flown until then.
+    """
+
+    team: np.ndarray
+    sea: np.ndarray
+    sums: np.ndarray
+    last: np.ndarray
+
+
+def empty_flight(slots: int, uavs: int, nodes: int) -> Flight:
     """A flight of at most that many slots, UAVs and nodes."""
     snapshots = slots // STRIDE + 3
     return Flight(
-        np.zeros((snapshots, uavs, 11), np.int64),
-        np.zeros((snapshots, nodes)),
-        np.zeros((snapshots, nodes), np.int64),
+        np.zeros((snapshots, uavs), CRAFT),
+        np.zeros((snapshots, nodes), NODE),
         np.zeros((snapshots, 2)),
-        np.zeros((uavs, MOST_WAYPOINTS + 1), np.int64),
         np.zeros(2, np.int64),
     )
 
 
 @kernel
-def begin(mission, uavs, residual, flight):
+def begin(mission, uavs, residual, rates, flight):
     """Make the present state the first snapshot of a flight."""
     for i in range(mission.uavs):
         u, v = uavs[i], flight.team[0, i]
-        v[X], v[Y], v[BATTERY], v[COUNTED] = u.x, u.y, u.battery, u.communications
-        v[CHARGING], v[LATCH], v[ACTIVE] = u.charging, u.latch, u.active and not u.grounded
-        v[NEXT], v[STAYED], v[LEFT], v[ACTION] = 0, 0, u.slots_left, u.executed
-        for w in range(MOST_WAYPOINTS + 1):
-            flight.begun[i, w] = 0 if w == 0 else NEVER
+        v.x, v.y, v.battery, v.counted = u.x, u.y, u.battery, u.communications
+        v.charging, v.latch, v.active = u.charging, u.latch, u.active and not u.grounded
+        v.next, v.stayed, v.left, v.action = 0, 0, u.slots_left, u.executed
+        v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
+        v.part = rates.parts // (mission.communication_slots * u.slots_per_cell)
     wait = _revival(mission)
     for k in range(mission.nodes):
-        flight.data[0, k] = residual[k]
-        flight.since[0, k] = 0 if residual[k] > 0.0 else wait
+        node = flight.sea[0, k]
+        node.base, node.since = residual[k], 0 if residual[k] > 0.0 else wait
     flight.sums[0, 0] = flight.sums[0, 1] = 0.0
-
-
-@inlined
-def copy_snapshot(source, first, target, second):
-    """Make the second snapshot equal to the first, but for the sums."""
-    for i in range(source.team.shape[1]):
-        for column in range(source.team.shape[2]):
-            target.team[second, i, column] = source.team[first, i, column]
-    for k in range(source.data.shape[1]):
-        target.data[second, k] = source.data[first, k]
-        target.since[second, k] = source.since[first, k]
 
 
 @inlined
@@ -127,15 +182,24 @@ def _revival(mission):
     return int(math.ceil(_HALF_A_PACKET / mission.arrival_rate))
 
 
+@inlined
+def copy_snapshot(mission, source, first, target, second):
+    """Make the second snapshot equal to the first, but for the sums."""
+    for i in range(mission.uavs):
+        target.team[second, i] = source.team[first, i]
+    for k in range(mission.nodes):
+        target.sea[second, k] = source.sea[first, k]
+
+
 @kernel
-def fly(mission, uavs, rates, plan, source, first, flight, slots):
+def fly(mission, rates, plan, source, first, flight, slots):
     """Fly a plan from a snapshot on, and return its value.
 
     Args:
         mission: ``MISSION`` record.
-        uavs: (I,) ``UAV`` records, of which the constants are read.
         rates: ``Rates``.
-        plan: ``Plan``, the same as that of ``source`` until the snapshot.
+        plan: ``Plan``, the same as that of ``source`` until the snapshot. The slots in which its
+            legs begin are written.
         source: The flight with the snapshot.
         first: The number of the snapshot.
         flight: The flight that is written, from that snapshot on; it may be ``source``.
@@ -145,196 +209,208 @@ def fly(mission, uavs, rates, plan, source, first, flight, slots):
         The data collected in the whole mission if its arrivals were those until now, less penalties
         [data units]. Data that arrive because the mission lasts longer lower it.
     """
-    ranks, means, extra = rates
-    count, m, nodes = mission.uavs, mission.communication_slots, mission.nodes
-    team = flight.team[-1]
-    data, since = flight.data[-1], flight.since[-1]
-    copy_snapshot(source, first, flight, -1)
+    extra, candidates, parts = rates.extra, rates.candidates, rates.parts
+    waypoints, team, sea = plan.waypoints, flight.team[-1], flight.sea[-1]
+    fleet, m, cost, grid = (
+        mission.uavs,
+        mission.communication_slots,
+        mission.flight_cost,
+        mission.grid,
+    )
+    copy_snapshot(mission, source, first, flight, -1)
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
-    for i in range(count):
-        for w in range(MOST_WAYPOINTS + 1):
-            flight.begun[i, w] = source.begun[i, w] if w <= team[i, NEXT] else NEVER
+    for i in range(fleet):
+        v = team[i]
+        v.waypoints, v.last_charge = plan.lengths[i], -1
+        for number in range(v.waypoints + 1):
+            w = waypoints[i, number]
+            if number > v.next:
+                w.begun = NEVER
+            elif first == 0:
+                w.begun = 0
+            if number < v.waypoints and w.stay == CHARGE:
+                v.last_charge = number
     total = mission.initial + mission.arrived
     present = total - mission.collected - mission.lost
-    wait, rate, grid = _revival(mission), mission.arrival_rate, mission.grid
-    parts = ranks.shape[0] // (2 * grid) // max(grid - 1, 1)  # places per cell
-    line = parts * (grid - 1) + 1
-    spot = np.empty(count, np.int64)  # place at the end of the slot
-    back = np.empty(count, np.int64)  # places per communication slot
+    wait, rate, line = _revival(mission), mission.arrival_rate, parts * (grid - 1) + 1
     t = first * STRIDE
     while t < slots:
         if t % STRIDE == 0:
             s = t // STRIDE
-            copy_snapshot(flight, -1, flight, s)
-            flight.sums[s, 0] = collected
-            flight.sums[s, 1] = penalty
-        active = 0
-        for i in range(count):
-            active += team[i, ACTIVE]
+            copy_snapshot(mission, flight, -1, flight, s)
+            flight.sums[s, 0], flight.sums[s, 1] = collected, penalty
+        active = taken = 0
+        for i in range(fleet):
+            active += team[i].active
+            taken += team[i].charging
         if active == 0:
             break
-        data_left = present + rate * nodes * t - collected
-        for i in range(count):
-            if team[i, ACTIVE]:
-                penalty += _act(
-                    mission, uavs, extra, plan, flight.begun, team, i, t, active, data_left
-                )
-                v = team[i]
-                part = parts // (m * uavs[i].slots_per_cell)
-                if STEP_Y[v[ACTION]] == 0:
-                    spot[i] = v[Y] * line + v[X] * parts
+        data_left = present + rate * mission.nodes * t - collected
+        for i in range(fleet):
+            v = team[i]
+            if v.active == 0:
+                continue
+            if v.charging != 0:
+                v.battery = min(v.battery + mission.charge_rate, mission.charge_complete)
+                continue
+            if v.next > v.last_charge:
+                penalty += _unplanned(mission, v, active, data_left)
+            v.battery -= cost
+            if v.left > 0:
+                v.left -= 1
+            else:
+                v.action = HOVER
+                flies_on = False
+                while v.next < v.waypoints:
+                    w = waypoints[i, v.next]
+                    if v.x != w.x or v.y != w.y:
+                        flies_on = True
+                        break
+                    if w.stay == CHARGE:
+                        break
+                    v.stayed += 1
+                    if v.stayed <= w.stay:
+                        break
+                    v.next += 1
+                    v.stayed = 0
+                    waypoints[i, v.next].begun = t
+                if flies_on:
+                    v.action = _towards(v, w, w.turned)
+                    if fleet > 1 and _is_blocked(mission, team, i, v.action):
+                        penalty += _BLOCKED
+                        v.action = _towards(v, w, 1 - w.turned)
+                        if _is_blocked(mission, team, i, v.action):
+                            v.action = HOVER
+                if v.action != HOVER:
+                    v.x += STEP_X[v.action]
+                    v.y += STEP_Y[v.action]
+                    v.left = v.slots_per_cell - 1
+                    if extra.size > 0:
+                        v.battery -= cost * extra[v.action, v.y, v.x]
                 else:
-                    spot[i] = (grid + v[X]) * line + v[Y] * parts
-                back[i] = part * (STEP_X[v[ACTION]] + STEP_Y[v[ACTION]])
-                spot[i] -= back[i] * (v[LEFT] * m + m)
+                    if fleet > 1 and _is_blocked(mission, team, i, HOVER):
+                        penalty += _BLOCKED  # the teammate would have been overruled
+                    if (
+                        v.latch != 0
+                        and in_zone(mission, v.x, v.y)
+                        and taken < working_pads(mission)
+                    ):
+                        taken += 1
+                        penalty += _begin_to_charge(mission, v, active)
+            _open_slot(mission, v, parts, line)
         for _ in range(m):
-            for i in range(count):
+            for i in range(fleet):
                 v = team[i]
-                spot[i] += back[i]
-                if not v[ACTIVE] or v[CHARGING]:
+                v.place += v.pace
+                if v.active == 0 or v.charging != 0:
                     continue
-                place = spot[i]
-                for rank in range(ranks.shape[1]):
-                    k = ranks[place, rank]
-                    if t < since[k]:
-                        continue
-                    held = data[k] + rate * t
-                    amount = means[place, rank] * uavs[i].rate
-                    if amount < held:
-                        data[k] -= amount
-                    else:
-                        amount = held
-                        data[k] = -rate * t
-                        since[k] = t + wait
-                    collected += amount
-                    v[COUNTED] += 1
-                    break
-                else:
+                rank, found = 0, False
+                while rank < candidates.shape[1] and not found:
+                    c = candidates[v.place, rank]
+                    node = sea[c.node]
+                    found = t >= node.since
+                    rank += 1
+                if not found:
                     # where data arrive, some node far away has got some
-                    v[COUNTED] += rate > 0.0
-        for i in range(count):
-            if team[i, ACTIVE]:
-                penalty += _settle(mission, uavs[i], plan, flight.begun, team[i], i, t)
+                    v.counted += rate > 0.0
+                    continue
+                held, amount = node.base + rate * t, c.rate * v.rate
+                if amount < held:
+                    node.base -= amount
+                else:
+                    amount, node.base, node.since = held, -rate * t, t + wait
+                collected += amount
+                v.counted += 1
+        for i in range(fleet):
+            v = team[i]
+            if v.active != 0:
+                penalty += _settle(mission, v)
+                if v.charging != 0 and v.latch == 0:
+                    v.charging = 0
+                    if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
+                        v.next += 1
+                        v.stayed = 0
+                        waypoints[i, v.next].begun = t + 1
         t += 1
     s = (t + STRIDE - 1) // STRIDE
-    copy_snapshot(flight, -1, flight, s)
+    copy_snapshot(mission, flight, -1, flight, s)
     flight.last[0], flight.last[1] = s, t
-    share = (mission.collected + collected) / max(total + rate * nodes * t, 1e-9)
+    share = (mission.collected + collected) / max(total + rate * mission.nodes * t, 1e-9)
     return share * total - penalty
 
 
 @inlined
-def _act(mission, uavs, extra, plan, begun, team, i, t, active, data_left):
-    """Move UAV ``i`` or let it hover or charge, take its battery, and return the penalty."""
-    v, u = team[i], uavs[i]
-    if v[CHARGING]:
-        v[BATTERY] = min(v[BATTERY] + mission.charge_rate, mission.charge_complete)
-        return 0.0
-    v[BATTERY] -= mission.flight_cost
-    penalty, ahead = _unplanned(mission, u, plan, v, i, active, data_left), False
-    if v[LEFT] > 0:
-        v[LEFT] -= 1
-        return penalty
-    v[ACTION] = HOVER
-    while v[NEXT] < plan.lengths[i] and not ahead:
-        w = plan.waypoints[i, v[NEXT]]
-        if v[X] != w[CELL_X] or v[Y] != w[CELL_Y]:
-            penalty += _move(mission, u, extra, team, i, w)
-            ahead = True
-        elif w[STAY] == CHARGE:
-            ahead = True
-        elif v[STAYED] < w[STAY]:
-            v[STAYED] += 1
-            ahead = True
-        else:
-            v[NEXT] += 1
-            v[STAYED] = 0
-            begun[i, v[NEXT]] = t
-    if v[ACTION] == HOVER and _is_blocked(mission, team, i, v[X], v[Y]):
-        penalty += _BLOCKED  # the teammate would have been overruled
-    if v[ACTION] == HOVER and v[LATCH] and in_zone(mission, v[X], v[Y]):
-        taken = 0
-        for j in range(mission.uavs):
-            taken += team[j, CHARGING]
-        if taken < working_pads(mission):
-            before = v[BATTERY] + mission.flight_cost
-            reserve = (active - 1) * (2 * u.slots_per_cell + mission.wind_most)
-            penalty += _LATE * max(1 + reserve - before, 0)
-            v[CHARGING] = 1
-            v[BATTERY] = min(before + mission.charge_rate, mission.charge_complete)
-    return penalty
-
-
-@inlined
-def _unplanned(mission, u, plan, v, i, active, data_left):
+def _unplanned(mission, v, active, data_left):
     """The penalty if the guard would send a UAV home for a charge that is not in its plan."""
-    for w in range(v[NEXT], plan.lengths[i]):
-        if plan.waypoints[i, w, STAY] == CHARGE:
-            return 0.0
-    m, lacking = mission.communication_slots, u.quota - v[COUNTED]
-    spare = v[BATTERY] + mission.flight_cost
+    m, lacking, spare = mission.communication_slots, v.quota - v.counted, v.battery
     if data_left * m < 0.2 * lacking * active:
         spare -= SCARCE_SLOTS * mission.flight_cost
     return _UNPLANNED if spare * m < lacking * mission.flight_cost else 0.0
 
 
 @inlined
-def _move(mission, u, extra, team, i, w):
-    """Let UAV ``i`` begin the next move to a waypoint, and return the penalty if it is blocked."""
-    v = team[i]
-    dx, dy = w[CELL_X] - v[X], w[CELL_Y] - v[Y]
-    east_or_west, north_or_south = (1 if dx > 0 else 3), (2 if dy > 0 else 0)
-    along_y = dx == 0 or (dy != 0 and w[ORDER] == 1)
-    action = north_or_south if along_y else east_or_west
-    penalty = 0.0
-    if _is_blocked(mission, team, i, v[X] + STEP_X[action], v[Y] + STEP_Y[action]):
-        penalty = _BLOCKED
-        if dx == 0 or dy == 0:
-            return penalty
-        action = east_or_west if along_y else north_or_south
-        if _is_blocked(mission, team, i, v[X] + STEP_X[action], v[Y] + STEP_Y[action]):
-            return penalty
-    v[X] += STEP_X[action]
-    v[Y] += STEP_Y[action]
-    v[ACTION] = action
-    v[LEFT] = u.slots_per_cell - 1
-    if extra.size > 0:
-        v[BATTERY] -= mission.flight_cost * extra[action, v[Y], v[X]]
-    return penalty
+def _towards(v, w, turned):
+    """The action that leads to a waypoint, along y first if ``turned``; Hover if none does."""
+    dx, dy = w.x - v.x, w.y - v.y
+    if turned != 0 and dy != 0:
+        dx = 0
+    elif turned == 0 and dx != 0:
+        dy = 0
+    if dx != 0:
+        return 1 if dx > 0 else 3
+    if dy != 0:
+        return 2 if dy > 0 else 0
+    return HOVER
 
 
 @inlined
-def _is_blocked(mission, team, i, x, y):
-    """Whether a teammate keeps UAV ``i`` out of a cell.
+def _is_blocked(mission, team, i, action):
+    """Whether a teammate keeps UAV ``i`` out of the cell to which an action leads.
 
     Those of a lower index have moved; the others will move away, unless they charge.
     """
+    x, y, blocked = team[i].x + STEP_X[action], team[i].y + STEP_Y[action], False
     for j in range(mission.uavs):
         o = team[j]
-        stays = j < i or o[CHARGING] or (o[LATCH] and in_zone(mission, x, y))
-        if j != i and o[ACTIVE] and stays and o[X] == x and o[Y] == y:
-            return True
-    return False
+        if j != i and o.x == x and o.y == y and o.active != 0:
+            is_parked = o.charging != 0 or (o.latch != 0 and in_zone(mission, x, y))
+            blocked = blocked or j < i or is_parked
+    return blocked
 
 
 @inlined
-def _settle(mission, u, plan, begun, v, i, t):
+def _begin_to_charge(mission, v, active):
+    """Let a UAV charge, and return the penalty if its battery is below the guard's reserve."""
+    before = v.battery + mission.flight_cost
+    v.charging = 1
+    v.battery = min(before + mission.charge_rate, mission.charge_complete)
+    reserve = (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
+    return _LATE * max(1 + reserve - before, 0)
+
+
+@inlined
+def _open_slot(mission, v, parts, line):
+    """Set the place of a UAV at the start of a slot, and how far it flies per part of it."""
+    v.place, v.pace = v.y * line + v.x * parts, 0
+    if v.action != HOVER:
+        if STEP_Y[v.action] != 0:
+            v.place = (mission.grid + v.x) * line + v.y * parts
+        v.pace = v.part * (STEP_X[v.action] + STEP_Y[v.action])
+        v.place -= v.pace * (v.left + 1) * mission.communication_slots
+
+
+@inlined
+def _settle(mission, v):
     """End the slot of a UAV, and return the penalty if its battery is depleted."""
     penalty = 0.0
-    if v[COUNTED] >= u.quota:
-        v[ACTIVE] = v[CHARGING] = 0
-    elif v[BATTERY] <= 0:
-        lacking = (u.quota - v[COUNTED]) / mission.communication_slots
+    if v.counted >= v.quota:
+        v.active = v.charging = 0
+    elif v.battery <= 0:
+        lacking = (v.quota - v.counted) / mission.communication_slots
         penalty = _DEPLETED + _SLOT_MISSED * lacking
-        v[ACTIVE] = v[CHARGING] = 0
-    if v[BATTERY] >= mission.charge_complete:
-        v[LATCH] = 0
-        if v[CHARGING]:
-            v[CHARGING] = 0
-            if v[NEXT] < plan.lengths[i] and plan.waypoints[i, v[NEXT], STAY] == CHARGE:
-                v[NEXT] += 1
-                v[STAYED] = 0
-                begun[i, v[NEXT]] = t + 1
-    elif v[BATTERY] <= mission.charge_start:
-        v[LATCH] = 1
+        v.active = v.charging = 0
+    if v.battery <= mission.charge_start:
+        v.latch = 1
+    if v.battery >= mission.charge_complete:
+        v.latch = 0
     return penalty

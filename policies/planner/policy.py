@@ -20,22 +20,16 @@ from dess.state import State
 from dess.view import View
 from policies.heuristics import step_towards
 from policies.planner.fluid import (
-    ACTION,
-    CELL_X,
-    CELL_Y,
     CHARGE,
-    CHARGING,
     MOST_WAYPOINTS,
-    NEXT,
-    STAY,
-    STAYED,
+    WAYPOINT,
     Plan,
-    begin,
-    empty_flight,
     fly,
+    insert,
+    remove,
 )
 from policies.planner.rates import rates_of
-from policies.planner.search import improve, insert, remove
+from policies.planner.search import empty_workspace, improve
 
 # The temperature of the first step of a search [data units], for a new plan and for a kept one.
 _NEW, _KEPT = 2.0, 0.3
@@ -75,10 +69,12 @@ class Planner:
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
         state = view.state
+        slots = int(state.missions["max_slots"].max())
         return _decide(
             state.missions, state.uavs, state.residual, view.world.nodes, rates_of(view),
-            memory_of(state, self.new, self.kept), view.mission, view.uav, guard(view),
-            self.new, self.kept,
+            memory_of(state, self.new, self.kept),
+            empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1]),
+            view.mission, view.uav, guard(view), self.new, self.kept,
         )  # fmt: skip
 
 
@@ -97,7 +93,7 @@ def memory_of(state: State, new: int, kept: int) -> Memory:
         shape = state.uavs.shape
         memory = Memory(
             np.zeros((len(missions), 3), np.uint64),
-            np.zeros((*shape, MOST_WAYPOINTS, 4), np.int16),
+            np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
             *(np.zeros(shape, np.int64) for _ in range(3)),
         )
         _MEMORIES[key] = weakref.ref(missions, lambda _: _MEMORIES.pop(key)), memory
@@ -106,7 +102,8 @@ def memory_of(state: State, new: int, kept: int) -> Memory:
 
 @kernel
 def _decide(
-    missions, uavs, residual, nodes, rates, memory, rows_mission, rows_uav, safe, new, kept
+    missions, uavs, residual, nodes, rates, memory, workspace,
+    rows_mission, rows_uav, safe, new, kept,
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
@@ -116,22 +113,20 @@ def _decide(
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
         if not is_same or made[2] != slot:
+            steps, hottest = new, _NEW
             if is_same and 0 < made[2] < slot:
-                _take_up(mission, team, plan, memory.charging[b])
                 steps, hottest = kept, _KEPT
+                _take_up(mission, team, plan, memory.charging[b])
             else:
                 _start(mission, team, residual[b].sum(), plan)
-                steps, hottest = new, _NEW
-            improve(mission, team, residual[b], nodes, rates, plan, steps, hottest)
-            _fly_first_slot(
-                mission, team, residual[b], rates, plan, memory.action[b], memory.charging[b]
-            )
+            improve(mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest)
+            _fly_first_slot(mission, rates, plan, workspace, memory.action[b], memory.charging[b])
             made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
         action = memory.action[b, i]
         if not safe[row, action]:
             x, y = team[i].x, team[i].y
             if plan.lengths[i] > 0:
-                x, y = plan.waypoints[i, 0, CELL_X], plan.waypoints[i, 0, CELL_Y]
+                x, y = plan.waypoints[i, 0].x, plan.waypoints[i, 0].y
             action = step_towards(mission, team, i, safe[row], x, y)
         actions[row] = action
     return actions
@@ -156,7 +151,7 @@ def _take_up(mission, uavs, plan, charging):
             plan.lengths[i] = 0
             continue
         first = 0
-        while first < plan.lengths[i] and plan.waypoints[i, first, STAY] != CHARGE:
+        while first < plan.lengths[i] and plan.waypoints[i, first].stay != CHARGE:
             first += 1
         if first == plan.lengths[i]:
             continue
@@ -168,15 +163,14 @@ def _take_up(mission, uavs, plan, charging):
 
 
 @kernel
-def _fly_first_slot(mission, uavs, residual, rates, plan, action, charging):
+def _fly_first_slot(mission, rates, plan, workspace, action, charging):
     """Write what each UAV does in the present slot, and take it out of the plan."""
-    flight = empty_flight(1, mission.uavs, mission.nodes)
-    begin(mission, uavs, residual, flight)
-    fly(mission, uavs, rates, plan, flight, 0, flight, 1)
+    flight = workspace.flight
+    fly(mission, rates, plan, flight, 0, workspace.ahead, 1)
     for i in range(mission.uavs):
-        u = flight.team[flight.last[0], i]
-        action[i], charging[i] = u[ACTION], u[CHARGING]
-        for _ in range(u[NEXT]):
+        v = workspace.ahead.team[workspace.ahead.last[0], i]
+        action[i], charging[i] = v.action, v.charging
+        for _ in range(v.next):
             remove(plan, i, 0)
-        if plan.lengths[i] > 0 and plan.waypoints[i, 0, STAY] != CHARGE:
-            plan.waypoints[i, 0, STAY] -= u[STAYED]
+        if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != CHARGE:
+            plan.waypoints[i, 0].stay -= v.stayed

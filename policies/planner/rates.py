@@ -20,57 +20,63 @@ _RANKS = 32
 _POINTS = 16
 
 
+# A node that a UAV may serve at a place, and its mean rate [data units per communication slot].
+CANDIDATE = np.dtype([("node", np.int64), ("rate", np.float64)])
+
+
 class Rates(NamedTuple):
     """What a UAV may collect at each place, and what its moves cost.
 
     Attributes:
-        ranks: (2 * M * L, C) the nodes in descending order of mean SNR. The first M * L places are
-            those on the M rows of cells, counted along the row; the others those on the columns.
-        rates: (2 * M * L, C) their mean rates [data units per communication slot].
+        candidates: (2 * M * L, C) ``CANDIDATE`` records of each place, in descending order of the
+            mean SNR. The first M * L places are those on the M rows of cells, counted along the
+            row; the others those on the columns.
         extra: (4, M, M) surcharges of moves in the wind [%], by action and the cell that it leads
             to; (0, 0, 0) where there is no wind.
+        parts: Places per cell.
     """
 
-    ranks: np.ndarray
-    rates: np.ndarray
+    candidates: np.ndarray
     extra: np.ndarray
+    parts: int
 
 
 def rates_of(view: View) -> Rates:
     """The tables of the sea that a view is about."""
     mission, snr = view.state.missions[0], view.world.mean_snr
-    ranks, rates = _tables(
+    candidates = _candidates(
         view.world.nodes.tobytes(),
         snr.tobytes(),
         len(snr),
         float(mission["communication_slot_length"]),
         float(mission["shadowing_deviation"]),
     )
-    wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
-    still = np.zeros((0, 0, 0), np.int64)
-    return Rates(ranks, rates, surcharges(len(snr), *wind) if mission["wind_most"] > 0 else still)
+    extra = np.zeros((0, 0, 0), np.int64)
+    if mission["wind_most"] > 0:
+        wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
+        extra = surcharges(len(snr), *wind).copy()
+    return Rates(candidates, extra, (snr.shape[1] - 1) // (len(snr) - 1))
 
 
 @lru_cache(maxsize=8)
-def _tables(
+def _candidates(
     nodes: bytes, mean_snr: bytes, grid: int, length: float, deviation: float
-) -> tuple[np.ndarray, np.ndarray]:
+) -> np.ndarray:
     cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
     snr = np.frombuffer(mean_snr).reshape(grid, -1)
     mean_rate = _mean_rate(snr, length, deviation)
-    parts = (snr.shape[1] - 1) // (grid - 1)  # places per cell
-    places, kept = snr.shape[1], min(_RANKS, len(cells))
-    ranks = np.empty((2, grid, places, kept), np.int16)
-    rates = np.empty((2, grid, places, kept))
+    parts, places = (snr.shape[1] - 1) // (grid - 1), snr.shape[1]
+    kept = min(_RANKS, len(cells))
+    table = np.empty((2, grid, places, kept), CANDIDATE)
     for axis in range(2):
         along, across = cells[:, axis], cells[:, 1 - axis]
         fine = np.abs(np.arange(places)[:, None] - parts * along)
         for line in range(grid):
             coarse = np.broadcast_to(np.abs(line - across), fine.shape)
             best = np.argsort(-snr[coarse, fine], axis=1, kind="stable")[:, :kept]
-            ranks[axis, line] = best
-            rates[axis, line] = np.take_along_axis(mean_rate[coarse, fine], best, 1)
-    return ranks.reshape(-1, kept), rates.reshape(-1, kept)
+            table["node"][axis, line] = best
+            table["rate"][axis, line] = np.take_along_axis(mean_rate[coarse, fine], best, 1)
+    return table.reshape(-1, kept)
 
 
 def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:

@@ -8,6 +8,7 @@ simulated annealing*, 1983). All random numbers are functions of the mission, th
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,20 +17,22 @@ from dess.code.kernels import inlined, kernel
 from dess.rules import in_zone, on_grid, zone_cell
 from dess.state import STEP_X, STEP_Y
 from policies.planner.fluid import (
-    CELL_X,
-    CELL_Y,
     CHARGE,
     MOST_SLOTS,
     MOST_WAYPOINTS,
-    NEXT,
-    ORDER,
-    STAY,
+    NEVER,
     STRIDE,
+    Flight,
     Plan,
     begin,
+    copy_plan,
     copy_snapshot,
     empty_flight,
+    empty_plan,
     fly,
+    insert,
+    remove,
+    set_waypoint,
 )
 
 # The temperature [data units] falls to this in the last step.
@@ -44,24 +47,29 @@ _LOW = np.uint64(0xFFFF)
 _HIGH = np.uint64(16)
 
 
-@kernel
-def empty_plan(uavs):
-    """A plan of that many UAVs without waypoints."""
-    return Plan(np.zeros((uavs, MOST_WAYPOINTS, 4), np.int16), np.zeros(uavs, np.int64))
+class Workspace(NamedTuple):
+    """Working memory of the search.
+
+    Attributes:
+        present, trial: The plan that the search has come to, and an edit of it.
+        flight, ahead: Their flights; ``ahead`` is written from the first slot that differs on.
+    """
+
+    present: Plan
+    trial: Plan
+    flight: Flight
+    ahead: Flight
+
+
+def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
+    """Working memory for missions of at most that many slots, UAVs and nodes."""
+    slots = min(slots, MOST_SLOTS)
+    flights = (empty_flight(slots, uavs, nodes) for _ in range(2))
+    return Workspace(empty_plan(uavs), empty_plan(uavs), *flights)
 
 
 @kernel
-def copy_plan(source, target):
-    """Make one plan equal to another."""
-    for i in range(len(source.lengths)):
-        target.lengths[i] = source.lengths[i]
-        for w in range(source.lengths[i]):
-            for column in range(4):
-                target.waypoints[i, w, column] = source.waypoints[i, w, column]
-
-
-@kernel
-def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
+def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hottest):
     """Improve a plan in place, and return its value in the fluid model; it is never worse.
 
     Args:
@@ -71,17 +79,17 @@ def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
         nodes: (K, 2) cells of the nodes.
         rates: ``Rates``.
         plan: ``Plan``, changed.
+        workspace: ``Workspace``, overwritten.
         steps: Number of edits to try.
         hottest: The temperature of the first step [data units].
     """
+    present, trial, flight, ahead = workspace
     slots = min(mission.max_slots - mission.slot, MOST_SLOTS)
-    flight = empty_flight(slots, mission.uavs, mission.nodes)
-    trial_flight = empty_flight(slots, mission.uavs, mission.nodes)
-    begin(mission, uavs, residual, flight)
-    value = fly(mission, uavs, rates, plan, flight, 0, flight, slots)
-    best, present, trial = value, empty_plan(len(plan.lengths)), empty_plan(len(plan.lengths))
-    copy_plan(plan, present)
-    copy_plan(plan, trial)
+    begin(mission, uavs, residual, rates, flight)
+    value = fly(mission, rates, plan, flight, 0, flight, slots)
+    best = value
+    copy_plan(mission, plan, present)
+    copy_plan(mission, plan, trial)
     words = np.empty(4, np.uint64)
     heat, cooling = hottest, (_COLDEST / hottest) ** (1.0 / max(steps, 1))
     for step in range(steps):
@@ -93,34 +101,31 @@ def improve(mission, uavs, residual, nodes, rates, plan, steps, hottest):
         if slot == _NO_EDIT:
             continue
         if slot >= flight.last[1]:
-            copy_plan(present, trial)
+            copy_plan(mission, present, trial)
             continue
-        new = fly(mission, uavs, rates, trial, flight, slot // STRIDE, trial_flight, slots)
+        new = fly(mission, rates, trial, flight, slot // STRIDE, ahead, slots)
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         if new >= value or new - value > heat * math.log(luck):
             value = new
-            _keep(mission, trial_flight, flight, slot // STRIDE)
+            _keep(mission, ahead, flight, slot // STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
-                trial.lengths[i] = min(trial.lengths[i], flight.team[flight.last[0], i, NEXT] + 1)
-            copy_plan(trial, present)
+                trial.lengths[i] = min(trial.lengths[i], flight.team[flight.last[0], i].next + 1)
+            copy_plan(mission, trial, present)
             if value > best:
                 best = value
-                copy_plan(present, plan)
+                copy_plan(mission, present, plan)
         else:
-            copy_plan(present, trial)
+            copy_plan(mission, present, trial)
     return best
 
 
 @kernel
-def _keep(mission, trial, flight, first):
+def _keep(mission, ahead, flight, first):
     """Make a flight that of a trial, which was flown from a snapshot on."""
-    for s in range(first, trial.last[0] + 1):
-        copy_snapshot(trial, s, flight, s)
-        flight.sums[s, 0], flight.sums[s, 1] = trial.sums[s, 0], trial.sums[s, 1]
-    flight.last[0], flight.last[1] = trial.last[0], trial.last[1]
-    for i in range(mission.uavs):
-        for w in range(flight.begun.shape[1]):
-            flight.begun[i, w] = trial.begun[i, w]
+    for s in range(first, ahead.last[0] + 1):
+        copy_snapshot(mission, ahead, s, flight, s)
+        flight.sums[s, 0], flight.sums[s, 1] = ahead.sums[s, 0], ahead.sums[s, 1]
+    flight.last[0], flight.last[1] = ahead.last[0], ahead.last[1]
 
 
 @inlined
@@ -137,138 +142,128 @@ def _pick_low(word, count):
 
 @kernel
 def _edit(mission, uavs, nodes, flight, plan, words):
-    """Edit a plan at random; return the first slot that this may change, ``NEVER`` if no edit."""
+    """Edit a plan at random; return the first slot that this may change, or ``_NO_EDIT``."""
     kind, i = _KINDS[_pick(words[0], len(_KINDS))], _pick(words[1], mission.uavs)
     if not uavs[i].active:
         return _NO_EDIT
-    p = _pick_low(words[1], plan.lengths[i] + (kind in (_INSERT, _CHARGE)))
+    length = plan.lengths[i]
+    p = _pick_low(words[1], length + (kind in (_INSERT, _CHARGE)))
     if kind == _INSERT:
-        return _insert_node(mission, uavs, nodes, flight, plan, i, p, words)
+        return _insert_node(mission, nodes, flight, plan, i, p, words)
     if kind == _CHARGE:
-        return _edit_charge(mission, flight, plan, i, p, words)
-    if plan.lengths[i] == 0:
+        return _edit_charge(mission, plan, i, p, words)
+    if length == 0:
         return _NO_EDIT
-    slot = flight.begun[i, p]
-    way = plan.waypoints[i]
+    w = plan.waypoints[i, p]
+    slot = w.begun
     if kind == _REMOVE:
         remove(plan, i, p)
     elif kind == _TURN:
-        way[p, ORDER] = 1 - way[p, ORDER]
+        w.turned = 1 - w.turned
     elif kind == _STAY:
-        if way[p, STAY] == CHARGE:
+        if w.stay == CHARGE:
             return _NO_EDIT
-        way[p, STAY] = max(way[p, STAY] + 1 - 2 * _pick(words[2], 2), 0)
+        w.stay = max(w.stay + 1 - 2 * _pick(words[2], 2), 0)
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
-        x, y = way[p, CELL_X] + STEP_X[action], way[p, CELL_Y] + STEP_Y[action]
-        if not on_grid(mission, x, y) or (way[p, STAY] == CHARGE and not in_zone(mission, x, y)):
+        x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
+        if not on_grid(mission, x, y) or (w.stay == CHARGE and not in_zone(mission, x, y)):
             return _NO_EDIT
-        way[p, CELL_X], way[p, CELL_Y] = x, y
+        w.x, w.y = x, y
     elif kind == _REVERSE:
-        q = min(p + 1 + _pick(words[2], 5), plan.lengths[i] - 1)
+        q = min(p + 1 + _pick(words[2], 5), length - 1)
         while p < q:
-            _swap(way, p, way, q)
+            _swap(plan.waypoints[i, p], plan.waypoints[i, q])
             p, q = p + 1, q - 1
     else:
-        j = _pick(words[2], mission.uavs)
-        if not uavs[j].active:
-            return _NO_EDIT
-        return _exchange(mission, flight, plan, kind, i, p, j, words)
+        slot = _exchange(
+            mission, uavs, flight, plan, kind, i, p, _pick(words[2], mission.uavs), words
+        )
     return slot
 
 
 @kernel
-def _exchange(mission, flight, plan, kind, i, p, j, words):
+def _exchange(mission, uavs, flight, plan, kind, i, p, j, words):
     """Move waypoint ``p`` of UAV ``i`` to UAV ``j``, or swap it with one of its."""
-    slot = flight.begun[i, p]
-    x, y, stay, order = plan.waypoints[i, p]
+    w = plan.waypoints[i, p]
+    slot, x, y, stay, turned = w.begun, w.x, w.y, w.stay, w.turned
+    is_other = j != i
+    if not uavs[j].active or (is_other and stay == CHARGE):
+        return _NO_EDIT
     if kind == _MOVE:
-        if j != i and (stay == CHARGE or plan.lengths[j] == MOST_WAYPOINTS):
+        if plan.lengths[j] == MOST_WAYPOINTS:
             return _NO_EDIT
         remove(plan, i, p)
         q = _pick(words[3], plan.lengths[j] + 1)
         if stay != CHARGE and _pick_low(words[2], 1 << 16) < _SHORTEST:
-            q = _shortest_detour(mission, flight, plan, j, x, y)
-        insert(plan, j, q, x, y, stay, order)
-    else:
-        if plan.lengths[j] == 0:
-            return _NO_EDIT
-        q = _pick(words[3], plan.lengths[j])
-        if j != i and (stay == CHARGE or plan.waypoints[j, q, STAY] == CHARGE):
-            return _NO_EDIT
-        _swap(plan.waypoints[i], p, plan.waypoints[j], q)
-    return min(slot, flight.begun[j, q])
+            q = _shortest_detour(flight, plan, j, x, y)
+        slot = min(slot, plan.waypoints[j, q].begun)
+        insert(plan, j, q, x, y, stay, turned)
+        return slot
+    if plan.lengths[j] == 0:
+        return _NO_EDIT
+    other = plan.waypoints[j, _pick(words[3], plan.lengths[j])]
+    if is_other and other.stay == CHARGE:
+        return _NO_EDIT
+    slot = min(slot, other.begun)
+    _swap(w, other)
+    return slot
 
 
 @kernel
-def _insert_node(mission, uavs, nodes, flight, plan, i, p, words):
+def _insert_node(mission, nodes, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
     if plan.lengths[i] == MOST_WAYPOINTS:
         return _NO_EDIT
-    data = flight.data[flight.last[0]]
-    k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
-    if data[other] > data[k]:
+    k, other, end = (
+        _pick(words[2], mission.nodes),
+        _pick_low(words[2], mission.nodes),
+        flight.last[0],
+    )
+    if flight.sea[end, other].base > flight.sea[end, k].base:
         k = other
-    x, y = nodes[k]
+    x, y = nodes[k, 0], nodes[k, 1]
     if _pick_low(words[0], 1 << 16) < _SHORTEST:
-        p = _shortest_detour(mission, flight, plan, i, x, y)
-    slot = flight.begun[i, p]
-    insert(plan, i, p, x, y, _pick(words[3], 3), words[3] & np.uint64(1))
+        p = _shortest_detour(flight, plan, i, x, y)
+    slot = plan.waypoints[i, p].begun
+    insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
-def _edit_charge(mission, flight, plan, i, p, words):
-    """Let UAV ``i`` charge before waypoint ``p``, or charge in another cell if it charges there."""
+def _edit_charge(mission, plan, i, p, words):
+    """Let UAV ``i`` charge before waypoint ``p``, or in another cell if it charges there."""
     x, y = zone_cell(mission, _pick(words[2], mission.zone_width * mission.zone_height))
-    slot = flight.begun[i, p]
-    if p < plan.lengths[i] and plan.waypoints[i, p, STAY] == CHARGE:
-        plan.waypoints[i, p, CELL_X], plan.waypoints[i, p, CELL_Y] = x, y
+    w = plan.waypoints[i, p]
+    slot = w.begun
+    if p < plan.lengths[i] and w.stay == CHARGE:
+        w.x, w.y = x, y
     elif plan.lengths[i] == MOST_WAYPOINTS or mission.flight_cost == 0:
-        return _NO_EDIT
+        slot = _NO_EDIT
     else:
-        insert(plan, i, p, x, y, CHARGE, words[3] & np.uint64(1))
+        insert(plan, i, p, x, y, CHARGE, np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
-def _shortest_detour(mission, flight, plan, i, x, y):
+def _shortest_detour(flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
-    way, least, place = plan.waypoints[i], 1 << 40, 0
-    from_x, from_y = flight.team[0, i, 0], flight.team[0, i, 1]
+    least, place = NEVER, 0
+    from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
         detour = abs(x - from_x) + abs(y - from_y)
         if p < plan.lengths[i]:
-            to_x, to_y = way[p, CELL_X], way[p, CELL_Y]
-            detour += abs(x - to_x) + abs(y - to_y) - abs(from_x - to_x) - abs(from_y - to_y)
-            from_x, from_y = to_x, to_y
+            w = plan.waypoints[i, p]
+            detour += abs(x - w.x) + abs(y - w.y) - abs(from_x - w.x) - abs(from_y - w.y)
+            from_x, from_y = w.x, w.y
         if detour < least:
             least, place = detour, p
     return place
 
 
-@kernel
-def insert(plan, i, p, x, y, stay, order):
-    """Insert a waypoint before number ``p`` of UAV ``i``."""
-    way = plan.waypoints[i]
-    for q in range(plan.lengths[i], p, -1):
-        for column in range(4):
-            way[q, column] = way[q - 1, column]
-    way[p, CELL_X], way[p, CELL_Y], way[p, STAY], way[p, ORDER] = x, y, stay, order
-    plan.lengths[i] += 1
-
-
-@kernel
-def remove(plan, i, p):
-    """Take out waypoint ``p`` of UAV ``i``."""
-    way = plan.waypoints[i]
-    plan.lengths[i] -= 1
-    for q in range(p, plan.lengths[i]):
-        for column in range(4):
-            way[q, column] = way[q + 1, column]
-
-
 @inlined
-def _swap(way, p, other, q):
-    for column in range(4):
-        way[p, column], other[q, column] = other[q, column], way[p, column]
+def _swap(one, other):
+    """Swap two waypoints, but for when their legs begin."""
+    x, y, stay, turned = one.x, one.y, one.stay, one.turned
+    set_waypoint(one, other.x, other.y, other.stay, other.turned)
+    set_waypoint(other, x, y, stay, turned)
