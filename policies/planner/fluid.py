@@ -274,29 +274,28 @@ def fly(mission, rates, plan, source, first, flight, slots):
                     v.next += 1
                     v.stayed = 0
                     waypoints[i, v.next].begun = t
-                if flies_on:
-                    v.action = _towards(v, w, w.turned)
-                    if fleet > 1 and _is_blocked(mission, team, i, v.action):
-                        penalty += _BLOCKED
-                        v.action = _towards(v, w, 1 - w.turned)
-                        if _is_blocked(mission, team, i, v.action):
-                            v.action = HOVER
+                # a teammate in the way costs something, and the UAV tries the other direction
+                is_blocked = False
+                for attempt in range(2):
+                    if flies_on:
+                        v.action = _towards(v, w, w.turned if attempt == 0 else 1 - w.turned)
+                    is_blocked = False
+                    for j in range(fleet):
+                        is_blocked = is_blocked or (j != i and _blocks(mission, v, team[j], j < i))
+                    if not is_blocked:
+                        break
+                    penalty += _BLOCKED
+                if is_blocked:
+                    v.action = HOVER
                 if v.action != HOVER:
                     v.x += STEP_X[v.action]
                     v.y += STEP_Y[v.action]
                     v.left = v.slots_per_cell - 1
                     if extra.size > 0:
                         v.battery -= cost * extra[v.action, v.y, v.x]
-                else:
-                    if fleet > 1 and _is_blocked(mission, team, i, HOVER):
-                        penalty += _BLOCKED  # the teammate would have been overruled
-                    if (
-                        v.latch != 0
-                        and in_zone(mission, v.x, v.y)
-                        and taken < working_pads(mission)
-                    ):
-                        taken += 1
-                        penalty += _begin_to_charge(mission, v, active)
+                elif v.latch != 0 and in_zone(mission, v.x, v.y) and taken < working_pads(mission):
+                    taken += 1
+                    penalty += _begin_to_charge(mission, v, active)
             _open_slot(mission, v, parts, line)
         for _ in range(m):
             for i in range(fleet):
@@ -364,18 +363,14 @@ def _towards(v, w, turned):
 
 
 @inlined
-def _is_blocked(mission, team, i, action):
-    """Whether a teammate keeps UAV ``i`` out of the cell to which an action leads.
+def _blocks(mission, v, other, has_moved):
+    """Whether a teammate keeps a UAV out of the cell to which its action leads.
 
-    Those of a lower index have moved; the others will move away, unless they charge.
+    A teammate that has not moved yet will move away, unless it charges.
     """
-    x, y, blocked = team[i].x + STEP_X[action], team[i].y + STEP_Y[action], False
-    for j in range(mission.uavs):
-        o = team[j]
-        if j != i and o.x == x and o.y == y and o.active != 0:
-            is_parked = o.charging != 0 or (o.latch != 0 and in_zone(mission, x, y))
-            blocked = blocked or j < i or is_parked
-    return blocked
+    x, y = v.x + STEP_X[v.action], v.y + STEP_Y[v.action]
+    stays = has_moved or other.charging != 0 or (other.latch != 0 and in_zone(mission, x, y))
+    return stays and other.x == x and other.y == y and other.active != 0
 
 
 @inlined
