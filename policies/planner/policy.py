@@ -21,6 +21,7 @@ from dess.view import View
 from policies.heuristics import step_towards
 from policies.planner.fluid import (
     CHARGE,
+    CRAFT,
     MOST_WAYPOINTS,
     WAYPOINT,
     Plan,
@@ -40,16 +41,14 @@ class Memory(NamedTuple):
 
     Attributes:
         made: (B, 3) the seed, replication and slot + 1 that each plan was made for; 0 for none.
-        waypoints, lengths: (B, ...) as in ``Plan``; what is left of the plan after the slot.
-        action: (B, I) the action of each UAV in the slot.
-        charging: (B, I) whether it is to charge in the slot.
+        waypoints, lengths: (B, ...) as in ``Plan``.
+        first: (B, I) ``CRAFT`` records: the UAVs after the slot, if it goes as planned.
     """
 
     made: np.ndarray
     waypoints: np.ndarray
     lengths: np.ndarray
-    action: np.ndarray
-    charging: np.ndarray
+    first: np.ndarray
 
 
 # The memories by the identity of the arrays that they belong to, and the budget of the search.
@@ -64,7 +63,7 @@ class Planner:
     """
 
     name = "planner"
-    new, kept = 60_000, 1_000
+    new, kept = 30_000, 700
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
@@ -82,7 +81,7 @@ class LongPlanner(Planner):
     """Plan as ``planner`` does, with a longer search."""
 
     name = "planner-long"
-    new, kept = 600_000, 10_000
+    new, kept = 300_000, 7_000
 
 
 def memory_of(state: State, new: int, kept: int) -> Memory:
@@ -94,7 +93,8 @@ def memory_of(state: State, new: int, kept: int) -> Memory:
         memory = Memory(
             np.zeros((len(missions), 3), np.uint64),
             np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
-            *(np.zeros(shape, np.int64) for _ in range(3)),
+            np.zeros(shape, np.int64),
+            np.zeros(shape, CRAFT),
         )
         _MEMORIES[key] = weakref.ref(missions, lambda _: _MEMORIES.pop(key)), memory
     return _MEMORIES[key][1]
@@ -116,17 +116,20 @@ def _decide(
             steps, hottest = new, _NEW
             if is_same and 0 < made[2] < slot:
                 steps, hottest = kept, _KEPT
-                _take_up(mission, team, plan, memory.charging[b])
+                _take_up(mission, team, plan, memory.first[b])
             else:
                 _start(mission, team, residual[b].sum(), plan)
             improve(mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest)
-            _fly_first_slot(mission, rates, plan, workspace, memory.action[b], memory.charging[b])
+            ahead = workspace.ahead
+            fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
+            for j in range(mission.uavs):
+                memory.first[b, j] = ahead.team[ahead.last[0], j]
             made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
-        action = memory.action[b, i]
+        action = memory.first[b, i].action
         if not safe[row, action]:
-            x, y = team[i].x, team[i].y
-            if plan.lengths[i] > 0:
-                x, y = plan.waypoints[i, 0].x, plan.waypoints[i, 0].y
+            x, y, number = team[i].x, team[i].y, memory.first[b, i].next
+            if number < plan.lengths[i]:
+                x, y = plan.waypoints[i, number].x, plan.waypoints[i, number].y
             action = step_towards(mission, team, i, safe[row], x, y)
         actions[row] = action
     return actions
@@ -143,34 +146,27 @@ def _start(mission, uavs, data, plan):
 
 
 @kernel
-def _take_up(mission, uavs, plan, charging):
-    """Fit what is left of a plan to what has happened since: UAVs have begun or ended to charge."""
+def _take_up(mission, uavs, plan, planned):
+    """Take out of a plan what has been done in the slot that it was made for.
+
+    If UAVs have begun to charge, or have been charged since, their plans follow.
+    """
     for i in range(mission.uavs):
-        u = uavs[i]
+        u, v = uavs[i], planned[i]
         if not u.active:
             plan.lengths[i] = 0
             continue
-        first = 0
-        while first < plan.lengths[i] and plan.waypoints[i, first].stay != CHARGE:
-            first += 1
-        if first == plan.lengths[i]:
-            continue
-        if u.charging and first > 0:
-            remove(plan, i, first)
-            insert(plan, i, 0, u.x, u.y, CHARGE, 0)
-        elif charging[i] and first == 0 and not u.charging and not u.latch:
-            remove(plan, i, 0)
-
-
-@kernel
-def _fly_first_slot(mission, rates, plan, workspace, action, charging):
-    """Write what each UAV does in the present slot, and take it out of the plan."""
-    flight = workspace.flight
-    fly(mission, rates, plan, flight, 0, workspace.ahead, 1)
-    for i in range(mission.uavs):
-        v = workspace.ahead.team[workspace.ahead.last[0], i]
-        action[i], charging[i] = v.action, v.charging
         for _ in range(v.next):
             remove(plan, i, 0)
         if plan.lengths[i] > 0 and plan.waypoints[i, 0].stay != CHARGE:
             plan.waypoints[i, 0].stay -= v.stayed
+        charge = 0
+        while charge < plan.lengths[i] and plan.waypoints[i, charge].stay != CHARGE:
+            charge += 1
+        if charge == plan.lengths[i]:
+            continue
+        if u.charging and charge > 0:
+            remove(plan, i, charge)
+            insert(plan, i, 0, u.x, u.y, CHARGE, 0)
+        elif v.charging != 0 and charge == 0 and not u.charging and not u.latch:
+            remove(plan, i, 0)

@@ -17,7 +17,7 @@ class Quick(Planner):
     """The planner with a search that is short enough for tests."""
 
     name = "quick"
-    new, kept = 200, 5
+    new, kept = 60, 3
 
 
 def _same(one: Any, records: Any, job: int) -> None:

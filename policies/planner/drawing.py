@@ -1,0 +1,98 @@
+"""The plans that a planner has during a mission, for drawings.
+
+plans = plan_of(load_scenario("paper"), seed=1, replication=0)
+plans[20][0].waypoints, plans[20][0].path     # of UAV 0, as planned in slot 20
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.mission import simulate
+from dess.scenario import Scenario, ScenarioSpace
+from dess.view import View
+from policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
+from policies.planner.policy import Planner, memory_of
+from policies.planner.rates import rates_of
+
+
+class Course(NamedTuple):
+    """What a plan has a UAV do, from the present slot on.
+
+    Attributes:
+        waypoints: (W, 2) the cells that it flies to, one after another.
+        stays: (W,) for how many slots it hovers at each; -1 where it charges.
+        path: (T + 1, 2) the cell in which the fluid model expects it, now and after each slot until
+            its quota is filled.
+    """
+
+    waypoints: np.ndarray
+    stays: np.ndarray
+    path: np.ndarray
+
+
+def plan_of(
+    scenario: Scenario | ScenarioSpace,
+    seed: int = 0,
+    replication: int = 0,
+    planner: Planner | None = None,
+) -> dict[int, list[Course]]:
+    """The plans of a planner in each slot of a mission in which it decides.
+
+    Args:
+        scenario: The scenario.
+        seed: Seed of the mission.
+        replication: Number of the replication.
+        planner: The planner; without one, ``planner``.
+
+    Returns:
+        The plan for the team by mission slot: a course per UAV, empty for UAVs that have ended.
+
+    Raises:
+        InputError: If the seed or the replication is out of range.
+    """
+    watched = _Watched(planner or Planner())
+    simulate(scenario, watched, seed, replication)
+    return watched.plans
+
+
+class _Watched:
+    """A planner whose plans for a mission are kept."""
+
+    def __init__(self, planner: Planner):
+        self.planner, self.name = planner, planner.name
+        self.plans: dict[int, list[Course]] = {}
+
+    def act(self, view: View) -> np.ndarray:
+        actions = self.planner.act(view)
+        self.plans[int(view.constants["slot"][0])] = _courses(view, self.planner)
+        return actions
+
+
+def _courses(view: View, planner: Planner) -> list[Course]:
+    """The courses of a planner's present plan for the mission of a view."""
+    state, rates = view.state, rates_of(view)
+    mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
+    memory = memory_of(state, planner.new, planner.kept)
+    plan = Plan(memory.waypoints[0].copy(), memory.lengths[0].copy())
+    flight = empty_flight(MOST_SLOTS, len(uavs), len(residual))
+    begin(mission, uavs, residual, rates, flight)
+    crafts, slots = [flight.team[0].copy()], min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
+    for slot in range(1, int(slots) + 1):
+        fly(mission, rates, plan, flight, 0, flight, slot)
+        if flight.last[1] < slot:
+            break
+        crafts.append(flight.team[flight.last[0]].copy())
+    return [
+        _course(plan.waypoints[i, : plan.lengths[i]], np.stack(crafts)[:, i])
+        for i in range(mission["uavs"])
+    ]
+
+
+def _course(waypoints: np.ndarray, crafts: np.ndarray) -> Course:
+    """The course of a UAV from its waypoints and its states in all slots."""
+    cells = np.stack([crafts["x"], crafts["y"]], 1)
+    slots = int(crafts["active"].sum())  # it is active until its last slot
+    return Course(
+        np.stack([waypoints["x"], waypoints["y"]], 1), waypoints["stay"].copy(), cells[: slots + 1]
+    )
