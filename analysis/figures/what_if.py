@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from analysis.figures import style
-from analysis.names import METRICS
+from analysis.figures.settings import of_metric
+from analysis.names import METRICS, metric_label
 from analysis.questions.what_if.question import SIDES
 
 # Share of the missions that the second panel of ``spread`` shows.
@@ -20,19 +21,21 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
 
     Args:
         table: Rows of ``questions.what_if_answer.means``.
-        metric: One of ``METRICS``.
+        metric: One of their metrics.
         settings: What the baseline and the variation set, in words.
     """
-    rows = table[table["metric"] == metric]
+    rows = table[table["metric"] == metric].dropna(subset="mean")
     colours = style.policy_colours(rows["policy"])
     with style.look():
         figure, ax = style.panels(4.1, values="y")
         style.policy_means(rows, "point", colours, 0.025 * (len(colours) - 1), ax)
-        ax.set(title=METRICS[metric], xlim=(-0.45, 1.45), ylim=_ends(rows))
+        ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
         ticks = ["\n".join((s, *words)) for s, words in zip(SIDES, settings, strict=True)]
         ax.set_xticks((0, 1), ticks)
-        style.round_ticks(ax.yaxis, 6)
-        ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+        of_metric(ax.yaxis, metric)
+        if metric in METRICS:
+            ax.set_ylim(_ends(rows))
+            ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         style.legend_below(figure, ax)
     return figure
 

@@ -88,6 +88,11 @@ class WhatIf:
         """The name of the scenario, or of its file."""
         return self.results.manifest["study"]["scenario"]
 
+    @property
+    def measured(self) -> list[str]:
+        """What is measured beyond the paper's metrics, such as the age of information."""
+        return answer.measured(self.results)
+
     def fields(self) -> pd.DataFrame:
         """The fields that the variation changes, that both sides set, and that missions draw."""
         return question.listed(self.results)
@@ -125,7 +130,7 @@ class WhatIf:
         """A metric of every policy in the baseline and in the variation, with intervals.
 
         Args:
-            metric: One of the paper's metrics.
+            metric: One of the paper's metrics, or of ``measured``.
         """
         from analysis.figures import what_if as figures
 

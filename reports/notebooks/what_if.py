@@ -58,7 +58,8 @@ html.say("{answer}", answer=html.composed(asked.answer()))
 # These are paired differences with their 95 % confidence intervals. A difference is
 # inconclusive if its interval contains 0. A learned policy is used as it was trained. In a setting
 # that differs from that of its training, which its model card describes, a newly trained policy may
-# do better.
+# do better. Where a field of a section is set, both sides measure what belongs to it, such as the
+# age of information.
 #
 # The figures below show the means of both sides. Their intervals may overlap although the paired
 # difference is clearly not zero:
@@ -68,7 +69,8 @@ caption = f"n = {asked.missions:,} missions per dot, bars are 95 % intervals of 
 html.gallery(
     [
         (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
-        for metric, name in names.METRICS.items()
+        for metric in (*names.METRICS, *asked.measured)
+        for name in [names.metric_name(metric)]
     ]
 )
 
@@ -93,7 +95,8 @@ html.gallery(
 # The tables have means per mission and mean paired differences with their 95 % intervals. Data are
 # in data units. The signs mean: ▲ the whole interval is above 0, ▼ it is below 0, ≈ it contains 0.
 # A UAV waits while it requests a charging pad and none is free. Its battery counts as depleted if
-# it becomes empty before the quota is filled.
+# it becomes empty before the quota is filled. Nothing stands where only one side measures
+# something.
 
 # %%
 for policy in asked.policies:

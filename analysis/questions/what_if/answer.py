@@ -6,6 +6,7 @@ verdict(table.iloc[0])                         # 'above': the variation has more
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import pandas as pd
 from scipy import stats
 
 from analysis import numbers
-from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
+from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_label
 from analysis.questions import summary
 from analysis.questions.missions import estimate
 from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, settings_of
@@ -36,41 +37,55 @@ MEASURES = {
 # Power, for ``missions_needed``: the probability that a difference of this size is significant.
 POWER = 0.8
 
+# What is 0 where nothing can fail and no buffer is limited, which is not measured then.
+_NOTHING = ("failures", "slots_grounded", "lost")
+
 _SHORT = {SUCCESS: "Success", RATIO: "Collection ratio", PRODUCT: "Their product"}
 _MISSION = ["policy", "point", "replication"]
 
 
 def missions_of(results: Results) -> pd.DataFrame:
-    """``results.missions`` with all of ``MEASURES``."""
+    """``results.missions`` with all of ``MEASURES``; nothing failed where nothing can fail."""
     uavs = results.uavs.assign(depleted=100 * (results.uavs["end"] == "battery"))
     sums = uavs.groupby(_MISSION)[["slots_charging", "slots_waiting", "depleted"]].sum()
     missions = results.missions.join(sums, on=_MISSION)
-    return missions.assign(
+    fillable = [name for name in _NOTHING if name in measured(results)]
+    return missions.fillna(dict.fromkeys(fillable, 0.0)).assign(
         collected_per_uav=missions["collected"] / missions["uavs"],
         charging_per_uav=missions["slots_charging"] / missions["uavs"],
         waiting_per_uav=missions["slots_waiting"] / missions["uavs"],
     )
 
 
+def measured(results: Results) -> list[str]:
+    """What scenarios beyond the paper measure, on at least one of both sides."""
+    missions = results.missions
+    return [name for name in measured_in(missions) if missions[name].notna().any()]
+
+
 def means(results: Results) -> pd.DataFrame:
     """Means with intervals: rows of ``analysis.summary`` by ``policy`` and ``point``."""
-    table = summary.means(results)
-    return table[table["metric"].isin([*METRICS])].reset_index(drop=True)
+    table = summary.means(replace(results, missions=missions_of(results)))
+    return table[table["metric"].isin([*METRICS, *measured(results)])].reset_index(drop=True)
 
 
 def answers(results: Results) -> pd.DataFrame:
     """The variation compared with the baseline, mission by mission.
 
     Returns:
-        A row per policy and metric (those of ``METRICS``, then of ``MEASURES``): ``policy``, the
-        means ``before`` and ``after``, and the columns of ``analysis.compare``. Every interval has
-        its own level of 95 %; see ``stats.paired.paired``.
+        A row per policy and metric (those of ``METRICS``, what is ``measured``, then those of
+        ``MEASURES``): ``policy``, the means ``before`` and ``after``, and the columns of
+        ``analysis.compare``. Every interval has its own level of 95 %; see
+        ``stats.paired.paired``. Of what only one side measures, ``n`` is 0 and all else nan but the
+        mean of this side.
     """
     missions = missions_of(results)
-    metrics = [*METRICS, *MEASURES]
+    metrics = [*METRICS, *measured(results), *MEASURES]
     tables = []
     for policy, rows in missions.groupby("policy", sort=False):
         table = compare(rows, BASELINE, metrics, correction=None, of="point")
+        table = table.set_index("metric").reindex(metrics).rename_axis("metric").reset_index()
+        table["n"] = table["n"].fillna(0).astype(int)
         sides = rows.groupby("point")[metrics].mean()
         table.insert(0, "policy", policy)
         table["before"] = table["metric"].map(sides.loc[BASELINE])
@@ -194,9 +209,10 @@ def listed(table: pd.DataFrame, policy: str) -> pd.DataFrame:
     lines = []
     for row in table[table["policy"] == policy].itertuples():
         write, unit = (numbers.percent, " points") if row.metric in METRICS else (_amount, "")
-        sides = [write(row.before), write(row.after)]
-        name, mark = (_SHORT | MEASURES)[row.metric], MARKS[verdict(row)]
-        lines.append([name, *sides, f"{mark} {change(row)}{unit}"])
+        sides = ["–" if np.isnan(mean) else write(mean) for mean in (row.before, row.after)]
+        name = (_SHORT | MEASURES).get(row.metric) or metric_label(row.metric)
+        difference = f"{MARKS[verdict(row)]} {change(row)}{unit}" if row.n else ""
+        lines.append([name, *sides, difference])
     heads = ["Mean per mission", "Baseline", "Variation", "Paired difference"]
     return pd.DataFrame(lines, columns=heads)
 
@@ -265,7 +281,8 @@ def change(answer: Any) -> str:
 
 
 def _amount(value: float, *ends: float, sign: str = "") -> str:
-    """A number with two decimals, and its interval if it has a length."""
-    rounded = [round(number, 2) or 0.0 for number in (value, *ends)]  # no -0.00
-    texts = [numbers.minus(f"{number:{sign if number else ''}.2f}") for number in rounded]
+    """A number with two decimals, or more if it is small, and its interval if it has a length."""
+    digits = 2 if abs(value) >= 0.1 or not value else 4
+    rounded = [round(number, digits) or 0.0 for number in (value, *ends)]  # no -0.00
+    texts = [numbers.minus(f"{number:{sign if number else ''}.{digits}f}") for number in rounded]
     return f"{texts[0]} [{', '.join(texts[1:])}]" if len({*ends}) > 1 else texts[0]

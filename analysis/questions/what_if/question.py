@@ -30,7 +30,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
-from dess.scenario import SAMPLED, ScenarioSpace, fields_of, load_scenario
+from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
 from policies import load_team
 
 NAME = "what-if"
@@ -50,6 +50,8 @@ def question(
 ) -> Study:
     """The study that answers: what if the baseline had these settings?
 
+    Where fields of a section are set, both sides measure what the section can measure.
+
     Args:
         settings: Fields of the scenario that the variation sets.
         baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
@@ -66,7 +68,8 @@ def question(
     for name, values in (("settings", settings), ("baseline", baseline or {})):
         if not isinstance(values, Mapping):
             raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
-    fixed, changed = dict(baseline or {}), dict(settings)
+    fixed, changed = dotted(dict(baseline or {})), dotted(dict(settings))
+    fixed = _measured(fixed | changed) | fixed
     _check_changes(
         load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed
     )
@@ -210,6 +213,13 @@ def _check_changes(before: ScenarioSpace, after: ScenarioSpace, changed: Iterabl
     if not changed:
         allowed = ", ".join(fields_of(ScenarioSpace))
         raise InputError(f"settings: none is given; allowed: one or more of {allowed}")
+
+
+def _measured(values: Iterable[str]) -> dict[str, bool]:
+    """The fields that measure what belongs to the sections of these fields, without those given."""
+    sections = {section for section, dot, _ in (field.partition(".") for field in values) if dot}
+    measuring = fields_of(ScenarioSpace).keys() & {f"{section}.measured" for section in sections}
+    return dict.fromkeys(sorted(measuring - {*values}), True)
 
 
 def _meaning(field: str) -> str:

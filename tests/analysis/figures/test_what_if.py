@@ -7,6 +7,7 @@ import pytest
 from analysis.figures import what_if as figures
 from analysis.names import METRICS
 from analysis.questions.what_if import answer as what_if_answer
+from analysis.questions.what_if.question import VARIATION
 from tests.analysis.small import asked
 
 POLICIES = ["random", "greedy"]
@@ -38,6 +39,16 @@ def test_figures_show_the_means_and_the_gains(results):
         own = answers[answers["policy"] == policy].set_index("metric").loc[[*METRICS]]
         assert bar.lines[0].get_xdata() == pytest.approx(own["difference"])
         assert drawn_interval(bar, 0) == pytest.approx(own[["low", "high"]].to_numpy())
+
+
+def test_a_measure_of_a_section_is_drawn_for_the_side_that_has_it(tmp_path):
+    results = asked(tmp_path, 4, settings={"age.measured": True}, policies=["greedy"])
+    table = what_if_answer.means(results)
+    (ax,) = figures.means(table, "age", (["age.measured no"], ["age.measured yes"])).axes
+    assert ax.get_title(loc="left") == "Age of information [mission slots]"
+    ((bar,), age) = ax.containers, results.missions["age"].mean()
+    assert bar.lines[0].get_ydata() == pytest.approx([age])
+    assert bar.lines[0].get_xdata() == pytest.approx([VARIATION], abs=0.05)
 
 
 def test_the_spread_is_the_share_of_missions_up_to_a_difference():

@@ -68,6 +68,34 @@ def test_means_are_of_the_papers_metrics(results):
             assert table.loc[key, "mean"] == pytest.approx(answer.after)
 
 
+def test_measures_of_sections_are_compared_and_nothing_fails_where_nothing_can(tmp_path):
+    changes = {"age.reward": -1.0, "failures.uav_rate": 0.2}
+    results = asked(tmp_path, 6, settings=changes, policies=["greedy"])
+    assert {"age", "failures"} <= {*what_if_answer.measured(results)}
+    answers = what_if_answer.answers(results).set_index("metric")
+    sides = results.missions.pivot(index="replication", columns="point", values="age")
+    change = (sides[VARIATION] - sides[BASELINE]).mean()
+    assert answers.loc["age", "difference"] == pytest.approx(change)
+    assert (answers.loc["failures", "before"], answers.loc["failures", "n"]) == (0, 6)
+    failed = results.missions.query("point == @VARIATION")["failures"].mean()
+    assert answers.loc["failures", "difference"] == pytest.approx(failed) and failed > 0
+    assert what_if_answer.means(results).query("metric == 'age'")["mean"].tolist() == (
+        pytest.approx(answers.loc["age", ["before", "after"]].tolist())
+    )
+
+
+def test_what_one_side_measures_has_no_difference(tmp_path):
+    results = asked(tmp_path, 4, settings={"age.measured": True}, policies=["greedy"])
+    table = what_if_answer.answers(results)
+    answers = table.set_index("metric")
+    assert np.isnan(answers.loc["age", ["before", "difference"]].astype(float)).all()
+    assert (answers.loc["age", "n"], answers.loc["success", "n"]) == (0, 4)
+    lines = what_if_answer.listed(table, "greedy").set_index("Mean per mission")
+    line = lines.loc["Age of information [mission slots]"]
+    mean = results.missions["age"].mean()
+    assert line.tolist() == ["–", f"{mean:.2f}", ""]
+
+
 @pytest.mark.parametrize(
     ("answer", "side"),
     [

@@ -44,6 +44,23 @@ def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
 
 
 @pytest.mark.parametrize(
+    ("settings", "baseline", "measured"),
+    [
+        ({"age.reward": -1.0}, {}, (True, True)),
+        ({"age": {"reward": -1.0}}, {}, (True, True)),
+        ({"uavs": 5}, {"age.reward": -1.0}, (True, True)),
+        ({"age.measured": True}, {}, (False, True)),
+        ({"age.reward": -1.0}, {"age.measured": False}, (False, False)),
+        ({"wind.strength": 1.0}, {}, (False, False)),
+    ],
+)
+def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measured):
+    study = what_if.question(settings, baseline, policies=POLICIES)
+    assert tuple(point.scenario.age.measured for point in study.points) == measured
+    assert not any(point.scenario.charging.measured for point in study.points)
+
+
+@pytest.mark.parametrize(
     ("values", "message"),
     [
         (
