@@ -73,7 +73,9 @@ SHARES = (SUCCESS,)
 MEANS = (RATIO, PRODUCT, REWARD)
 BOUNDED = (RATIO, PRODUCT, UTILISATION)  # those of the means whose values lie between 0 and 1
 COST = "cost"  # of a study with prices
-LESS_IS_BETTER = (COST, *(name for name, of in MEASURES.items() if of.less_is_better))
+# Of a study with bounds: the bound, and the bound minus the product.
+BOUND, GAP = "upper_bound", "optimality_gap"
+LESS_IS_BETTER = (COST, GAP, *(name for name, of in MEASURES.items() if of.less_is_better))
 
 
 class Parameter(NamedTuple):
@@ -217,8 +219,9 @@ def measured_in(missions: Container[str]) -> list[str]:
 
 
 def metrics_in(missions: Container[str]) -> list[str]:
-    """The metrics that a table of missions has: those of the paper, then what was measured."""
-    return [*SHARES, *MEANS, *measured_in(missions)]
+    """The metrics that a table of missions has: those of the paper, then all others."""
+    of_bounds = [name for name in (BOUND, GAP) if name in missions]
+    return [*SHARES, *MEANS, *of_bounds, *measured_in(missions)]
 
 
 def value_text(value: object) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 from analysis.execution.jobs import Job, Progress, attempt
 from analysis.execution.workers import Finished, Pool, reported
-from analysis.results.provenance import Member, engine_code, members_of
+from analysis.results.provenance import Member, engine_code
 from dess import InputError
 from dess.code.libraries import needs
 
@@ -103,12 +103,12 @@ class Cluster(Pool):
         """Numbers and results of jobs as they come in; None if the workers of a job have died."""
         done: SimpleQueue[Any] = SimpleQueue()
         code = engine_code()
-        teams = {policy: members_of(policy) for policy in {job.policy for job in jobs}}
+        codes = {policy: job.code for policy, job in {job.policy: job for job in jobs}.items()}
         futures = []
         try:
             for job in jobs:
-                team = teams[job.policy]
-                future = self.client.submit(_checked, job, code, team, pure=False)
+                own = codes[job.policy]
+                future = self.client.submit(_checked, job, code, own, pure=False)
                 future.add_done_callback(done.put)
                 futures.append(future)
             numbers = {future.key: number for number, future in enumerate(futures)}
@@ -199,9 +199,9 @@ def _silence() -> Iterator[None]:
                 logger.setLevel(level)
 
 
-def _checked(job: Job, code: str, members: list[Member]) -> Any:
+def _checked(job: Job, code: str, own: list[Member] | str) -> Any:
     other = "code of dess" if engine_code() != code else ""
-    if members_of(job.policy) != members:
+    if job.code != own:
         other = f"code or weights of {job.policy}"
     if other:
         raise InputError(f"scheduler: a worker has other {other}; allowed: the same as here")

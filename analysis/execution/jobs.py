@@ -1,4 +1,4 @@
-"""Jobs: the units of work of a study that are sent to workers (chunks of missions, event logs)."""
+"""Jobs: units of work that are sent to workers: chunks of missions or of bounds, event logs."""
 
 import traceback
 from collections.abc import Callable, Iterator
@@ -7,9 +7,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from analysis.bound import Bound, upper_bound
 from analysis.execution.engines import simulate_missions
 from analysis.results.chunks import Chunk, Part
 from analysis.results.manifest import Cell
+from analysis.results.provenance import Member, bound_code, members_of
 from analysis.results.store import Store
 from dess import InputError, simulate
 from dess.record import Records
@@ -64,6 +66,15 @@ class MissionsJob:
         """Store the records."""
         store.write(self.chunk, records)
 
+    def warm_up(self) -> None:
+        """Compile the engine, with a heuristic, since it is unknown what other policies do."""
+        replace(next(self.alone()), policy="random").run()
+
+    @property
+    def code(self) -> list[Member]:
+        """The code, beside that of the engines, on which the result depends."""
+        return members_of(self.policy)
+
 
 @dataclass(frozen=True)
 class LogJob:
@@ -103,8 +114,67 @@ class LogJob:
         """Store the event log."""
         store.write_log(self.mission.cell, self.mission.replications[0], columns)
 
+    def warm_up(self) -> None:
+        """Do nothing, since the log of a single mission is soon made."""
 
-Job = MissionsJob | LogJob
+    @property
+    def code(self) -> list[Member]:
+        """The code, beside that of the engines, on which the result depends."""
+        return members_of(self.policy)
+
+
+@dataclass(frozen=True)
+class BoundsJob:
+    """A job that computes the upper bounds of missions, which hold for every policy.
+
+    Attributes:
+        chunk: The missions.
+        spaces: The scenario of each part of the chunk.
+        seed: Seed of the missions.
+    """
+
+    chunk: Chunk
+    spaces: tuple[ScenarioSpace, ...]
+    seed: int
+    policy = "the upper bound"
+
+    @property
+    def missions(self) -> int:
+        """The number of missions."""
+        return self.chunk.missions
+
+    def run(self, progress: Progress | None = None) -> list[Bound]:
+        """Compute the bounds; ``progress`` gets the number of bounds since its last call."""
+        bounds = []
+        for space, part in zip(self.spaces, self.chunk.parts, strict=True):
+            for replication in part.replications:
+                bounds.append(upper_bound(space, self.seed, replication))
+                if progress:
+                    progress(1)
+        return bounds
+
+    def alone(self) -> Iterator["BoundsJob"]:
+        """A job for each of the missions."""
+        for space, part in zip(self.spaces, self.chunk.parts, strict=True):
+            for number in part.replications:
+                alone = Part(part.cell, range(number, number + 1))
+                yield BoundsJob(Chunk(self.chunk.team, (alone,)), (space,), self.seed)
+
+    def save(self, store: Store, bounds: list[Bound]) -> None:
+        """Store the bounds."""
+        store.bounds.write(self.chunk, bounds)
+
+    def warm_up(self) -> None:
+        """Compile the bound."""
+        upper_bound(self.spaces[0], self.seed, self.chunk.parts[0].replications[0], iterations=1)
+
+    @property
+    def code(self) -> str:
+        """The code, beside that of the engines, on which the result depends."""
+        return bound_code()
+
+
+Job = MissionsJob | LogJob | BoundsJob
 
 
 @dataclass(frozen=True)

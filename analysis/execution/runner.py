@@ -19,16 +19,19 @@ import numpy as np
 from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
 from analysis.execution.engines import CHUNK
-from analysis.execution.jobs import Job, LogJob, MissionsJob, Problem, Progress
+from analysis.execution.jobs import BoundsJob, Job, LogJob, MissionsJob, Problem, Progress
 from analysis.execution.reuse import sources
 from analysis.execution.workers import Here, Pool
 from analysis.results import commands
 from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
-from analysis.results.manifest import Selected
+from analysis.results.manifest import Cell, Selected
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
+
+# Bounds of a chunk: few, since each takes seconds.
+BOUNDS_CHUNK = 5
 
 Counts = list[list[int]]  # missions of every team and design point
 
@@ -38,13 +41,15 @@ class Round(NamedTuple):
 
     Attributes:
         number: The number of the round, from 0.
-        missions: Number of missions needed in all rounds up to this one.
-        present: Number of these missions that are already in the folder.
+        missions: Number of missions needed in all rounds up to this one; for bounds, with theirs.
+        present: Number of those of this round that are already in the folder.
+        of_bounds: Whether the upper bounds of missions are computed; it is the last round then.
     """
 
     number: int
     missions: int
     present: int
+    of_bounds: bool = False
 
 
 class ChunkError(Exception):
@@ -126,7 +131,7 @@ class _Run:
         wanted: Counts = [[self.study.first for _ in points] for _ in teams]
         logs = self._log_jobs()
         while wanted != before:
-            self._round(new_parts(self.store, before, wanted), logs)
+            self._round(new_parts(self.store.manifest.cells, before, wanted), logs)
             before, logs = wanted, []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
@@ -134,6 +139,8 @@ class _Run:
         checks = [part for team in teams for part in check_parts(manifest, team)]
         if any(part.replications for part in checks):
             self._round(checks, [])
+        if self.study.bounds:
+            self._bounds([max(counts) for counts in zip(*wanted, strict=True)])
         self.store.finish(wanted, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
@@ -162,13 +169,29 @@ class _Run:
             present += chunk.missions - (missing.missions if missing else 0)
             if missing:
                 jobs.append(self._missions_job(missing))
+        self._begin(parts, present)
+        self._do(jobs)
+
+    def _bounds(self, counts: list[int]) -> None:
+        """Compute the missing bounds of as many missions of every design point."""
+        cells = self.store.manifest.bound_cells
+        parts, jobs = new_parts([cells], [[0] * len(cells)], [counts]), []
+        chunks = [*split(parts, BOUNDS_CHUNK)]
+        for chunk in filter(None, map(self.store.bounds.missing, chunks)):
+            spaces = (self.study.points[part.cell.point].scenario for part in chunk.parts)
+            jobs.append(BoundsJob(chunk, tuple(spaces), self.study.seed))
+        missing = sum(job.missions for job in jobs)
+        self._begin(parts, sum(chunk.missions for chunk in chunks) - missing, of_bounds=True)
+        self._do(jobs)
+
+    def _begin(self, parts: Sequence[Part], present: int, of_bounds: bool = False) -> None:
+        """Tell that a round with these parts begins, and how many of its missions are present."""
         self.asked += sum(len(part.replications) for part in parts)
         if self.announce:
-            self.announce(Round(self.rounds, self.asked, present))
+            self.announce(Round(self.rounds, self.asked, present, of_bounds))
         self.rounds += 1
         if self.progress:
             self.progress(present)
-        self._do(jobs)
 
     def _take_over(self, parts: Sequence[Part]) -> None:
         """Copy missing missions of the parts from the other folders, as far as they have them."""
@@ -227,18 +250,17 @@ class _Run:
     def _failure(self, job: Job, problem: Problem) -> Failure:
         """The failure of a job, with a command that reproduces it by a mission or by the study."""
         command = shlex.join([*self.study.command, "--out", str(self.store.folder)])
-        if mission := problem.mission:
+        if (mission := problem.mission) and not isinstance(job, BoundsJob):
             which = mission.cell, mission.replications[0]
             command = commands.of_folder(self.store.folder, self.store.manifest, *which)
-        policy = self.study.policies[job.chunk.team]
-        return Failure(policy, job.missions, problem.error, command, problem.traceback)
+        return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 
-def new_parts(store: Store, before: Counts, wanted: Counts) -> list[Part]:
+def new_parts(all_cells: Sequence[Sequence[Cell]], before: Counts, wanted: Counts) -> list[Part]:
     """The missions that are needed in addition to earlier ones, each once, in the study's order."""
     parts: list[Part] = []
     asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
-    for cells, begins, ends in zip(store.manifest.cells, before, wanted, strict=True):
+    for cells, begins, ends in zip(all_cells, before, wanted, strict=True):
         for cell, begin, end in zip(cells, begins, ends, strict=True):
             earlier = asked[cell.team, cell.key]
             new = gaps(range(cell.first + begin, cell.first + end), earlier)

@@ -11,11 +11,10 @@ import warnings
 from abc import abstractmethod
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import replace
 from threading import Thread
 from typing import Any
 
-from analysis.execution.jobs import Job, MissionsJob, Problem, Progress, attempt
+from analysis.execution.jobs import Job, Problem, Progress, attempt
 from analysis.results.chunks import Part
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
@@ -163,12 +162,9 @@ def reported(job: Job, result: Any, progress: Progress | None) -> Any:
 
 
 def _compile(jobs: Sequence[Job]) -> None:
-    """Compile the engine once in this process, so that the workers only load it.
-
-    A heuristic of this project is used for it, because it is unknown what other policies do.
-    """
-    for job in [job for job in jobs if isinstance(job, MissionsJob)][:1]:
-        replace(next(job.alone()), policy="random").run()
+    """Compile what the jobs need once in this process, so that the workers only load it."""
+    for job in {type(job): job for job in jobs}.values():
+        job.warm_up()
 
 
 def _numbered(number: int, job: Job) -> tuple[int, Any]:

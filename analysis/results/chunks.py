@@ -4,7 +4,7 @@
 """
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
@@ -74,6 +74,15 @@ def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None)
     return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
 
 
+def bound_parts(manifest: Manifest) -> list[Part]:
+    """The missions that need bounds: at every design point those of any team; none without them."""
+    counts = [max(of_point) for of_point in zip(*manifest.missions, strict=True)]
+    return [
+        Part(cell, range(cell.first, cell.first + counts[cell.point]))
+        for cell in manifest.bound_cells
+    ]
+
+
 def check_parts(manifest: Manifest, team: int) -> list[Part]:
     """The missions that check the design points selected for a team.
 
@@ -113,6 +122,21 @@ def gaps(wanted: range, present: list[range]) -> list[range]:
         if begin >= wanted.stop:
             break
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
+
+
+def absent(chunk: Chunk, present: Mapping[tuple[int, str], list[range]]) -> Chunk | None:
+    """The part of a chunk that is not present; None if all of it is.
+
+    Args:
+        chunk: The chunk.
+        present: The replications that are present, by the team and the key of their cell.
+    """
+    parts = tuple(
+        Part(part.cell, gap)
+        for part in chunk.parts
+        for gap in gaps(part.replications, present.get((chunk.team, part.cell.key), []))
+    )
+    return Chunk(chunk.team, parts) if parts else None
 
 
 def name_of(rows: Sequence[Sequence[Any]]) -> str:

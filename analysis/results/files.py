@@ -12,7 +12,8 @@ from dess.files import replacing, writable
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 LONG = 150  # largest number of characters of a policy's name in the name of a folder
-FOLDERS = ("missions", "uavs", "events", "failures")
+BOUNDS = "bounds"  # the folder of the bounds of missions, which are the same for all policies
+FOLDERS = ("missions", "uavs", "events", BOUNDS, "failures")
 
 
 def partition(policy: str) -> str:

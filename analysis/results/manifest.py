@@ -9,9 +9,11 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 import dess
+from analysis.results.documents import Hash
 from analysis.results.provenance import (
     Acceptance,
     Origin,
+    bound_code,
     code_behind,
     commit_of_source,
     differing,
@@ -29,13 +31,14 @@ from dess.scenario import ScenarioSpace, load_scenario
 from dess.streams import MAX_REPLICATION
 
 SCHEMA_VERSION = 3
+NO_TEAM = -1  # the team of the cells of bounds, which hold for every policy
 
 # What is selected for a team: a design point, or one for each question; None without a selection.
 Selected = int | list[int] | None
 
 
 class Cell(NamedTuple):
-    """A team at a design point, given by their numbers.
+    """A team at a design point, given by their numbers, or the bounds of a design point.
 
     ``key`` is a hash of all that the records depend on, except the replication. ``first`` is the
     first replication.
@@ -58,6 +61,8 @@ class Manifest(Origin):
         selected: For every team the selected design point, or the list of selected points if one is
             selected for each of several conditions; None if the study selects nothing.
         complete: Whether all missions are present.
+        bound_code: A hash of the code of the bound at the first run, which is part of the keys of
+            the bounds; None if the study has no bounds.
     """
 
     schema_version: int
@@ -65,6 +70,7 @@ class Manifest(Origin):
     missions: list[list[Annotated[int, Field(ge=1, le=CHECK)]]]
     selected: list[Selected]
     complete: bool
+    bound_code: Hash | None = None
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -81,6 +87,8 @@ class Manifest(Origin):
             raise ValueError("selected: is not a design point")
         if any(not _suits(of_team, study, self.complete) for of_team in self.selected):
             raise ValueError("selected: does not belong to the selection of the study")
+        if study.bounds != bool(self.bound_code):
+            raise ValueError("bound_code: does not belong to the bounds of the study")
         self._check_points(study)
         return self
 
@@ -116,7 +124,7 @@ class Manifest(Origin):
         return cls(
             schema_version=SCHEMA_VERSION,
             version=dess.__version__,
-            code=code_behind(study.policies),
+            code=code_behind(study.policies, study.bounds),
             engine_code=engine_code(),
             accepted=[],
             commit=commit_of_source(),
@@ -129,6 +137,7 @@ class Manifest(Origin):
             missions=[[study.first] * len(points)] * len(study.policies),
             selected=[None] * len(study.policies),
             complete=False,
+            bound_code=bound_code() if study.bounds else None,
         )
 
     @classmethod
@@ -167,6 +176,7 @@ class Manifest(Origin):
         held = {team.policy: team for team in self.policies}
         update: dict[str, Any] = {
             "engine_code": self.engine_code,
+            "bound_code": self.bound_code or new.bound_code,
             "policies": [held.get(team.policy, team) for team in new.policies],
             "accepted": self.accepted + accepted,
         }
@@ -189,6 +199,9 @@ class Manifest(Origin):
             f"holds other scenarios than those of study {name}": foreign,
             f"holds policy {' '.join(dropped)}, which study {name} does not have": bool(dropped),
             f"made by other weights of policy {' '.join(changed)}": bool(changed),
+            f"holds bounds, which study {name} does not have": bool(
+                self.bound_code and not new.bound_code
+            ),
         }
         for complaint, holds in complaints.items():
             if holds:
@@ -199,7 +212,8 @@ class Manifest(Origin):
         """A hash of all that the records depend on, and of their number."""
         keys = [cell.key for cells in self.cells for cell in cells]
         accepted = [change.data for change in self.accepted]
-        content = _canonical([keys, self.missions, self.selected, accepted])
+        bounds = [[cell.key for cell in self.bound_cells]] if self.bound_code else []
+        content = _canonical([keys, self.missions, self.selected, accepted, *bounds])
         return sha256(content.encode()).hexdigest()[:16]
 
     @cached_property
@@ -256,6 +270,15 @@ class Manifest(Origin):
                 tuple(Cell(number, p, k, self.points[p].replication) for p, k in enumerate(keys))
             )
         return tuple(teams)
+
+    @cached_property
+    def bound_cells(self) -> tuple[Cell, ...]:
+        """The cells of the bounds, in the order of the design points; none without bounds."""
+        run = {"version": self.version, "bound": self.bound_code, "seed": self.seed}
+        scenarios = [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
+        keys = [sha256((_canonical(run) + text).encode()).hexdigest()[:16] for text in scenarios]
+        cells = [Cell(NO_TEAM, p, k, self.points[p].replication) for p, k in enumerate(keys)]
+        return tuple(cells) if self.bound_code else ()
 
     @property
     def text(self) -> str:

@@ -30,8 +30,8 @@ from dess.streams import MAX_REPLICATION
 
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
 LIMIT = 2**30  # bytes of the largest file
-_PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
-_KEY = pa.dictionary(pa.int32(), pa.string())
+PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
+KEY = pa.dictionary(pa.int32(), pa.string())
 Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
 # The columns of words, and the words.
@@ -44,11 +44,11 @@ def _columns(record: np.dtype) -> list[tuple[str, pa.DataType]]:
 
 
 # The columns of the tables; ``cell`` is the key of the team and the scenario.
-MISSIONS = pa.schema([("cell", _KEY), *_columns(MISSION_RECORD)])
+MISSIONS = pa.schema([("cell", KEY), *_columns(MISSION_RECORD)])
 # With what extended scenarios measure; nan where a mission lacks it.
 EXTENDED_MISSIONS = pa.schema([*MISSIONS, *_columns(OPERATIONS)])
 UAVS = pa.schema(
-    [("cell", _KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
+    [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
 )
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
 EVENTS = pa.schema(
@@ -119,7 +119,7 @@ def _missions_table(columns: dict[str, np.ndarray], chunk: Chunk) -> pa.Table:
 def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> pa.Table:
     arrays = {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
     arrays["cell"] = arrays["cell"].dictionary_encode()
-    return pa.table(arrays, schema=schema.with_metadata({_PARTS: json.dumps(chunk.rows)}))
+    return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
 
 
 def check(tables: Tables, rows: Sequence[Row], seed: int) -> None:
@@ -190,7 +190,7 @@ def parts_in(table: pa.Table) -> list[Row]:
     Raises:
         ValueError: If the file lists none, or some that are no parts.
     """
-    rows = _ROWS.validate_json((table.schema.metadata or {}).get(_PARTS, b""))
+    rows = _ROWS.validate_json((table.schema.metadata or {}).get(PARTS, b""))
     if any(start >= stop for _, start, stop in rows):
         raise ValueError("a part has no replications")
     return rows
@@ -262,8 +262,9 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
 def _check_size(path: Path, metadata: pq.FileMetaData) -> None:
     """Refuse a file whose content is larger than the memory, although the file is small."""
     groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    columns = [group.column(n) for group in groups for n in range(metadata.num_columns)]
     size = sum(group.total_byte_size for group in groups)
-    size += 8 * metadata.num_columns * metadata.num_rows
+    size += 8 * sum(column.num_values for column in columns)
     check_memory(f"{path}: {metadata.num_rows:,} rows", 3 * size, "a file of dess study run")
 
 

@@ -40,6 +40,7 @@ from policies.base import Policy
 from policies.registry import files_of
 
 ENGINES = ("dess.batch", "dess.mission")
+BOUND = ("analysis.bound",)
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
 
 
@@ -116,7 +117,8 @@ class Origin(Document):
     @field_validator("study")
     @classmethod
     def _is_a_study(cls, study: dict[str, Any]) -> dict[str, Any]:
-        study = {"costs": None} | study  # results of earlier versions have no costs
+        # Results of earlier versions have neither costs nor bounds.
+        study = {"costs": None, "bounds": False} | study
         if missing := StudyData.model_fields.keys() - study.keys():
             raise ValueError(f"has no {min(missing)}")
         study_of(study)
@@ -158,7 +160,8 @@ class Origin(Document):
         known = {file for team in named for file in files_of(team)}
         closed = [t for t in self.policies if not known.issuperset(files_of(t.policy))]
         teams = [team for team in self.policies if team not in closed]
-        here, changes = code_behind(team.policy for team in teams), []
+        here = code_behind((team.policy for team in teams), self.study["bounds"])
+        changes = []
         code = {name: code for name, code in self.code.items() if name in here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
@@ -230,9 +233,14 @@ def engine_code() -> str:
     return combined(_code(ENGINES))
 
 
-def code_behind(teams: Iterable[str]) -> dict[str, str]:
-    """Hashes of the modules that the records of teams depend on, by name."""
-    hashes = {**_code(ENGINES)}
+def bound_code() -> str:
+    """A hash of the code of the bound."""
+    return combined(_code(BOUND))
+
+
+def code_behind(teams: Iterable[str], bounds: bool = False) -> dict[str, str]:
+    """Hashes of the modules that the records of teams, and bounds, depend on, by name."""
+    hashes = _code(ENGINES) | (_code(BOUND) if bounds else {})
     for policy in (policy for team in teams for policy in load_team(team)):
         hashes |= _code(_modules_of(policy))
     return dict(sorted(hashes.items()))

@@ -1,11 +1,12 @@
 """A results folder: parquet files that are named by hashes of their content, and a manifest.
 
 ``manifest.json`` describes the study and what it was run with. ``missions/`` and ``uavs/`` contain
-the records in chunks, partitioned by policy; ``events/`` contains event logs, and ``failures/``
-describes what could not be computed. The name of a file has two hashes: of its content (cells and
-replications), and of its bytes. So a run can resume by computing what is missing, and a damaged
-file counts as missing. A file is written completely or not at all. Nothing is pickled. The content
-of the folder does not depend on when, where, in which order or by how many workers it was computed.
+the records in chunks, partitioned by policy; ``events/`` contains event logs, ``bounds/`` the upper
+bounds of missions, and ``failures/`` describes what could not be computed. The name of a file has
+two hashes: of its content (cells and replications), and of its bytes. So a run can resume by
+computing what is missing, and a damaged file counts as missing. A file is written completely or not
+at all. Nothing is pickled. The content of the folder does not depend on when, where, in which order
+or by how many workers it was computed.
 """
 
 import json
@@ -21,7 +22,8 @@ import pyarrow as pa
 from filelock import FileLock, Timeout
 
 from analysis.results import files, parquet
-from analysis.results.chunks import Chunk, Failure, Part, gaps, rows_of, split
+from analysis.results.bounds.kept import BoundFiles
+from analysis.results.chunks import Chunk, Failure, Part, absent, gaps, rows_of, split
 from analysis.results.files import FOLDERS, LOCK, MANIFEST
 from analysis.results.manifest import Cell, Manifest, Selected
 from analysis.study.study import Study
@@ -37,6 +39,7 @@ class Store:
         folder: The folder.
         manifest: The manifest of the folder.
         damaged: The files whose content is not what their names say.
+        bounds: The upper bounds of the missions, if the study has them.
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
@@ -46,6 +49,7 @@ class Store:
         self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
         self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
         self.damaged: list[Path] = []
+        self.bounds = BoundFiles(folder / files.BOUNDS)
 
     @classmethod
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -139,6 +143,7 @@ class Store:
                     self.damaged.append(path)
                 else:
                     self._logs[team, parquet.content_hash(path)] = path
+        self.damaged += self.bounds.scan(self.manifest)
 
     def _examine(self, team: int, name: str, tables: parquet.Tables) -> None:
         """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
@@ -161,12 +166,7 @@ class Store:
 
     def missing(self, chunk: Chunk) -> Chunk | None:
         """The part of a chunk that is missing; None if all of it is present."""
-        parts = tuple(
-            Part(part.cell, gap)
-            for part in chunk.parts
-            for gap in gaps(part.replications, self._present[chunk.team, part.cell.key])
-        )
-        return Chunk(chunk.team, parts) if parts else None
+        return absent(chunk, self._present)
 
     def missing_logs(self, cell: Cell, logged: int) -> list[int]:
         """Those of the first ``logged`` replications whose event log is missing."""

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.names import SWEEP, SWEEPS, measured_in
+from analysis.bound import Bound
+from analysis.names import BOUND, GAP, PRODUCT, SWEEP, SWEEPS, measured_in
 from analysis.results import commands
-from analysis.results.chunks import check_parts, parts_of
+from analysis.results.bounds.tables import Place
+from analysis.results.chunks import bound_parts, check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.store import Store
 from analysis.study.cheapest import Cheapest, CheapestChoice
@@ -32,17 +34,21 @@ class Results:
             fields that the design sets and that are not in the record, and the fields of
             ``MISSION_RECORD``, then those of ``OPERATIONS`` that were measured, with nan where a
             mission lacks one. Rows are in the order of the policies in the study, then of point
-            and replication. If the study has prices, ``cost`` is the last column.
+            and replication. If the study has prices, ``cost`` comes next; if it has bounds,
+            ``upper_bound`` and ``optimality_gap``, the bound minus the product, are the last columns.
         uavs: One row per UAV of each mission: ``policy``, ``point``, ``replication``, ``uav`` and
             the fields of ``UAV_RECORD``, with ``end`` as a name.
         checks: Further missions, in rows as above, of the design points that were selected; the
             selection was not based on them. Empty if the study selects nothing.
+        bounds: The upper bound of every mission by design point and replication, the same for all
+            policies. Empty if the study has no bounds.
     """
 
     store: Store
     missions: pd.DataFrame
     uavs: pd.DataFrame
     checks: pd.DataFrame
+    bounds: dict[Place, Bound]
 
     @property
     def manifest(self) -> dict[str, Any]:
@@ -170,7 +176,17 @@ def results_of(store: Store) -> Results:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
     all_missions = _labelled(manifest, missions)
     all_checks = _labelled(manifest, checks) if checks else all_missions[:0]
-    return Results(store, all_missions, _of_policies(uavs), all_checks)
+    bounds = store.bounds.load(bound_parts(manifest))
+    if bounds:
+        all_missions = _with_gaps(all_missions, bounds)
+    return Results(store, all_missions, _of_policies(uavs), all_checks, bounds)
+
+
+def _with_gaps(missions: pd.DataFrame, bounds: Mapping[Place, Bound]) -> pd.DataFrame:
+    """The missions with their bounds, and how far each is below its bound."""
+    places = zip(missions["point"], missions["replication"], strict=True)
+    bound = np.array([bounds[place].ratio for place in places])
+    return missions.assign(**{BOUND: bound, GAP: bound - missions[PRODUCT]})
 
 
 def _of_policies(tables: Mapping[str, pd.DataFrame]) -> pd.DataFrame:

@@ -95,6 +95,9 @@ class StudyData(StrictTable):
     logged: Integer = Field(
         0, ge=0, le=MOST, description="first replications of every cell whose event log is kept"
     )
+    bounds: bool = Field(
+        False, strict=True, description="whether every mission has an upper bound, for the gap"
+    )
 
     @property
     def rule(self) -> Precision | AnySelection | None:

@@ -61,7 +61,9 @@ def _bar() -> "Iterator[tuple[Progress, Announce]]":
     with console.bar("mission") as bar:
 
         def begin(started: "Round") -> None:
-            if started.number:
+            if started.of_bounds:
+                bar.set_description("bounds", refresh=False)
+            elif started.number:
                 bar.set_description(f"round {started.number + 1}", refresh=False)
             else:
                 present = f", {started.present:,} of them present" if started.present else ""

@@ -1,0 +1,1 @@
+"""Upper bounds of the missions of a study, as files of its results folder."""

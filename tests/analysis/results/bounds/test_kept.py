@@ -1,0 +1,205 @@
+"""The bounds of a study are stored, resumed, checked on reading, and added to its missions."""
+
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import load_results, run_study
+from analysis.bound import Bound
+from analysis.execution import jobs, runner
+from analysis.results import parquet
+from analysis.results.bounds.tables import check, table_of
+from analysis.results.chunks import Chunk, Part
+from analysis.results.manifest import Cell
+from analysis.results.store import Store
+from dess import InputError
+from tests.analysis.small import files_of, grid, small_study
+
+NODES = 3  # of the small scenario
+
+
+def made_up(space, seed, replication, **_):
+    """A bound that depends on the mission alone, and takes no time."""
+    uavs = space.uavs[1]
+    generator = np.random.default_rng([seed, replication, uavs])
+    prices = generator.random((2, len(space.nodes)))
+    return Bound(0.9 + 0.1 * generator.random(), prices, np.array([5, 30]), uavs)
+
+
+@pytest.fixture(autouse=True)
+def fast(monkeypatch):
+    monkeypatch.setattr(jobs, "upper_bound", made_up)
+    monkeypatch.setattr(runner, "BOUNDS_CHUNK", 3)
+
+
+def bounded(folder, **changes):
+    return small_study(folder, **{"bounds": True, "missions": 7} | changes)
+
+
+@pytest.fixture
+def out(tmp_path):
+    """The results folder of a study with bounds."""
+    run_study(bounded(tmp_path), tmp_path / "out")
+    return tmp_path / "out"
+
+
+def test_stored_bounds_are_those_computed(out):
+    results = load_results(out)
+    assert [*results.bounds] == [(0, number) for number in range(7)]
+    for (_, number), bound in results.bounds.items():
+        computed = made_up(results.scenario(), 7, number)
+        assert bound.ratio == computed.ratio
+        assert bound.iterations == computed.iterations
+        np.testing.assert_array_equal(bound.prices, computed.prices)
+        np.testing.assert_array_equal(bound.cuts, computed.cuts)
+
+
+def test_the_gap_of_a_mission_is_its_bound_minus_its_product(out):
+    missions = load_results(out).missions
+    assert [*missions.columns[-2:]] == ["upper_bound", "optimality_gap"]
+    greedy, random = (missions[missions["policy"] == p] for p in ("greedy", "random"))
+    assert greedy["upper_bound"].tolist() == random["upper_bound"].tolist()  # once for all policies
+    product = missions["collection_ratio_and_communication"]
+    pd.testing.assert_series_equal(
+        missions["optimality_gap"], missions["upper_bound"] - product, check_names=False
+    )
+
+
+def test_a_study_without_bounds_has_neither_files_nor_columns(tmp_path):
+    results = run_study(small_study(tmp_path), tmp_path / "out")
+    assert results.bounds == {}
+    assert not [*(tmp_path / "out" / "bounds").iterdir()]
+    assert "upper_bound" not in results.missions
+
+
+def test_every_design_point_has_bounds_of_its_own(tmp_path):
+    results = run_study(bounded(tmp_path, design=grid(uavs=[1, 2])), tmp_path / "out")
+    assert {place: bound.iterations for place, bound in results.bounds.items()} == {
+        (point, number): point + 1 for point in (0, 1) for number in range(7)
+    }
+
+
+@pytest.mark.parametrize("after", [1, 4, 8])
+def test_a_run_that_was_interrupted_ends_with_the_same_bytes(after, tmp_path, monkeypatch):
+    run_study(bounded(tmp_path), tmp_path / "undisturbed")
+    calls = 0
+
+    def interrupted(*arguments, **options):
+        nonlocal calls
+        calls += 1
+        if calls == after:
+            raise KeyboardInterrupt
+        return made_up(*arguments, **options)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(jobs, "upper_bound", interrupted)
+        if after <= 7:
+            with pytest.raises(KeyboardInterrupt):
+                run_study(bounded(tmp_path), tmp_path / "out")
+    calls, done = 0, []
+    monkeypatch.setattr(jobs, "upper_bound", lambda *a, **o: done.append(a[2]) or made_up(*a, **o))
+    run_study(bounded(tmp_path), tmp_path / "out")
+    assert len(done) == (7 if after > 7 else 7 - 3 * ((after - 1) // 3))  # whole chunks are kept
+    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
+
+
+def test_bounds_can_be_added_to_a_study_and_more_missions_to_bounds(tmp_path):
+    plain = bounded(tmp_path, bounds=False)
+    before = run_study(plain, tmp_path / "out").missions
+    more = run_study(bounded(tmp_path), tmp_path / "out").missions
+    pd.testing.assert_frame_equal(more[before.columns], before)
+    assert len(run_study(bounded(tmp_path, missions=9), tmp_path / "out").bounds) == 9
+    with pytest.raises(InputError, match="holds bounds, which study trial does not have"):
+        run_study(plain, tmp_path / "out")
+
+
+def test_progress_counts_missions_and_bounds(tmp_path):
+    done, rounds = [], []
+    run_study(bounded(tmp_path), tmp_path / "out", progress=done.append, announce=rounds.append)
+    assert sum(done) == 2 * 7 + 7
+    assert [(round.missions, round.of_bounds) for round in rounds] == [(14, False), (21, True)]
+    rounds.clear()
+    run_study(bounded(tmp_path), tmp_path / "out", announce=rounds.append)
+    assert [round.present for round in rounds] == [14, 7]
+
+
+def test_a_bound_that_cannot_be_computed_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
+    def failing(space, seed, replication, **_):
+        if replication == 4:
+            raise ZeroDivisionError("no bound")
+        return made_up(space, seed, replication)
+
+    monkeypatch.setattr(jobs, "upper_bound", failing)
+    with pytest.raises(runner.ChunkError) as error:
+        run_study(bounded(tmp_path), tmp_path / "out")
+    ((path, failure),) = error.value.failures.items()
+    assert json.loads(path.read_text())["error"] == failure.error == "ZeroDivisionError: no bound"
+    assert failure.policy == "the upper bound"
+    assert failure.command.startswith("dess study run")
+    with pytest.raises(InputError, match="incomplete; allowed: run the study again"):
+        load_results(tmp_path / "out")
+
+
+def test_a_damaged_file_is_noticed_and_computed_again(out, tmp_path):
+    whole = files_of(out)
+    path = next((out / "bounds").glob("*.parquet"))
+    path.write_bytes(path.read_bytes()[:-9])
+    assert Store.read(out).damaged == [path]
+    with pytest.raises(InputError, match="is missing; allowed: run the study again"):
+        load_results(out)
+    run_study(bounded(tmp_path), out)
+    assert files_of(out) == whole
+
+
+def test_two_files_with_different_bounds_of_a_mission_are_refused(out, tmp_path):
+    """Such as after files of two folders were merged."""
+    manifest = Store.read(out).manifest
+    part = Part(manifest.bound_cells[0], range(2, 4))
+    chunk = Chunk(part.cell.team, (part,))
+    other = [Bound(0.5, np.ones((1, NODES)), np.array([9]), 1)] * 2
+    parquet.write(out / "bounds", chunk.name, table_of(chunk, other))
+    with pytest.raises(InputError, match="two files have different bounds"):
+        load_results(out)
+
+
+CELL = Cell(-1, 0, "0123456789abcdef", 0)
+CHUNK = Chunk(-1, (Part(CELL, range(1)),))
+WRONG = {
+    "above 1": ({"ratio": 1.01}, "between 0 and 1"),
+    "nan": ({"ratio": float("nan")}, "between 0 and 1"),
+    "iterations": ({"iterations": -1}, "iterations below 0"),
+    "no cut": ({"cuts": np.zeros(0, int), "prices": np.zeros((0, 3))}, "cuts that do not follow"),
+    "cuts": ({"cuts": np.array([7, 7])}, "cuts that do not follow"),
+    "a price too few": ({"prices": np.ones((2, 2))}, "a price for every cut and node"),
+    "a price below 0": ({"prices": -np.ones((2, 3))}, "a number from 0 on"),
+    "an infinite price": ({"prices": np.full((2, 3), np.inf)}, "a number from 0 on"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_no_bound_can_have_is_refused(case):
+    right = {"ratio": 1.0, "prices": np.ones((2, 3)), "cuts": np.array([3, 7]), "iterations": 4}
+    check(table_of(CHUNK, [Bound(**right)]), CHUNK.rows, {CELL.key: 3})
+    changes, line = WRONG[case]
+    with pytest.raises(ValueError, match=line):
+        check(table_of(CHUNK, [Bound(**right | changes)]), CHUNK.rows, {CELL.key: 3})
+
+
+def test_bounds_of_other_missions_are_refused():
+    table = table_of(CHUNK, [Bound(1.0, np.ones((1, 3)), np.array([3]), 4)])
+    with pytest.raises(ValueError, match="not those of the requested missions"):
+        check(table, [(CELL.key, 1, 2)], {})
+
+
+def test_results_of_before_have_no_bounds(tmp_path):
+    run_study(small_study(tmp_path), tmp_path / "out")
+    path = tmp_path / "out" / "manifest.json"
+    data = json.loads(path.read_text())
+    del data["study"]["bounds"], data["bound_code"]
+    path.write_text(json.dumps(data))
+    shutil.rmtree(tmp_path / "out" / "bounds")
+    assert load_results(tmp_path / "out").bounds == {}
+    assert len(run_study(bounded(tmp_path, missions=10), tmp_path / "out").bounds) == 10
