@@ -100,6 +100,7 @@ def _tables(
     import pandas as pd
 
     from analysis.questions import costs, summary
+    from analysis.questions.optimality import gap
 
     policy = policy or summary.best_policy(results.missions)
     return {
@@ -111,6 +112,7 @@ def _tables(
         "sensitivities": summary.sensitivities(results),
         "costs": costs.front(results) if results.store.manifest.costs else pd.DataFrame(),
         "selected": summary.selections(results),
+        "gaps": gap.by_fleet(results),
         "checks": summary.checks(results),
         "worst": summary.worst(results, policy, worst, folder=folder),
     }

@@ -20,6 +20,7 @@ from analysis.names import (
 )
 from analysis.questions import costs, summary
 from analysis.questions.head_to_head import new_training
+from analysis.questions.optimality import gap
 from analysis.questions.summary import settings
 from analysis.replication import paper
 from analysis.results.tables import Results
@@ -67,6 +68,7 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
         "distributions": _print_distributions,
         "precisions": lambda precisions: _print_precisions(points, precisions),
         "comparisons": _print_comparisons,
+        "gaps": lambda table: print_frame("optimality gap", gap.listed(table).set_index("policy")),
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
     }

@@ -1,0 +1,1 @@
+"""Questions about how far policies are from the best possible, and about planners."""

@@ -1,0 +1,99 @@
+"""The gap of a policy is the mean of bound minus product, with its paired interval."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis import run_study
+from analysis.bound import Bound
+from analysis.execution import jobs
+from analysis.names import BOUND, GAP, PRODUCT
+from analysis.questions.optimality import gap
+from tests.analysis.small import small_study
+
+
+class Made:
+    """Results of made-up missions."""
+
+    bounds = {(0, 0): None}
+
+    def __init__(self, missions):
+        self.missions = missions
+
+
+@pytest.fixture
+def results():
+    """Three missions of one UAV and two of two UAVs, by two policies; the gaps are by hand."""
+    gaps = {"low": [0.10, 0.20, 0.30, 0.2, 0.2], "high": [0.05, 0.15, 0.25, 0.0, 0.1]}
+    bound = np.array([0.7, 0.8, 0.9, 1.0, 1.0])
+    rows = [
+        {"policy": p, "point": 0, "replication": r, "uavs": u, BOUND: b, GAP: g, PRODUCT: b - g}
+        | {"success": 1, "collection_ratio": b - g, "reward": 0.0}
+        for p, of_policy in gaps.items()
+        for r, (u, b, g) in enumerate(zip([1, 1, 1, 2, 2], bound, of_policy, strict=True))
+    ]
+    return Made(pd.DataFrame(rows))
+
+
+def test_the_interval_is_that_of_paired_differences(results):
+    table = gap.by_fleet(results).set_index(["uavs", "policy"])
+    row = table.loc[1, "low"]
+    # Gaps 0.1, 0.2 and 0.3: mean 0.2, deviation 0.1, t of 2 degrees of freedom 4.3027.
+    half = 4.3027 * 0.1 / np.sqrt(3)
+    assert row[GAP] == pytest.approx(0.2)
+    assert row[f"{GAP}_low"] == pytest.approx(0.2 - half, abs=1e-5)
+    assert row[f"{GAP}_high"] == pytest.approx(0.2 + half, abs=1e-5)
+    assert (row["n"], row[BOUND]) == (3, pytest.approx(0.8))
+    assert row[PRODUCT] == pytest.approx(row[BOUND] - row[GAP])
+    # The spread of the bounds and of the products, 0.1 each, is larger than that of the gaps here.
+    constant = table.loc[2, "low"]
+    assert constant[f"{GAP}_low"] == pytest.approx(constant[f"{GAP}_high"]) == pytest.approx(0.2)
+
+
+def test_rows_are_by_number_of_uavs_then_over_all(results):
+    table = gap.by_fleet(results)
+    assert [*zip(table["uavs"], table["policy"], table["n"], strict=True)] == [
+        *((1, "low", 3), (1, "high", 3), (2, "low", 2), (2, "high", 2)),
+        *((gap.ALL, "low", 5), (gap.ALL, "high", 5)),
+    ]
+    assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
+
+
+def test_a_table_of_text(results):
+    listed = gap.listed(gap.by_fleet(results))
+    assert listed.iloc[3].tolist()[:3] == ["high", "2", "2"]
+    assert listed["gap [points]"][1].startswith("15.0 [")
+    assert listed["upper bound"][3].startswith("100.0 % [")
+
+
+def test_the_closest_policy_is_first_and_far_is_the_upper_end(results):
+    table = gap.by_fleet(results)
+    far = gap.at_most(table)
+    assert far["policy"].tolist() == ["high", "low"]
+    assert [*far] == ["policy", "1 UAV", "2 UAVs", "all missions"]
+    assert far["1 UAV"].tolist() == [f"{15 + 24.8:.1f}", f"{20 + 24.8:.1f}"]
+
+
+def test_the_sentence_names_the_best_policy(results):
+    text = gap.in_words(results)
+    assert text.startswith("**`high` is at most 39.8 points with 1 UAV (gap to the upper bound ")
+    assert "points with 2 UAVs (gap to the upper bound 5.0 [" in text
+    assert gap.in_words(results, "low").startswith("**`low` is at most 44.8 points")
+
+
+def test_fleets_of_one_size_have_no_rows_over_all(results):
+    results.missions = results.missions[results.missions["uavs"] == 1]
+    assert gap.by_fleet(results)["uavs"].tolist() == [1, 1]
+    assert [*gap.at_most(gap.by_fleet(results))] == ["policy", "1 UAV"]
+
+
+def test_results_without_bounds_have_no_gap(tmp_path, monkeypatch):
+    plain = run_study(small_study(tmp_path, missions=2), tmp_path / "plain")
+    assert gap.by_fleet(plain).empty
+    bound = Bound(0.9, np.zeros((1, 3)), np.array([30]), 0)
+    monkeypatch.setattr(jobs, "upper_bound", lambda *_, **__: bound)
+    bounded = run_study(small_study(tmp_path, missions=2, bounds=True), tmp_path / "bounded")
+    table = gap.by_fleet(bounded)
+    rows = table[table["uavs"] == gap.ALL] if gap.ALL in {*table["uavs"]} else table
+    means = bounded.missions.groupby("policy", sort=False)[PRODUCT].mean()
+    assert rows[GAP].tolist() == pytest.approx((0.9 - means).tolist())
