@@ -22,6 +22,7 @@ STUDIES: dict[str, list[str]] = {
     "sweet-spot": ["ddqn", "greedy"],
     "sensitivity": [],
     "comparison": [],
+    "gap": [],
     "explorer": [],
     "pads": [],
     "age": [],

@@ -50,6 +50,7 @@ SCHEMA_VERSION = 1
 SLOW = 0.95  # the quantile that is reported for slow calls
 MAX_MISSIONS = 1_000  # of a policy: the time of every call in them is kept
 ROUNDS = 3  # rounds of the batch engine; the median time counts
+ENOUGH = 30.0  # seconds of calls after which no further mission of a policy is timed
 THREADS = 1  # threads of the numerical libraries; a UAV has at most one free core
 
 Positive = Annotated[Count, Field(ge=1)]
@@ -97,7 +98,8 @@ class Timing(Document):
         threads: Number of threads that the libraries could use.
         scenario: The name of the scenario.
         constants: The fields of the scenario.
-        missions: Number of missions per policy: replications 0, 1, ... of the seed.
+        missions: Number of missions per policy: replications 0, 1, ... of the seed. A policy whose
+            calls have taken ``ENOUGH`` seconds has fewer.
     """
 
     schema_version: int
@@ -146,6 +148,7 @@ def measure(
     Missions are simulated one at a time with the SimPy engine, then all together with the batch
     engine. The policies take turns, so that a machine that is slow for a while slows down all of
     them. The first mission and the first round of the batch are simulated once before to warm up.
+    A policy that takes ``ENOUGH`` seconds for fewer missions is timed on these.
 
     Args:
         policies: The names of the teams.
@@ -260,6 +263,7 @@ class _Team:
         self.policies = [_Timed(policy, clock, self.calls) for policy in load_team(name)]
         self.single: list[tuple[float, int]] = []  # every call of the SimPy engine
         self.rounds: list[tuple[float, int]] = []  # every round of the batch engine
+        self.missions = 0  # that were timed
 
     def cost(self) -> Cost:
         """The measured times of the team."""
@@ -283,14 +287,16 @@ def _steps(
     """Simulate all missions that are measured, step by step."""
     for number, replication in enumerate([0, *range(missions)]):
         for team in teams:
-            team.calls.clear()
-            simulate(space, team.policies, seed, replication)
-            team.single += team.calls if number else []
+            if sum(seconds for seconds, _ in team.single) < ENOUGH:
+                team.calls.clear()
+                simulate(space, team.policies, seed, replication)
+                team.single += team.calls if number else []
+                team.missions = number
             yield
     for number in range(1 + ROUNDS):
         for team in teams:
             team.calls.clear()
-            simulate_batch(space, team.policies, seed, missions)
+            simulate_batch(space, team.policies, seed, team.missions)
             times, rows = zip(*team.calls, strict=True)
             team.rounds += [(sum(times), sum(rows))] if number else []
             yield

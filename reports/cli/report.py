@@ -156,7 +156,7 @@ def timing(
         typer.Option(
             metavar="P[,P...]",
             autocompletion=completion.policies,
-            help="Policies to measure; repeatable.  [default: those of the study comparison]",
+            help="Policies to measure; repeatable.  [default: those of comparison and gap]",
         ),
     ] = None,
     missions: Annotated[int, typer.Option(min=1, max=1_000, help="Missions per policy.")] = 30,
@@ -165,7 +165,8 @@ def timing(
     from analysis.execution.decision_time import is_current, measure, read, writing
     from analysis.study.study import load_study
 
-    teams = policy or [*load_study("comparison").policies]
+    shown = (name for study in ("comparison", "gap") for name in load_study(study).policies)
+    teams = policy or [*dict.fromkeys(shown)]
     if not is_current(out, teams, missions):
         with (
             writing(out) as path,

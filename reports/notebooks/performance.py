@@ -15,15 +15,19 @@
 # collects, and compares both with the numbers that the paper prints for its learned policy.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folders of the studies table4 and fig4
+results = "../../results"  # folder with the results folders of table4, fig4 and, if run, gap
 
 # %%
 from pathlib import Path
 
+from IPython.display import display
+
 from analysis import load_results, numbers, summary
+from analysis.figures import optimality
 from analysis.figures import policies as figures
 from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import printed
+from analysis.questions.optimality import gap
 from analysis.questions.summary import best_policy, by_fleet, fleet_table, guard_in_words
 from analysis.replication import paper
 from reports.pages import html
@@ -32,6 +36,7 @@ from reports.pages import html
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
 overall = summary(table4.missions, by=["policy"])
 fleets, fig4_fleets = by_fleet(table4.missions), by_fleet(fig4.missions)
+bounded = gap.results_in(Path(results) / "gap")
 
 # %% [markdown]
 # ## <a id="table-4"></a>Random missions: the paper's Table IV
@@ -137,7 +142,23 @@ html.table(
 )
 
 # %% [markdown]
+# ## How far from the best possible
+
+# %%
+html.say("{text}", text=html.composed(gap.in_words(bounded) if bounded else gap.NOT_RUN))
+
+# %%
+if bounded:
+    gaps = gap.by_fleet(bounded)
+    caption = f"n = {numbers.span(gaps['n'])} missions of the study gap, with 95 % intervals."
+    display(
+        html.table(gap.at_most(gaps), "Scorecard: at most so many points from the best possible"),
+        html.figure(optimality.gaps(gaps), "The product of every policy, and the bound", caption),
+        html.table(gap.listed(gaps), "Means, the upper bound, and the gap", data=gaps),
+    )
+
+# %% [markdown]
 # ## Where the figures come from
 
 # %%
-html.provenance([table4, fig4])
+html.provenance([table4, fig4, *([bounded] if bounded else [])])

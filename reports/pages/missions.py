@@ -18,6 +18,7 @@ from analysis.verification import cross_check
 from reports.pages.kernels import Progress
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
+TIMED = (COMPARISON, "planner")  # the pages that show how long decisions take
 
 
 def make(

@@ -31,6 +31,7 @@ NAMES = (  # in the order of the index
     "learning",
     "parameters",
     "comparison",
+    "planner",
     "pads",
     "age",
     "failures",

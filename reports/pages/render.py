@@ -180,7 +180,7 @@ def _lacking(report: Report, results: Path) -> dict[str, InputError]:
         f"dess study run {study}": partial(_check_results, results / study)
         for study in report.studies
     }
-    if report.name == missions.COMPARISON:
+    if report.name in missions.TIMED:
         needs["dess timing"] = partial(decision_time.read, results / "timing")
     errors = {}
     for command, check in needs.items():

@@ -10,17 +10,29 @@ best policy that is possible. The same missions give bound and product, so the i
 paired differences.
 """
 
+from pathlib import Path
+
 import pandas as pd
 
 from analysis import numbers
 from analysis.names import BOUND, GAP, PRODUCT
 from analysis.questions import summary
-from analysis.results.tables import Results
+from analysis.results.files import MANIFEST
+from analysis.results.tables import Results, load_results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 
+NOT_RUN = (
+    "How far the policies are from the best possible is not known here: `dess study run gap` "
+    "computes an upper bound of every mission."
+)
 ALL = "all"  # in place of a number of UAVs: the missions of fleets of any size
 _SHOWN = {PRODUCT: "product", BOUND: "upper bound", GAP: "gap [points]"}
+
+
+def results_in(folder: Path) -> Results | None:
+    """The results of the study in a folder; None if it has not been run."""
+    return load_results(folder) if (folder / MANIFEST).exists() else None
 
 
 def by_fleet(results: Results) -> pd.DataFrame:

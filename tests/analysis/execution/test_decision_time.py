@@ -16,6 +16,7 @@ from policies import load, load_team
 from tests.analysis.small import small_study, write_scenario, write_timing
 
 SEED, MISSIONS = 5, 6
+TICK = 2.0**-10  # seconds, so that no sum of ticks is rounded
 
 
 class Ticks:
@@ -42,9 +43,9 @@ def scenario(folder):
 
 @pytest.fixture(scope="module")
 def measured(scenario):
-    """Calls that all take 2 s, with 1 s in between."""
+    """Calls that all take 2 ticks, with a tick in between."""
     policies = ["greedy", "random,greedy"]
-    return decision_time.measure(policies, scenario, SEED, MISSIONS, clock=Ticks(1.0, 2.0))
+    return decision_time.measure(policies, scenario, SEED, MISSIONS, clock=Ticks(TICK, 2 * TICK))
 
 
 class Counting:
@@ -71,7 +72,7 @@ def test_calls_and_rows_are_those_of_the_missions(measured, scenario, policy):
 
 def test_times_are_those_of_the_calls_alone(measured):
     for cost in measured.costs:
-        assert cost.median == cost.slow == 2.0
+        assert cost.median == cost.slow == 2 * TICK
 
 
 def test_the_batch_shares_a_call_among_its_rows(measured, scenario):
@@ -79,14 +80,24 @@ def test_the_batch_shares_a_call_among_its_rows(measured, scenario):
     simulate_batch(load_scenario(scenario), team, SEED, MISSIONS)
     calls, rows = len(team[0].rows), sum(team[0].rows)
     assert calls < rows
-    assert measured.costs[0].batch == pytest.approx(2.0 * calls / rows)
+    assert measured.costs[0].batch == pytest.approx(2 * TICK * calls / rows)
 
 
 def test_slow_calls_make_the_upper_quantile(scenario):
-    """Of ten calls one takes 9 s, the others 1 s."""
-    clock = Ticks(*([0.0, 1.0] * 9), 0.0, 9.0)
+    """Of ten calls one takes 9 ticks, the others one."""
+    clock = Ticks(*([0.0, TICK] * 9), 0.0, 9 * TICK)
     cost = decision_time.measure(["greedy"], scenario, SEED, MISSIONS, clock=clock).costs[0]
-    assert (cost.median, cost.slow) == (1.0, 9.0)
+    assert (cost.median, cost.slow) == (TICK, 9 * TICK)
+
+
+def test_a_slow_policy_is_timed_on_fewer_missions(scenario, monkeypatch):
+    """All calls take a tick; a mission has at least 20 calls, so each policy has enough of one."""
+    monkeypatch.setattr(decision_time, "ENOUGH", 20 * TICK)
+    slow = decision_time.measure(["greedy"], scenario, SEED, 4, clock=Ticks(0.0, TICK)).costs[0]
+    monkeypatch.undo()
+    one = decision_time.measure(["greedy"], scenario, SEED, 1, clock=Ticks(0.0, TICK)).costs[0]
+    assert slow == one
+    assert one.calls >= 20
 
 
 def test_warm_up_does_not_count(scenario):
@@ -115,7 +126,9 @@ def test_the_policies_decide_as_ever(measured, scenario):
 def test_progress_ends_with_the_last_step(scenario):
     steps = []
     policies = ["greedy", "random"]
-    decision_time.measure(policies, scenario, SEED, 3, Ticks(1.0), lambda *step: steps.append(step))
+    decision_time.measure(
+        policies, scenario, SEED, 3, Ticks(TICK), lambda *step: steps.append(step)
+    )
     total = 2 * (1 + 3 + 1 + ROUNDS)
     assert steps == [(n, total) for n in range(1, total + 1)]
 
@@ -226,6 +239,6 @@ def test_every_policy_takes_its_turn(scenario, monkeypatch):
     monkeypatch.setattr(
         decision_time, "simulate", lambda *a: (flown.append(a[1][0].name), simulate(*a))
     )
-    decision_time.measure(["greedy", "random"], scenario, SEED, 2, Ticks(1.0))
+    decision_time.measure(["greedy", "random"], scenario, SEED, 2, Ticks(TICK))
     assert flown == ["greedy", "random"] * 3
     assert Counter(flown) == {"greedy": 3, "random": 3}

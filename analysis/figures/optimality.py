@@ -1,0 +1,202 @@
+"""Figures of the optimality gap, and of planners beside learners.
+
+Each returns a figure of its own; nothing touches pyplot's state.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+import seaborn as sns
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
+
+from analysis import numbers
+from analysis.figures import style
+from analysis.figures.comparison import COLOURS
+from analysis.figures.missions import chart, trajectories
+from analysis.names import BOUND, METRICS, PRODUCT
+from analysis.questions.head_to_head import AHEAD, BEHIND
+from analysis.questions.missions import LoggedMission
+from analysis.questions.optimality.gap import ALL, fleet
+from dess.scenario import ScenarioSpace
+
+_CHARGE = -1  # what a plan has in place of slots to stay at a waypoint where the UAV charges
+
+
+def gaps(table: pd.DataFrame) -> Figure:
+    """The product of every policy and the upper bound, in a panel per number of UAVs.
+
+    Args:
+        table: Rows of ``optimality.gap.by_fleet``.
+    """
+    fleets = [*table[table["uavs"] != ALL].groupby("uavs", sort=False)]
+    policies = [*dict.fromkeys(table["policy"])]
+    colours = style.policy_colours(policies)
+    with style.look():
+        figure, axes = style.panels((0.75 + 0.22 * len(policies)) * len(fleets) + 0.6,
+                                    len(fleets), "x", sharex=True, squeeze=False)  # fmt: skip
+        for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
+            bound = rows.iloc[0]
+            ax.axvspan(bound[f"{BOUND}_low"], bound[f"{BOUND}_high"], color=style.MUTED, alpha=0.3,
+                       linewidth=0)  # fmt: skip
+            ax.axvline(bound[BOUND], color=style.INK, linewidth=1.3, label="upper bound")
+            for y, (_, row) in enumerate(rows.iterrows()):
+                arms = style.arms(row, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
+                ax.errorbar(row[PRODUCT], y, xerr=arms, **style.dot(row["policy"], colours))
+            ax.set_yticks(range(len(rows)), rows["policy"])
+            ax.set(title=f"{fleet(uavs)}: bound {bound[BOUND]:.1%}", ylim=(len(rows) - 0.4, -0.6))
+        ax.set(xlim=(-0.02, 1.02), xlabel=METRICS[PRODUCT])
+        ax.xaxis.set_major_formatter(PercentFormatter(1))
+        style.legend_below(figure, ax)
+    return figure
+
+
+def differences(table: pd.DataFrame) -> Figure:
+    """Paired differences from a baseline, by number of UAVs.
+
+    Args:
+        table: Rows of ``optimality.planner.differences``.
+    """
+    colours = style.policy_colours(table["policy"])
+    places = {uavs: place for place, uavs in enumerate(dict.fromkeys(table["uavs"]))}
+    rows = table.assign(place=table["uavs"].map(places), mean=table["difference"])
+    with style.look():
+        figure, ax = style.panels(3.4, values="y")
+        ax.axhline(0, color=style.INK, linewidth=1.2, zorder=1)
+        style.policy_means(rows, "place", colours, 0.1, ax, linestyle="")
+        names = [uavs if uavs == ALL else fleet(uavs) for uavs in places]
+        ax.set_xticks(range(len(places)), names)
+        ax.set(title=f"Difference from {table['baseline'].iloc[0]}", xlim=(-0.5, len(places) - 0.5),
+               ylabel="mean difference [points]")  # fmt: skip
+        style.points_axis(ax.yaxis, 6)
+        style.legend_below(figure, ax)
+    return figure
+
+
+def front(table: pd.DataFrame, bound: float) -> Figure:
+    """Decision time against the product of all policies, and their Pareto front.
+
+    Args:
+        table: Rows of ``optimality.planner.front``.
+        bound: The mean upper bound of the product.
+    """
+    colours = style.policy_colours(table["policy"])
+    best = table[table["on_front"]].sort_values("seconds")
+    with style.look():
+        figure, ax = style.panels(4.2)
+        ax.axhline(bound, color=style.INK, linewidth=1.3, linestyle="--", label="upper bound")
+        ax.step(best["seconds"], best["mean"], where="post", color=style.MUTED, linewidth=1.2,
+                label="Pareto front", zorder=1)  # fmt: skip
+        for row in table.to_dict("records"):
+            ax.errorbar(row["seconds"], row["mean"], yerr=style.arms(pd.Series(row)),
+                        label=row["policy"], linestyle="",
+                        **style.dot(row["policy"], colours))  # fmt: skip
+        ax.set(xscale="log", title="Decision time against quality", ylabel=METRICS[PRODUCT])
+        ax.set_xlabel("time of a decision for one mission, median")
+        ax.set_xlim(table["seconds"].min() / 2, table["seconds"].max() * 2)
+        ax.xaxis.set_major_formatter(FuncFormatter(lambda time, _: numbers.seconds(time)))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        style.legend_below(figure, ax)
+    return figure
+
+
+def coverage(space: ScenarioSpace, shares: Mapping[str, np.ndarray]) -> Figure:
+    """The share of each node's data that two policies collect, and the difference, on maps.
+
+    Args:
+        space: The scenario.
+        shares: For two policies the (K,) shares of ``optimality.planner.coverage``.
+    """
+    (first, one), (second, other) = shares.items()
+    lead = one - other
+    most = max(float(np.abs(lead).max()), 0.01)
+    blue = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
+    both = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
+    with style.look():
+        figure, axes = style.panels(14.5, 3)
+        for ax, title, values, colours, low, high in (
+            (axes[0], f"Collected by {first}", one, blue, 0, 1),
+            (axes[1], f"Collected by {second}", other, blue, 0, 1),
+            (axes[2], f"{first} − {second} [points]", lead, both, -most, most),
+        ):
+            texts = [f"{100 * value:.0f}" for value in values]
+            if values is lead:
+                texts = [numbers.difference(value, 0) for value in values]
+            _values(space, values, texts, ax, cmap=colours, vmin=low, vmax=high)
+            ax.set_title(title)
+    return figure
+
+
+def at_home(table: pd.DataFrame) -> Figure:
+    """The share of the UAVs in the charging zone over the slots of the mission, by policy.
+
+    Args:
+        table: Rows of ``optimality.planner.at_home``.
+    """
+    colours = style.policy_colours(table["policy"])
+    with style.look():
+        figure, ax = style.panels(3.4, values="y")
+        for policy, rows in table.groupby("policy", sort=False):
+            ax.plot(rows["slot"], rows["share"], color=colours[str(policy)][0], label=policy)
+        ax.set(title="UAVs in the charging zone", xlabel="mission slot", ylabel="share of the UAVs",
+               xlim=(0, table["slot"].max()), ylim=(0, 1.02))  # fmt: skip
+        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        style.legend_below(figure, ax)
+    return figure
+
+
+def plan(mission: LoggedMission, plans: Sequence[np.ndarray]) -> Figure:
+    """The plan before the first slot, as dashed lines over the mission as it was flown.
+
+    Args:
+        mission: The mission.
+        plans: For each UAV its (W, 3) waypoints: cell x, y, and the slots to stay there; a negative
+            number of slots stands for charging.
+    """
+    log = mission.log
+    starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)].set_index("uav")
+    with style.look():
+        figure, ax = style.panels(5.6)
+        trajectories(log, mission.scenario, ax)
+        for uav, waypoints in enumerate(plans):
+            cells = np.vstack([starts.loc[uav, ["x", "y"]].to_numpy(float), waypoints[:, :2]])
+            ax.plot(*cells.T, color=style.uav_colours(len(plans))[uav], linestyle=(0, (4, 2)),
+                    linewidth=1.6, zorder=7, gid=f"plan-{uav}",
+                    label=f"plan of UAV {uav + 1}")  # fmt: skip
+            for number, (x, y, _) in enumerate(waypoints, 1):
+                ax.annotate(f"{number}", (x, y), xytext=(5, 5), textcoords="offset points",
+                            fontsize=7.5, zorder=9)  # fmt: skip
+        ax.set_title("The first plan, and the mission as flown")
+        style.legend_below(figure, ax)
+    return figure
+
+
+def prices(space: ScenarioSpace, values: np.ndarray) -> Figure:
+    """What one more data unit at each node would add to the bound, on a map.
+
+    Args:
+        space: The scenario.
+        values: (K,) the sums of a node's prices, from 0 to 1.
+    """
+    with style.look():
+        figure, ax = style.panels(5.6)
+        colours = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
+        _values(space, values, [f"{value:.2f}" for value in values], ax, cmap=colours, vmin=0,
+                vmax=max(float(values.max()), 0.01))  # fmt: skip
+        ax.set_title("Price of a node's data")
+    return figure
+
+
+def _values(
+    space: ScenarioSpace, values: np.ndarray, texts: Sequence[str], ax: Axes, **colours: object
+) -> None:
+    """Nodes in the colours of their values, with the values beside them."""
+    chart(space, ax)
+    x, y = np.array(space.nodes).T
+    ax.scatter(x, y, c=values, s=330, edgecolors=style.MUTED, linewidths=0.8, zorder=3,
+               **colours)  # type: ignore[arg-type] # fmt: skip
+    for place in zip(x, y, texts, strict=True):
+        ax.annotate(place[2], place[:2], ha="center", va="center", fontsize=7.5, zorder=4)

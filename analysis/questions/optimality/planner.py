@@ -1,0 +1,180 @@
+"""A planner beside a learner, in the same missions: who is ahead, where, and at what price in time.
+
+pair = planner.Beside(results, "planner", "ddqn")
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis import numbers
+from analysis.execution.decision_time import Timing
+from analysis.names import PRODUCT, SUCCESS
+from analysis.questions.missions import LoggedMission, logged_mission
+from analysis.questions.node_shares import collected, held
+from analysis.questions.optimality.gap import ALL, fleet
+from analysis.results.event_log import uav_slots
+from analysis.results.tables import Results
+from analysis.stats.front import on_front
+from analysis.stats.intervals import LEVEL
+from analysis.stats.intervals import summary as means_of
+from analysis.stats.paired import compare
+
+
+def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
+    """Planners compared with a learner on the same missions, by number of UAVs and over all.
+
+    Returns:
+        A row per policy, number of UAVs (or ``ALL``) and metric (product, success), as
+        ``analysis.compare`` returns it, with the column ``uavs``.
+
+    Raises:
+        InputError: If the study lacks one of the policies.
+    """
+    for policy in (*planners, learner):
+        results.check_policy(policy)
+    missions = results.missions[results.missions["policy"].isin([*planners, learner])]
+    by_fleet = compare(missions, learner, [PRODUCT, SUCCESS], by=["uavs"])
+    overall = compare(missions, learner, [PRODUCT, SUCCESS]).assign(uavs=ALL)
+    return pd.concat([by_fleet, overall], ignore_index=True)
+
+
+def answer(table: pd.DataFrame, planner: str) -> str:
+    """Whether the planner is better than the learner, by how much, and for which fleets.
+
+    Args:
+        table: Rows of ``differences``.
+        planner: The planner.
+    """
+    rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
+    overall = rows[rows["uavs"] == ALL].iloc[0]
+    parts = [
+        f"{_points(row)} with {fleet(row.uavs)}" for row in rows.itertuples() if row.uavs != ALL
+    ]
+    learner, difference = overall["baseline"], _points(overall)
+    if overall["low"] > 0:
+        claim = f"The planner is better: `{planner}` is {difference} points ahead of `{learner}`"
+    elif overall["high"] < 0:
+        claim = (
+            f"The learner is better: `{planner}` differs by {difference} points from `{learner}`"
+        )
+    else:
+        claim = (
+            f"The missions do not tell which is better: `{planner}` minus `{learner}` is "
+            f"{difference} points"
+        )
+    return (
+        f"**{claim}** in the product (collection ratio and communication), over {overall['n']:,} "
+        f"common missions: {numbers.words(parts)}. Brackets are {numbers.level(LEVEL)} intervals "
+        "of paired differences."
+    )
+
+
+def listed(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of ``differences`` as a table of text."""
+    heads = {PRODUCT: "Product [points]", SUCCESS: "Success [points]"}
+    rows = table.assign(mean=table["difference"], metric=table["metric"].map(heads))
+    index = ["policy", "uavs", "n"]
+    wide = numbers.wide(rows, index, write=numbers.points).reset_index()
+    names = {"policy": "Policy", "uavs": "UAVs", "n": "Pairs"}
+    return wide.rename(columns=names)
+
+
+def front(results: Results, times: Timing) -> pd.DataFrame:
+    """The product and the decision time of every policy whose decisions were timed.
+
+    Returns:
+        A row per policy, the fastest first: ``policy``, ``mean``, ``low`` and ``high`` of the
+        product, ``seconds`` (median time of a call for one mission), and ``on_front``: whether no
+        other policy is at least as fast and as good, and better in one of the two.
+    """
+    means = means_of(results.missions, by=["policy"])
+    means = means[means["metric"] == PRODUCT][["policy", "mean", "low", "high"]]
+    seconds = {cost.policy: cost.median for cost in times.costs}
+    table = means.assign(seconds=means["policy"].map(seconds)).dropna(ignore_index=True)
+    table["on_front"] = on_front(table["seconds"].to_numpy(), table["mean"].to_numpy())
+    return table.sort_values("seconds", ignore_index=True)
+
+
+def mean_bound(results: Results) -> float:
+    """The mean upper bound of the missions."""
+    return float(np.mean([bound.ratio for bound in results.bounds.values()]))
+
+
+def coverage(results: Results, policy: str) -> np.ndarray:
+    """The (K,) mean shares of their data that the nodes lose to a policy, over kept event logs."""
+    nodes = len(results.scenario().nodes)
+    shares = []
+    for events in _logs(results, policy):
+        fleet_size = int(events["uav"].max()) + 1
+        shares.append(collected(events, fleet_size, nodes).sum(axis=0) / held(events, nodes))
+    return np.mean(shares, axis=0)
+
+
+def at_home(results: Results, policies: Sequence[str]) -> pd.DataFrame:
+    """The share of the UAVs in the charging zone in every slot, over kept event logs.
+
+    Returns:
+        A row per policy and slot: ``policy``, ``slot``, ``share``, and ``n``, the number of UAVs
+        whose mission is not over. Slots with less than half of the UAVs of slot 0 have no row.
+    """
+    left, top, width, height = results.scenario().zone
+    tables = []
+    for policy in policies:
+        slots = pd.concat([uav_slots(events) for events in _logs(results, policy)])
+        inside = slots["x"].between(left, left + width - 1)
+        inside &= slots["y"].between(top, top + height - 1)
+        rows = inside.groupby(slots["slot"]).agg(share="mean", n="size").reset_index()
+        rows = rows[rows["n"] >= rows["n"].iloc[0] / 2]
+        tables.append(rows.assign(policy=policy))
+    return pd.concat(tables, ignore_index=True)
+
+
+def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
+    """When and how UAVs go home: their charging sessions in kept event logs.
+
+    Returns:
+        A row per policy: ``policy``, ``sessions`` per UAV, mean ``slot`` and ``battery`` [%] at the
+        beginning of a session, and ``n`` UAVs.
+    """
+    rows = []
+    for policy in policies:
+        logs = [*_logs(results, policy)]
+        begun = pd.concat([events[events["event"] == "charge_start"] for events in logs])
+        uavs = sum(int(events["uav"].max()) + 1 for events in logs)
+        rows.append(
+            (policy, len(begun) / uavs, begun["time"].mean(), begun["battery"].mean(), uavs)
+        )
+    return pd.DataFrame(rows, columns=["policy", "sessions", "slot", "battery", "n"])
+
+
+def example(results: Results, policy: str) -> LoggedMission:
+    """The first mission of the smallest fleet whose event log is kept."""
+    first = results.cell(policy, 0).first
+    logged = range(first, first + results.manifest["study"]["logged"])
+    missions = results.missions[results.missions["policy"] == policy].set_index("replication")
+    replication = int(missions.loc[[*logged], "uavs"].idxmin())
+    return logged_mission(results, policy, 0, replication)
+
+
+def node_prices(results: Results, replication: int) -> np.ndarray:
+    """What one more initial data unit at each of the K nodes would add to the bound [data units].
+
+    It is the sum of the prices of the node over all cuts, since data of the first slot count in
+    every cut, and at most 1.
+    """
+    return results.bounds[0, replication].prices.sum(axis=0)
+
+
+def _logs(results: Results, policy: str) -> list[pd.DataFrame]:
+    first = results.cell(policy, 0).first
+    return [
+        results.events(policy, 0, number)
+        for number in range(first, first + results.manifest["study"]["logged"])
+    ]
+
+
+def _points(row: Any) -> str:
+    return numbers.points(row.difference, row.low, row.high)

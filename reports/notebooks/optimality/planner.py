@@ -1,0 +1,185 @@
+# ---
+# jupyter:
+#   dess:
+#     studies: [gap]
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+# ---
+
+# %% [markdown]
+# # Planner against learner
+#
+# This page compares a policy that plans with one that has learned, in the same missions: which is
+# better, where, how much time its decisions take, and how far both are from the best possible.
+
+# %% tags=["parameters"]
+results = "../../results"  # folder that holds the results folders gap and timing
+planner = "planner"  # the policy that plans
+longer = "planner-long"  # the same with a longer search
+learner = "ddqn"  # the policy that has learned
+
+# %%
+from pathlib import Path
+
+from IPython.display import display
+
+from analysis import load_results, numbers
+from analysis.execution import decision_time
+from analysis.figures import comparison
+from analysis.figures import optimality as figures
+from analysis.questions import decision_costs, head_to_head, regions
+from analysis.questions.optimality import gap
+from analysis.questions.optimality import planner as questions
+from reports.pages import html
+
+# %%
+study = load_results(Path(results) / "gap")
+times = decision_time.read(Path(results) / "timing")
+differences = questions.differences(study, [planner, longer], learner)
+gaps = gap.by_fleet(study)
+pair = head_to_head.pair_of(study, planner, learner)
+missions = head_to_head.duels(study, pair)
+logged = study.manifest["study"]["logged"]
+
+# %%
+html.say("{answer}", answer=html.composed(questions.answer(differences, planner)))
+
+# %%
+html.say("{gap}", gap=html.composed(gap.in_words(study, longer)))
+
+# %% [markdown]
+# ## Differences by number of UAVs
+#
+# All policies meet the same missions: the same parameters, initial data, arrivals and shadowing. So
+# they are compared mission by mission.
+
+# %%
+by_product = differences[differences["metric"] == "collection_ratio_and_communication"]
+html.figure(
+    figures.differences(by_product),
+    f"Paired differences from {learner} in the product, by number of UAVs",
+    f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals.",
+    by_product,
+)
+
+# %%
+html.table(
+    questions.listed(differences),
+    f"Paired differences from {learner} with 95 % intervals",
+    data=differences,
+)
+
+# %% [markdown]
+# ## How far from the best possible
+#
+# For every mission, an upper bound was computed on what any policy can expect to collect in it.
+# The gap is the bound minus the product of a policy, over the same missions. The best possible
+# policy is somewhere between the best policy here and the bound.
+
+# %%
+html.figure(
+    figures.gaps(gaps),
+    "The product of every policy and the upper bound, by number of UAVs",
+    f"n = {numbers.span(gaps['n'])} missions; bars and the grey band are 95 % intervals.",
+)
+
+# %%
+html.table(gap.listed(gaps), "Means with 95 % intervals, and the gap in points", data=gaps)
+
+# %% [markdown]
+# ## Where each of them wins
+#
+# The values of every parameter are divided into at most five bins with about equally many missions.
+# Blue means that the planner is better, orange that the learner is, hollow grey inconclusive
+# (Holm's correction for all bins). The dashed line is the mean of all missions.
+
+# %%
+lead = regions.along(missions, pair.candidates)
+html.gallery(
+    [
+        (
+            comparison.lead(lead, field, missions["difference"].mean()),
+            f"Mean difference {planner} − {learner} against {field}",
+            f"{planner} − {learner}, n = {numbers.span(bins['n'])} missions per dot.",
+        )
+        for field, bins in lead.groupby("field", sort=False)
+    ]
+)
+
+# %% [markdown]
+# ### Which nodes they serve
+
+# %%
+shares = {policy: questions.coverage(study, policy) for policy in (planner, learner)}
+html.figure(
+    figures.coverage(study.scenario(), shares),
+    "Maps of the share of each node's data that is collected, by both policies, and the difference",
+    f"Means over n = {logged} missions, in percent of the data that the node has had.",
+)
+
+# %% [markdown]
+# ### When each of them goes home
+
+# %%
+home = questions.at_home(study, [planner, learner])
+html.figure(
+    figures.at_home(home),
+    "The share of the UAVs in the charging zone over the slots of the mission",
+    f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
+    home,
+)
+
+# %%
+sessions = questions.returns(study, [planner, learner])
+html.table(sessions.round(2), f"Charging sessions of the same {logged} missions", data=sessions)
+
+# %% [markdown]
+# ## Decision time against quality
+#
+# The time is the median time in which a policy decides for the UAVs of one mission, on one core.
+# Policies on the line are not dominated: none is at least as fast and as good.
+
+# %%
+points = questions.front(study, times)
+html.figure(
+    figures.front(points, questions.mean_bound(study)),
+    "Decision time against the product of all policies, and their Pareto front",
+    f"n = {len(missions):,} missions per policy; bars are 95 % intervals of the product.",
+    points,
+)
+
+# %%
+shown = decision_costs.timed(times, points["policy"])
+html.table(decision_costs.listed(times, shown), "Times of decisions, and the speed they allow")
+
+# %% [markdown]
+# ## One mission: the plan, and which data are worth fetching
+#
+# The price of a node says what one more data unit there would add to the bound. Where it is near 1,
+# the best possible team fetches all data; where it is 0, some data are left in any case.
+
+# %%
+mission = questions.example(study, planner)
+replication = int(mission.row["replication"])
+html.gallery(
+    [
+        (
+            figures.plan(mission, questions.first_plan(study, planner, replication)),
+            "The plan before the first slot, over the mission as it was flown",
+            mission.caption,
+        ),
+        (
+            figures.prices(study.scenario(), questions.node_prices(study, replication)),
+            "The price of every node's data in the upper bound of the same mission",
+            f"n = 1, mission {replication}: data units that one more data unit would add.",
+        ),
+    ]
+)
+
+# %% [markdown]
+# ## Where the figures come from
+
+# %%
+display(html.provenance([study]), html.table(decision_costs.origin(times), wrap=True))
