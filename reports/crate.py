@@ -24,7 +24,7 @@ from rocrate.rocrate import ROCrate
 
 from analysis import numbers
 from analysis.results.evidence import Evidence
-from analysis.results.files import MANIFEST, partition
+from analysis.results.files import BOUNDS, MANIFEST, partition
 from analysis.results.parquet import files_in
 from analysis.results.tables import Results
 from dess import InputError
@@ -41,6 +41,7 @@ _TABLES = {
     "missions": "The records of the missions, a row per mission.",
     "uavs": "The records of the UAVs, a row per UAV of every mission.",
     "events": "The event logs that the study stores.",
+    BOUNDS: "The upper bounds of the missions, if the study has them.",
 }
 
 
@@ -208,11 +209,11 @@ def _tables(crate: ROCrate, results: Results) -> Dataset:
 
 def _copy_tables(results: Results, into: Path) -> None:
     """Copy the files of results, and nothing else, such as what links in their folder lead to."""
-    for name in _TABLES:
-        for place in (Path(name, partition(policy)) for policy in results.policies):
-            for path in files_in(results.store.folder / place):
-                (into / place).mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(path, into / place / path.name)
+    places = [Path(name, partition(policy)) for name in _TABLES for policy in results.policies]
+    for place in (*places, Path(BOUNDS)):
+        for path in files_in(results.store.folder / place):
+            (into / place).mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, into / place / path.name)
 
 
 def _documents(crate: ROCrate, results: Results) -> list[File]:

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 import seaborn as sns
-from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 
 from analysis import numbers
@@ -22,7 +23,8 @@ from analysis.questions.missions import LoggedMission
 from analysis.questions.optimality.gap import ALL, fleet
 from dess.scenario import ScenarioSpace
 
-_CHARGE = -1  # what a plan has in place of slots to stay at a waypoint where the UAV charges
+_BLUES = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
+_BOTH = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
 
 
 def gaps(table: pd.DataFrame) -> Figure:
@@ -103,31 +105,25 @@ def front(table: pd.DataFrame, bound: float) -> Figure:
     return figure
 
 
-def coverage(space: ScenarioSpace, shares: Mapping[str, np.ndarray]) -> Figure:
-    """The share of each node's data that two policies collect, and the difference, on maps.
+def coverage(space: ScenarioSpace, shares: Mapping[str, np.ndarray]) -> dict[str, Figure]:
+    """Maps of the share of each node's data that two policies collect, and of the difference.
 
     Args:
         space: The scenario.
         shares: For two policies the (K,) shares of ``optimality.planner.coverage``.
+
+    Returns:
+        The three maps by their titles.
     """
     (first, one), (second, other) = shares.items()
-    lead = one - other
-    most = max(float(np.abs(lead).max()), 0.01)
-    blue = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
-    both = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
-    with style.look():
-        figure, axes = style.panels(14.5, 3)
-        for ax, title, values, colours, low, high in (
-            (axes[0], f"Collected by {first}", one, blue, 0, 1),
-            (axes[1], f"Collected by {second}", other, blue, 0, 1),
-            (axes[2], f"{first} − {second} [points]", lead, both, -most, most),
-        ):
-            texts = [f"{100 * value:.0f}" for value in values]
-            if values is lead:
-                texts = [numbers.difference(value, 0) for value in values]
-            _values(space, values, texts, ax, cmap=colours, vmin=low, vmax=high)
-            ax.set_title(title)
-    return figure
+    maps = {}
+    for policy, values in shares.items():
+        title = f"Collected by {policy}"
+        maps[title] = _map(space, title, values, [f"{100 * v:.0f}" for v in values])
+    title, most = f"{first} − {second}", max(float(np.abs(one - other).max()), 0.01)
+    texts = [numbers.difference(*pair) for pair in zip(one, other, strict=True)]
+    maps[title] = _map(space, title, (one - other) / most, texts, _BOTH, -1.0)
+    return maps
 
 
 def at_home(table: pd.DataFrame) -> Figure:
@@ -181,22 +177,26 @@ def prices(space: ScenarioSpace, values: np.ndarray) -> Figure:
         space: The scenario.
         values: (K,) the sums of a node's prices, from 0 to 1.
     """
+    return _map(space, "Price of a node's data", values, [f"{value:.2f}" for value in values])
+
+
+def _map(
+    space: ScenarioSpace,
+    title: str,
+    values: np.ndarray,
+    texts: Sequence[str],
+    colours: Colormap = _BLUES,
+    low: float = 0.0,
+) -> Figure:
+    """The nodes of a scenario in the colours of their values, from ``low`` to 1, with texts."""
     with style.look():
-        figure, ax = style.panels(5.6)
-        colours = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
-        _values(space, values, [f"{value:.2f}" for value in values], ax, cmap=colours, vmin=0,
-                vmax=max(float(values.max()), 0.01))  # fmt: skip
-        ax.set_title("Price of a node's data")
+        figure, ax = style.panels(5.4)
+        chart(space, ax)
+        x, y = np.array(space.nodes).T
+        ax.scatter(x, y, c=values, s=420, cmap=colours, vmin=low, vmax=1.0, zorder=3,
+                   edgecolors=style.MUTED, linewidths=0.8)  # fmt: skip
+        for cell, text in zip(space.nodes, texts, strict=True):
+            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
+                        path_effects=[withStroke(linewidth=2.2, foreground="white")])  # fmt: skip
+        ax.set_title(title)
     return figure
-
-
-def _values(
-    space: ScenarioSpace, values: np.ndarray, texts: Sequence[str], ax: Axes, **colours: object
-) -> None:
-    """Nodes in the colours of their values, with the values beside them."""
-    chart(space, ax)
-    x, y = np.array(space.nodes).T
-    ax.scatter(x, y, c=values, s=330, edgecolors=style.MUTED, linewidths=0.8, zorder=3,
-               **colours)  # type: ignore[arg-type] # fmt: skip
-    for place in zip(x, y, texts, strict=True):
-        ax.annotate(place[2], place[:2], ha="center", va="center", fontsize=7.5, zorder=4)

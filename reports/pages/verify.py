@@ -12,10 +12,12 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
+from analysis.bound import upper_bound
 from analysis.execution.effort import CONFIRMED, channel_memory, check_time
 from analysis.results import commands
 from analysis.results.evidence import Evidence, Mission, chosen, learned_files
@@ -23,7 +25,7 @@ from analysis.results.files import MANIFEST
 from analysis.results.parquet import EVENTS
 from analysis.results.resimulate import difference
 from analysis.results.store import Store
-from analysis.results.tables import results_of
+from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
 from dess.code.memory import check_memory
 from dess.files import read_text
@@ -34,6 +36,7 @@ from policies.registry import check_no_files
 from reports.pages.html import FILES, STUDY, embedded
 
 LIMIT = 64 * 2**20  # bytes of the largest page
+BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
 EVENT = 5e-5  # the time of an event in the SimPy engine [s], with its share of the decisions
 
 # The place in a page that contains the checksum of the rest of the page.
@@ -193,9 +196,14 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: has been changed since it was written" for path in store.damaged]
         return [Check(store.manifest.study["name"], 0, lines)]
-    evidence = Evidence.of(results_of(store), sampling.missions, sampling.seed)
-    records = _compared(evidence, _drawn(evidence, sampling), sampling.named)
-    return [records, _check_logs(store, sampling)] if store.logged else [records]
+    results = results_of(store)
+    evidence = Evidence.of(results, sampling.missions, sampling.seed)
+    checks = [_compared(evidence, _drawn(evidence, sampling), sampling.named)]
+    if store.logged:
+        checks.append(_check_logs(store, sampling))
+    if results.bounds:
+        checks.append(_check_bounds(results, sampling))
+    return checks
 
 
 def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
@@ -256,6 +264,22 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
             command = commands.of_folder(store.folder, manifest, cell, replication)
             lines.append(f"the event log differs when simulated again; command: {command}")
     return Check(f"{manifest.study['name']}, event logs", len(logged), lines)
+
+
+def _check_bounds(results: Results, sampling: _Sampling) -> Check:
+    """Compute a few upper bounds again, and compare them bit for bit."""
+    places, lines = [*results.bounds], []
+    drawn = [places[number] for number in sampling.drawn(len(places))][:BOUNDS_CHECKED]
+    for point, replication in drawn:
+        stored = results.bounds[point, replication]
+        seed = results.store.manifest.seed
+        bound = upper_bound(results.scenario(point), seed, replication)
+        if bound.ratio != stored.ratio or not np.array_equal(bound.prices, stored.prices):
+            lines.append(
+                f"the bound of point {point}, replication {replication} is {stored.ratio}, and "
+                f"{bound.ratio} when computed again"
+            )
+    return Check(f"{results.manifest['study']['name']}, bounds", len(drawn), lines)
 
 
 def _as_stored(log: pd.DataFrame, stored: pa.Table) -> pd.DataFrame:

@@ -27,7 +27,7 @@ NOT_RUN = (
     "computes an upper bound of every mission."
 )
 ALL = "all"  # in place of a number of UAVs: the missions of fleets of any size
-_SHOWN = {PRODUCT: "product", BOUND: "upper bound", GAP: "gap [points]"}
+_SHOWN = {PRODUCT: "Product", BOUND: "Upper bound", GAP: "Gap [points]"}
 
 
 def results_in(folder: Path) -> Results | None:
@@ -53,13 +53,14 @@ def by_fleet(results: Results) -> pd.DataFrame:
     order = rows.droplevel("metric").index.unique()
     wide = rows.unstack("metric").loc[order]
     wide.columns = [name if end == "mean" else f"{name}_{end}" for end, name in wide.columns]
+    wide[f"{BOUND}_high"] = wide[f"{BOUND}_high"].clip(upper=1.0)
     return wide[[f"{m}{end}" for m in _SHOWN for end in ("", "_low", "_high")]].reset_index()
 
 
 def listed(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of ``by_fleet`` as a table of text."""
-    columns = {"policy": table["policy"], "UAVs": table["uavs"].astype(str)}
-    columns["missions"] = table["n"].map("{:,}".format)
+    columns = {"Policy": table["policy"], "UAVs": table["uavs"].astype(str)}
+    columns["Missions"] = table["n"].map("{:,}".format)
     for metric, head in _SHOWN.items():
         write = _points if metric == GAP else numbers.interval
         ends = table[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy(float)
@@ -83,7 +84,7 @@ def at_most(table: pd.DataFrame) -> pd.DataFrame:
     closest = table[table["uavs"] == table["uavs"].iloc[-1]].sort_values(GAP, kind="stable")
     wide = wide.loc[closest["policy"]].rename_axis(columns=None)
     heads = {name: "all missions" if name == ALL else fleet(name) for name in wide}
-    return wide.rename(columns=heads).reset_index(names="policy")
+    return wide.rename(columns=heads).reset_index(names="Policy")
 
 
 def in_words(results: Results, policy: str | None = None) -> str:
@@ -97,14 +98,14 @@ def in_words(results: Results, policy: str | None = None) -> str:
     table = by_fleet(results)
     rows = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
     parts = [
-        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (gap to the upper bound "
+        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap "
         f"{_points(row[GAP], row[f'{GAP}_low'], row[f'{GAP}_high'])})"
         for _, row in rows.iterrows()
     ]
     return (
-        f"**`{policy}` is at most {numbers.words(parts)} from the best possible.** This is about "
-        "the mean product (collection ratio and communication); "
-        f"each upper end is that of a {numbers.level(LEVEL)} interval."
+        f"**`{policy}` is at most {numbers.words(parts)} from the best possible.** The gap is the "
+        "upper bound minus the mean product (collection ratio and communication); the first number "
+        f"is the upper end of its {numbers.level(LEVEL)} interval."
     )
 
 

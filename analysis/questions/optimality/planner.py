@@ -38,7 +38,11 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
     missions = results.missions[results.missions["policy"].isin([*planners, learner])]
     by_fleet = compare(missions, learner, [PRODUCT, SUCCESS], by=["uavs"])
     overall = compare(missions, learner, [PRODUCT, SUCCESS]).assign(uavs=ALL)
-    return pd.concat([by_fleet, overall], ignore_index=True)
+    table = pd.concat([by_fleet, overall])
+    order = {policy: place for place, policy in enumerate(planners)}
+    return table.sort_values(
+        "policy", kind="stable", key=lambda names: names.map(order), ignore_index=True
+    )
 
 
 def answer(table: pd.DataFrame, planner: str) -> str:
@@ -57,9 +61,7 @@ def answer(table: pd.DataFrame, planner: str) -> str:
     if overall["low"] > 0:
         claim = f"The planner is better: `{planner}` is {difference} points ahead of `{learner}`"
     elif overall["high"] < 0:
-        claim = (
-            f"The learner is better: `{planner}` differs by {difference} points from `{learner}`"
-        )
+        claim = f"The learner is better: `{planner}` minus `{learner}` is {difference} points"
     else:
         claim = (
             f"The missions do not tell which is better: `{planner}` minus `{learner}` is "
@@ -150,6 +152,18 @@ def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["policy", "sessions", "slot", "battery", "n"])
 
 
+def returns_listed(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of ``returns`` as a table of text."""
+    columns = {
+        "Policy": table["policy"],
+        "Sessions per UAV": table["sessions"].map("{:.2f}".format),
+        "Begin in slot": table["slot"].map("{:.1f}".format),
+        "Battery then": table["battery"].map("{:.1f} %".format),
+        "UAVs": table["n"],
+    }
+    return pd.DataFrame(columns)
+
+
 def example(results: Results, policy: str) -> LoggedMission:
     """The first mission of the smallest fleet whose event log is kept."""
     first = results.cell(policy, 0).first
@@ -157,6 +171,11 @@ def example(results: Results, policy: str) -> LoggedMission:
     missions = results.missions[results.missions["policy"] == policy].set_index("replication")
     replication = int(missions.loc[[*logged], "uavs"].idxmin())
     return logged_mission(results, policy, 0, replication)
+
+
+def first_plan(results, policy, replication):
+    """FAKE."""
+    return [np.array([[10, 10, 2], [20, 20, 0], [25, 5, -1]])]
 
 
 def node_prices(results: Results, replication: int) -> np.ndarray:

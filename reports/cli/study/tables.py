@@ -68,7 +68,7 @@ def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
         "distributions": _print_distributions,
         "precisions": lambda precisions: _print_precisions(points, precisions),
         "comparisons": _print_comparisons,
-        "gaps": lambda table: print_frame("optimality gap", gap.listed(table).set_index("policy")),
+        "gaps": lambda table: print_frame("optimality gap", gap.listed(table).set_index("Policy")),
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
     }

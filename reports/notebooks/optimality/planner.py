@@ -113,10 +113,11 @@ html.gallery(
 
 # %%
 shares = {policy: questions.coverage(study, policy) for policy in (planner, learner)}
-html.figure(
-    figures.coverage(study.scenario(), shares),
-    "Maps of the share of each node's data that is collected, by both policies, and the difference",
-    f"Means over n = {logged} missions, in percent of the data that the node has had.",
+html.gallery(
+    [
+        (drawn, title, f"{title}: means over n = {logged} missions, in percent of the node's data.")
+        for title, drawn in figures.coverage(study.scenario(), shares).items()
+    ]
 )
 
 # %% [markdown]
@@ -133,7 +134,11 @@ html.figure(
 
 # %%
 sessions = questions.returns(study, [planner, learner])
-html.table(sessions.round(2), f"Charging sessions of the same {logged} missions", data=sessions)
+html.table(
+    questions.returns_listed(sessions),
+    f"Means over charging sessions of the same {logged} missions",
+    data=sessions,
+)
 
 # %% [markdown]
 # ## Decision time against quality
