@@ -21,6 +21,10 @@ from analysis.stats.front import on_front
 from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
+from dess.mission import MissionModel
+from dess.view import decide
+from policies import load
+from policies.planner.policy import Planner, memory_of
 
 
 def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
@@ -173,9 +177,20 @@ def example(results: Results, policy: str) -> LoggedMission:
     return logged_mission(results, policy, 0, replication)
 
 
-def first_plan(results, policy, replication):
-    """FAKE."""
-    return [np.array([[10, 10, 2], [20, 20, 0], [25, 5, -1]])]
+def first_plan(results: Results, policy: str, replication: int) -> list[np.ndarray]:
+    """What a planner plans in the first slot of a mission; nothing is simulated.
+
+    Returns:
+        For each UAV its (W, 3) waypoints after the first slot: the cell x, y, and the slots to stay
+        there, below 0 if it is to charge there. Empty if the policy is no planner.
+    """
+    planner, seed = load(policy), results.store.manifest.seed
+    if not isinstance(planner, Planner):
+        return []
+    model = MissionModel(results.scenario(), [planner], seed, replication, None)
+    decide(model.team, model.state, model.world)
+    plans = memory_of(model.state, planner.new, planner.kept)
+    return [plans.waypoints[0, uav, : plans.lengths[0, uav], :3] for uav in model.fleet]
 
 
 def node_prices(results: Results, replication: int) -> np.ndarray:

@@ -168,18 +168,15 @@ html.table(decision_costs.listed(times, shown), "Times of decisions, and the spe
 # %%
 mission = questions.example(study, planner)
 replication = int(mission.row["replication"])
+plan = figures.plan(mission, questions.first_plan(study, planner, replication))
+prices = figures.prices(study.scenario(), questions.node_prices(study, replication))
+
+# %%
+caption = f"n = 1, mission {replication}: data units that one more data unit would add to the bound"
 html.gallery(
     [
-        (
-            figures.plan(mission, questions.first_plan(study, planner, replication)),
-            "The plan before the first slot, over the mission as it was flown",
-            mission.caption,
-        ),
-        (
-            figures.prices(study.scenario(), questions.node_prices(study, replication)),
-            "The price of every node's data in the upper bound of the same mission",
-            f"n = 1, mission {replication}: data units that one more data unit would add.",
-        ),
+        (plan, "The plan of the first slot, over the mission as it was flown", mission.caption),
+        (prices, "The price of every node's data in the bound of the same mission", caption),
     ]
 )
 

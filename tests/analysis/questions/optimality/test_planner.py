@@ -11,6 +11,7 @@ from analysis.questions.optimality import planner
 from analysis.questions.optimality.gap import ALL
 from analysis.results.event_log import uav_slots
 from dess import InputError
+from policies.planner import Planner
 from tests.analysis.small import small_study
 
 LOGGED = 3
@@ -122,6 +123,22 @@ def test_the_example_is_the_first_of_the_smallest_fleets_with_a_log(results):
 def test_the_price_of_a_node_is_the_sum_over_cuts(results):
     np.testing.assert_allclose(planner.node_prices(results, 7), [0.17, 0.27, 0.37])
     assert planner.mean_bound(results) == 1.0
+
+
+def test_only_planners_have_a_first_plan(results):
+    assert planner.first_plan(results, "greedy", 0) == []
+
+
+def test_the_first_plan_is_made_of_cells_of_the_map(results, monkeypatch):
+    monkeypatch.setattr(Planner, "new", 500)
+    for replication in range(3):
+        plans = planner.first_plan(results, "planner", replication)
+        uavs = results.missions.query("replication == @replication")["uavs"].iloc[0]
+        assert len(plans) == uavs
+        cells = np.concatenate([waypoints[:, :2] for waypoints in plans])
+        assert len(cells) and cells.min() >= 0 and cells.max() < 8
+        again = planner.first_plan(results, "planner", replication)
+        assert all(np.array_equal(*pair) for pair in zip(plans, again, strict=True))
 
 
 def test_success_is_compared_too(results):
