@@ -22,6 +22,7 @@ from analysis.questions.head_to_head import AHEAD, BEHIND
 from analysis.questions.missions import LoggedMission
 from analysis.questions.optimality.gap import ALL, fleet
 from dess.scenario import ScenarioSpace
+from policies.planner import Course
 
 _BLUES = sns.light_palette(COLOURS[AHEAD], as_cmap=True)
 _BOTH = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
@@ -144,28 +145,25 @@ def at_home(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def plan(mission: LoggedMission, plans: Sequence[np.ndarray]) -> Figure:
-    """The plan before the first slot, as dashed lines over the mission as it was flown.
+def plan(mission: LoggedMission, courses: Sequence[Course]) -> Figure:
+    """The plan of the first slot, as dashed lines over the mission as it was flown.
 
     Args:
         mission: The mission.
-        plans: For each UAV its (W, 3) waypoints: cell x, y, and the slots to stay there; a negative
-            number of slots stands for charging.
+        courses: What the plan has each UAV do.
     """
-    log = mission.log
-    starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)].set_index("uav")
     with style.look():
-        figure, ax = style.panels(5.6)
-        trajectories(log, mission.scenario, ax)
-        for uav, waypoints in enumerate(plans):
-            cells = np.vstack([starts.loc[uav, ["x", "y"]].to_numpy(float), waypoints[:, :2]])
-            ax.plot(*cells.T, color=style.uav_colours(len(plans))[uav], linestyle=(0, (4, 2)),
-                    linewidth=1.6, zorder=7, gid=f"plan-{uav}",
-                    label=f"plan of UAV {uav + 1}")  # fmt: skip
-            for number, (x, y, _) in enumerate(waypoints, 1):
-                ax.annotate(f"{number}", (x, y), xytext=(5, 5), textcoords="offset points",
-                            fontsize=7.5, zorder=9)  # fmt: skip
-        ax.set_title("The first plan, and the mission as flown")
+        figure, ax = style.panels(6.0)
+        trajectories(mission.log, mission.scenario, ax)
+        for uav, course in enumerate(courses):
+            colour = style.uav_colours(len(courses))[uav]
+            ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,
+                    gid=f"plan-{uav}", label=f"plan of UAV {uav + 1}")  # fmt: skip
+            for number, cell in enumerate(course.waypoints, 1):
+                ax.annotate(str(number), cell, xytext=(6, 6), textcoords="offset points",
+                            color=colour, fontsize=8, fontweight="bold", zorder=10,
+                            path_effects=[withStroke(linewidth=2, foreground="white")])  # fmt: skip
+        ax.set_title("The first plan (dashed), and the mission as flown")
         style.legend_below(figure, ax)
     return figure
 

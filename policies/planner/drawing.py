@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.mission import simulate
+from dess.mission import MissionModel, simulate
 from dess.scenario import Scenario, ScenarioSpace
-from dess.view import View
+from dess.view import View, decide
 from policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
 from policies.planner.policy import Planner, memory_of
 from policies.planner.rates import rates_of
@@ -54,6 +54,26 @@ def plan_of(
     watched = _Watched(planner or Planner())
     simulate(scenario, watched, seed, replication)
     return watched.plans
+
+
+def first_plan(
+    scenario: ScenarioSpace, seed: int = 0, replication: int = 0, planner: Planner | None = None
+) -> list[Course]:
+    """The plan in the first slot of a mission, without simulating the mission.
+
+    Args:
+        scenario: The scenario.
+        seed: Seed of the mission.
+        replication: Number of the replication.
+        planner: The planner; without one, ``planner``.
+
+    Returns:
+        A course per UAV.
+    """
+    watched = _Watched(planner or Planner())
+    model = MissionModel(scenario, [watched], seed, replication, None)
+    decide(model.team, model.state, model.world)
+    return watched.plans[0]
 
 
 class _Watched:

@@ -21,10 +21,8 @@ from analysis.stats.front import on_front
 from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
-from dess.mission import MissionModel
-from dess.view import decide
 from policies import load
-from policies.planner.policy import Planner, memory_of
+from policies.planner import Course, Planner, first_plan
 
 
 def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
@@ -177,20 +175,15 @@ def example(results: Results, policy: str) -> LoggedMission:
     return logged_mission(results, policy, 0, replication)
 
 
-def first_plan(results: Results, policy: str, replication: int) -> list[np.ndarray]:
-    """What a planner plans in the first slot of a mission; nothing is simulated.
+def plan(results: Results, policy: str, replication: int) -> list[Course]:
+    """What a planner plans for each UAV in the first slot of a mission; nothing is simulated.
 
-    Returns:
-        For each UAV its (W, 3) waypoints after the first slot: the cell x, y, and the slots to stay
-        there, below 0 if it is to charge there. Empty if the policy is no planner.
+    Empty if the policy is no planner.
     """
-    planner, seed = load(policy), results.store.manifest.seed
+    planner = load(policy)
     if not isinstance(planner, Planner):
         return []
-    model = MissionModel(results.scenario(), [planner], seed, replication, None)
-    decide(model.team, model.state, model.world)
-    plans = memory_of(model.state, planner.new, planner.kept)
-    return [plans.waypoints[0, uav, : plans.lengths[0, uav], :3] for uav in model.fleet]
+    return first_plan(results.scenario(), results.store.manifest.seed, replication, planner)
 
 
 def node_prices(results: Results, replication: int) -> np.ndarray:

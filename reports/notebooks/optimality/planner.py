@@ -168,7 +168,7 @@ html.table(decision_costs.listed(times, shown), "Times of decisions, and the spe
 # %%
 mission = questions.example(study, planner)
 replication = int(mission.row["replication"])
-plan = figures.plan(mission, questions.first_plan(study, planner, replication))
+plan = figures.plan(mission, questions.plan(study, planner, replication))
 prices = figures.prices(study.scenario(), questions.node_prices(study, replication))
 
 # %%

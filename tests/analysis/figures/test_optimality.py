@@ -10,6 +10,7 @@ from analysis.questions.missions import LoggedMission
 from dess import load_scenario, simulate
 from dess.state import sample_scenario
 from policies import load
+from policies.planner import Course
 
 PAPER = load_scenario("paper")
 
@@ -80,16 +81,16 @@ def test_the_share_at_home_is_a_line_per_policy() -> None:
     assert [line.get_ydata().tolist() for line in ax.lines] == [[1.0, 0.5], [1.0, 0.0]]
 
 
-def test_the_plan_is_drawn_over_the_mission_from_the_start_cell() -> None:
+def test_the_plan_is_drawn_over_the_mission() -> None:
     record = simulate(load_scenario("paper", uavs=1), load("greedy"), 3, 1, events=True)
     log = pd.DataFrame(record.events.columns())
     scenario = sample_scenario(load_scenario("paper", uavs=1), 3, 1)
     mission = LoggedMission(pd.Series(), pd.DataFrame(), scenario, log)
-    figure = optimality.plan(mission, [np.array([[8, 10, 2], [20, 5, -1]])])
+    course = Course(np.array([[8, 10]]), np.array([2]), np.array([[26, 5], [25, 5], [24, 5]]))
+    figure = optimality.plan(mission, [course])
     (line,) = (line for line in figure.axes[0].lines if line.get_gid() == "plan-0")
-    start = log[(log["event"] == "mission_start") & (log["uav"] == 0)].iloc[0]
-    assert line.get_xdata().tolist() == [start["x"], 8, 20]
-    assert line.get_ydata().tolist() == [start["y"], 10, 5]
+    assert np.array_equal(line.get_xydata(), course.path)
+    assert "1" in [text.get_text() for text in figure.axes[0].texts if tuple(text.xy) == (8, 10)]
 
 
 def test_prices_are_written_at_the_nodes() -> None:

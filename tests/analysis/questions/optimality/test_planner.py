@@ -125,20 +125,19 @@ def test_the_price_of_a_node_is_the_sum_over_cuts(results):
     assert planner.mean_bound(results) == 1.0
 
 
-def test_only_planners_have_a_first_plan(results):
-    assert planner.first_plan(results, "greedy", 0) == []
+def test_only_planners_have_a_plan(results):
+    assert planner.plan(results, "greedy", 0) == []
 
 
-def test_the_first_plan_is_made_of_cells_of_the_map(results, monkeypatch):
+def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     monkeypatch.setattr(Planner, "new", 500)
-    for replication in range(3):
-        plans = planner.first_plan(results, "planner", replication)
-        uavs = results.missions.query("replication == @replication")["uavs"].iloc[0]
-        assert len(plans) == uavs
-        cells = np.concatenate([waypoints[:, :2] for waypoints in plans])
+    for replication in range(LOGGED):
+        courses = planner.plan(results, "planner", replication)
+        log = results.events("greedy", 0, replication)
+        starts = log[(log["event"] == "mission_start") & (log["uav"] >= 0)]
+        assert [course.path[0].tolist() for course in courses] == starts[["x", "y"]].values.tolist()
+        cells = np.concatenate([course.waypoints for course in courses])
         assert len(cells) and cells.min() >= 0 and cells.max() < 8
-        again = planner.first_plan(results, "planner", replication)
-        assert all(np.array_equal(*pair) for pair in zip(plans, again, strict=True))
 
 
 def test_success_is_compared_too(results):
