@@ -66,8 +66,18 @@ def test_an_auditor_finds_the_record_in_the_log(
     _check(simulate(space, policy, seed % 2**53, replication, events=True), space)
 
 
-def test_an_auditor_finds_the_records_of_the_paper_scenario() -> None:
-    paper, greedy = load_scenario("paper"), shipped.load("greedy")
+@pytest.mark.parametrize(
+    "section",
+    [
+        {},
+        {"failures.uav_rate": 0.002},
+        {"wind.strength": 0.4},
+        {"pads": 1, "charging.order": "lowest-battery"},
+        {"arrivals.process": "continuous", "arrivals.buffer": 30},
+    ],
+)
+def test_an_auditor_finds_the_records_of_the_paper_scenario(section: dict[str, Any]) -> None:
+    paper, greedy = load_scenario("paper", **section), shipped.load("greedy")
     for replication in range(3):
         _check(simulate(paper, greedy, 2022, replication, events=True), paper)
 
