@@ -1,8 +1,12 @@
 """How numbers are written on pages and in the terminal, such as shares in percent."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import pandas as pd
+
+# What a spreadsheet takes as the beginning of a formula.
+_FORMULA = re.compile(r"^[=+\-@\t\r]")
 
 
 def percent(value: float) -> str:
@@ -111,6 +115,19 @@ def headed(lines: Iterable[Mapping[tuple[str, str], str]]) -> pd.DataFrame:
     """A table of text with two header rows: each line maps (upper, lower header) to its text."""
     rows = [*lines]
     return pd.DataFrame(rows, columns=pd.MultiIndex.from_tuples(rows[0] if rows else [("", "")]))
+
+
+def csv(frame: pd.DataFrame, form: str | None = None) -> str:
+    """A table in CSV; a text that a spreadsheet would take as a formula begins with an apostrophe.
+
+    A spreadsheet runs formulas when it opens a file, and they may read and send other cells.
+
+    Args:
+        frame: The table.
+        form: The format of its numbers, such as ``%.6g``; by default all digits.
+    """
+    safe = frame.map(lambda cell: _FORMULA.sub(r"'\g<0>", cell) if isinstance(cell, str) else cell)
+    return safe.to_csv(index=False, float_format=form and form.__mod__)
 
 
 def wide(

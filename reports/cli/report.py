@@ -55,6 +55,7 @@ def report(
             "value in TOML syntax; repeatable.",
         ),
     ] = None,
+    yes: YesOption = False,
 ) -> None:
     """Render results as HTML pages with an index: reports on the paper, and pages of any study.
 
@@ -66,6 +67,8 @@ def report(
             raise InputError(f"--set: {' '.join(names)} takes no --set; allowed: {WHAT_IF}")
         values["settings"] = dict(setting(text) for text in settings)
         values.setdefault("baseline", {})  # the scenario itself, not that of the default question
+    if yes:  # a parameter of the notebooks that simulate missions
+        values["yes"] = True
     from reports.pages.notebook import NAMES
     from reports.pages.render import render, render_study
 

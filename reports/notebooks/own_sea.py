@@ -26,6 +26,7 @@ requirements = {"success": 0.99, "collection_ratio": 0.68}  # the lowest accepta
 missions = 300  # additional missions that check each selected setting
 seed = 0  # seed of the missions
 workers = 1  # processes
+yes = False  # True if the sweep may take more than an hour
 
 # %%
 from analysis import numbers, sweep
@@ -88,7 +89,7 @@ html.figure(drawing, "Map of the mission; battery, residual data and charging", 
 # %%
 priced = {**prices, "currency": currency, "missions": planned}
 about = (scenario, policies, missions, seed, results, workers, priced, requirements)
-answer = sweep(*about, **fields)
+answer = sweep(*about, yes=yes, **fields)
 
 # %%
 html.say(

@@ -22,6 +22,7 @@ policies = ["greedy", "nearest"]
 missions = 200  # number of missions of every setting
 seed = 0  # seed of the missions
 workers = 1  # processes; more than one is worth its start time from thousands of missions on
+yes = False  # True if the missions may take more than an hour
 
 # %%
 from analysis import sweep
@@ -30,7 +31,7 @@ from reports.pages import html
 from reports.pages.study import tables, words
 
 # %%
-answer = sweep(scenario, policies, missions, seed, results, workers, **fields)
+answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **fields)
 
 # %% [markdown]
 # ## What was simulated

@@ -24,6 +24,7 @@ policies = ["ddqn", "greedy"]  # each policy is compared with itself
 missions = 500  # number of missions of every policy, in the baseline and in the variation
 seed = 0  # seed of the missions
 workers = 1  # processes; more than one is worth its start time from thousands of missions on
+yes = False  # True if the missions may take more than an hour
 shown = None  # the policy whose missions are drawn; None for the best in the variation
 
 # %%
@@ -33,7 +34,9 @@ from analysis import names, what_if
 from reports.pages import html
 
 # %%
-asked = what_if(settings, baseline, scenario, policies, missions, seed, results, workers, shown)
+asked = what_if(
+    settings, baseline, scenario, policies, missions, seed, results, workers, shown, yes=yes
+)
 
 # %% [markdown]
 # ## The question

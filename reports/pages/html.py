@@ -24,6 +24,7 @@ import pandas as pd
 from IPython.display import HTML, Markdown
 from matplotlib.figure import Figure
 
+from analysis import numbers
 from analysis.numbers import span
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import Results
@@ -47,7 +48,6 @@ _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
 _MARKUP = re.compile(
     rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#](?!\d)|^\d+(?=[.)](\s|$))"
 )
-_FORMULA = re.compile(r"^[=+\-@\t\r]")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
@@ -241,7 +241,7 @@ def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
     """Links that save data as CSV and a table as LaTeX; the links contain the files."""
     name = re.sub(r"[^a-z0-9]+", "-", title.partition(":")[0].lower())[:80].strip("-")
     files = {
-        "CSV": ("csv", "text/csv", csv(data)),
+        "CSV": ("csv", "text/csv", numbers.csv(data, DIGITS)),
         "LaTeX": ("tex", "application/x-tex", latex(shown)),
     }
     links = [
@@ -250,15 +250,6 @@ def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:
         for kind, (suffix, media, text) in files.items()
     ]
     return f'<span class="data">Data: {" ".join(links)}</span>'
-
-
-def csv(frame: pd.DataFrame) -> str:
-    """A table in CSV; a text that a spreadsheet would take as a formula begins with an apostrophe.
-
-    A spreadsheet runs formulas when it opens a file, and they may read and send other cells.
-    """
-    safe = frame.map(lambda cell: _FORMULA.sub(r"'\g<0>", cell) if isinstance(cell, str) else cell)
-    return safe.to_csv(index=False, float_format=DIGITS.__mod__)
 
 
 def latex(frame: pd.DataFrame) -> str:

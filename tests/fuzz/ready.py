@@ -12,6 +12,8 @@ from tests.fuzz.steps import Copy
 # The names of the ready inputs.
 SCENARIO, STUDY, SELECTION, TRAINING = "sea.toml", "study.toml", "selection.toml", "training.toml"
 RESULTS, SELECTED, PAGE, POLICY = "results", "selected", "page.html", "policy"
+# A scenario with all sections, a table that it reads, a study of it, and the results of the study.
+SECTIONS, STORM, STUDIED, EXTENDED = "sections.toml", "storm.csv", "studied.toml", "extended"
 SHIPPED = ("paper.toml", "bay.toml", "sweet-spot.toml", "sensitivity.toml", "ddqn-paper.toml")
 
 _SEA = """
@@ -24,6 +26,64 @@ flying_time = [20, 30]
 charge_start = [10, 15]
 charge_complete = [40, 60]
 quota = 60
+"""
+_SECTIONS = """
+[arrivals]
+process = "continuous"
+rates = [0.1, 0.0, 0.3]
+schedule = "storm.csv"
+buffer = 5
+service = "newest"
+
+[age]
+measured = true
+reward = -0.01
+
+[charging]
+order = "lowest-battery"
+power = 15
+measured = true
+plan_waits = true
+
+[failures]
+uav_rate = 0.01
+uav_repair = 5.0
+uav_data = "lost"
+pad_rate = 0.05
+pad_repair = 4.0
+node_rate = 0.02
+node_repair = 6.0
+node_data = "lost"
+
+[wind]
+strength = 0.4
+direction = 30.0
+gusts = 0.2
+seed = 3
+
+[[fleet]]
+slots_per_cell = 2
+rate = 1.5
+
+[[fleet]]
+flying_time = 28
+quota = 50
+"""
+_STORM = """slot,factor
+5,3.0
+20,0.5
+"""
+_STUDIED = """
+description = "a small study with all sections"
+scenario = "sections.toml"
+policies = ["greedy", "age"]
+missions = 4
+seed = 7
+logged = 2
+
+[design]
+kind = "grid"
+values."failures.uav_rate" = [0.0, 0.05]
 """
 _STUDY = """
 description = "a small study"
@@ -102,6 +162,7 @@ def make(forks: Forks) -> None:
     write_texts(ready)
     _run(forks, RESULTS, "study", "run", f"../in/{STUDY}")
     _run(forks, SELECTED, "study", "run", f"../in/{SELECTION}")
+    _run(forks, EXTENDED, "study", "run", f"../in/{STUDIED}")
     _run(forks, POLICY, "train", f"../in/{TRAINING}")
     _run(forks, "pages", "report", f"../in/{RESULTS}")
     shutil.copyfile(ready / "pages" / f"study-{Path(STUDY).stem}.html", ready / PAGE)
@@ -111,6 +172,7 @@ def write_texts(ready: Path) -> None:
     """Write the scenarios, studies and configs into a new folder: small ones, and the shipped."""
     ready.mkdir(parents=True)
     texts = {SCENARIO: _SEA, STUDY: _STUDY, SELECTION: _SELECTION, TRAINING: _TRAINING}
+    texts |= {SECTIONS: _SEA + _SECTIONS, STORM: _STORM, STUDIED: _STUDIED}
     for name, text in texts.items():
         (ready / name).write_text(text, "utf-8")
     folders = {"dess": "scenarios", "analysis": "study/shipped", "policies": "ddqn/configs"}

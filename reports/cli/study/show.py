@@ -46,6 +46,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show the results of a study: means, comparisons, selections, the worst missions."""
+    from analysis import numbers
     from analysis.questions import summary
     from analysis.results.tables import load_results
     from reports.cli.study import tables as printed
@@ -61,7 +62,7 @@ def show(
     means = summary.meeting(summary.means(results), targets)
     means = summary.with_verdicts(results, means)
     if as_csv:
-        console.say(_with_values(results, means).to_csv(index=False).rstrip())
+        console.say(numbers.csv(_with_values(results, means)).rstrip())
     elif as_json:
         tables = _tables(results, means, policy, worst, folder)
         print(json.dumps(_document(results, tables, targets), indent=2))

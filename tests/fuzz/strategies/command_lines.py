@@ -11,15 +11,15 @@ from reports.cli.commands import app
 from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.steps import Copy
+from tests.fuzz.strategies.sections import FIELDS, PLAIN, odd_settings
 from tests.fuzz.strategies.values import long_texts, numbers, texts, toml_values
 
 OUTPUTS = {"--out", "--events", "--figure", "--animation", "--crate"}
 _UNUSED = {"--install-completion", "--show-completion"}  # about the shell of a user
-_FIELDS = ("uavs", "quota", "initial_data", "flying_time", "nodes", "zone", "grid", "max_slots")
 # Plain values, by the name of the option or argument.
 _PLAIN: dict[str, tuple[str, ...]] = {
-    "--scenario": ("paper", "bay", f"../in/{ready.SCENARIO}"),
-    "--set": ("uavs=2", "initial_data=[5, 20]", "pads=1", "max_slots=20"),
+    "--scenario": ("paper", "bay", f"../in/{ready.SCENARIO}", f"../in/{ready.SECTIONS}"),
+    "--set": ("uavs=2", "initial_data=[5, 20]", "pads=1", "max_slots=20", *PLAIN),
     "--policy": ("greedy", "random,nearest", f"../in/{ready.POLICY}"),
     "--missions": ("1", "2", "3"),
     "--workers": ("1",),
@@ -39,7 +39,7 @@ _PLAIN: dict[str, tuple[str, ...]] = {
     "--license": ("MIT",),
     "--page": (f"../in/{ready.PAGE}",),
     "--name": ("a",),
-    "dir": (f"../in/{ready.RESULTS}", f"../in/{ready.SELECTED}"),
+    "dir": (f"../in/{ready.RESULTS}", f"../in/{ready.SELECTED}", f"../in/{ready.EXTENDED}"),
     "page|dir": (f"../in/{ready.RESULTS}", f"../in/{ready.PAGE}"),
     "name": ("greedy", "paper", "fig4", f"../in/{ready.STUDY}"),
 }
@@ -76,6 +76,7 @@ def command_lines(draw: st.DrawFn) -> Case:
     if words == ("report",):  # it would render all reports
         arguments.append(draw(texts))
     inputs = (ready.SCENARIO, ready.STUDY, ready.RESULTS, ready.SELECTED, ready.POLICY, ready.PAGE)
+    inputs += (ready.SECTIONS, ready.STORM, ready.EXTENDED)
     steps = tuple(Copy(name, f"in/{name}") for name in inputs)
     return Case("command line", tuple(arguments), steps, lasting=2)
 
@@ -100,5 +101,6 @@ def _plain(name: str) -> tuple[str, ...]:
 def _odd(name: str) -> st.SearchStrategy[str]:
     odd = st.one_of(texts, numbers, long_texts)
     if name in ("--set", "--parameter", "--price", "--target", "--require"):
-        odd |= st.tuples(st.sampled_from(_FIELDS) | texts, toml_values).map("=".join)
+        odd |= st.tuples(st.sampled_from(FIELDS) | texts, toml_values).map("=".join)
+        odd |= odd_settings
     return st.sampled_from(_plain(name)) if name == "--results" else odd

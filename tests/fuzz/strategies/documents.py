@@ -5,10 +5,18 @@ from hypothesis import strategies as st
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
 from tests.fuzz.steps import Bytes, Copy, Lines, Write
-from tests.fuzz.strategies.values import byte_edits, long_texts, positions, texts, toml_values
+from tests.fuzz.strategies.sections import odd_settings
+from tests.fuzz.strategies.values import (
+    byte_edits,
+    long_texts,
+    numbers,
+    positions,
+    texts,
+    toml_values,
+)
 
-_SCENARIOS = (ready.SCENARIO, ready.SCENARIO, "paper.toml", "bay.toml")
-_STUDIES = (ready.STUDY, ready.STUDY, ready.SELECTION, "sweet-spot.toml", "sensitivity.toml")
+_SCENARIOS = (ready.SCENARIO, ready.SECTIONS, ready.SECTIONS, "paper.toml", "bay.toml")
+_STUDIES = (ready.STUDY, ready.STUDIED, ready.SELECTION, "sweet-spot.toml", "sensitivity.toml")
 _CONFIGS = (ready.TRAINING, ready.TRAINING, "ddqn-paper.toml")
 _STUDIES += ("screening.toml", "precise.toml")
 # Keys that no file may have, or only once.
@@ -55,11 +63,21 @@ def _lines(draw: st.DrawFn) -> Step:
     edits = []
     for _ in range(draw(st.integers(1, 3))):
         action = draw(st.sampled_from(["value", "value", "value", "line", "remove", "repeat"]))
-        new = draw(toml_values if action == "value" else _line)
+        new = draw(toml_values if action == "value" else _line | odd_settings)
         edits.append((draw(positions), action, new))
     return Lines("in/file.toml", tuple(edits))
 
 
+def _tables(path: str) -> st.SearchStrategy[Step]:
+    """Changes of a CSV table: its bytes, or one of its lines."""
+    lines = st.tuples(positions, st.just("line"), texts | numbers | _rows)
+    return st.one_of(
+        byte_edits().map(lambda edits: Bytes(path, edits)),
+        lines.map(lambda edit: Lines(path, (edit,))),
+    )
+
+
+_rows = st.tuples(numbers, numbers).map(",".join)
 _changes = st.one_of(
     _lines(),
     _lines(),
@@ -75,9 +93,10 @@ def documents(draw: st.DrawFn) -> Case:
     kind = draw(st.sampled_from([_SCENARIOS, _STUDIES, _CONFIGS]))
     copy = Copy(draw(st.sampled_from(kind)), "in/file.toml")
     change = draw(_changes)
-    sea = Copy(ready.SCENARIO, f"in/{ready.SCENARIO}")
-    table = (Copy("bay.csv", "in/bay.csv"),)
-    if draw(st.integers(0, 5)) == 0:
-        table += (Bytes("in/bay.csv", draw(byte_edits())),)
+    files = (ready.SCENARIO, ready.SECTIONS, ready.STORM, "bay.csv")
+    beside: tuple[Step, ...] = tuple(Copy(name, f"in/{name}") for name in files)
+    if draw(st.integers(0, 4)) == 0:
+        table = draw(st.sampled_from([f"in/{ready.STORM}", "in/bay.csv"]))
+        beside += (draw(_tables(table)),)
     arguments = draw(st.sampled_from(_commands(kind)))
-    return Case("document", arguments, (sea, *table, copy, change), lasting=2)
+    return Case("document", arguments, (*beside, copy, change), lasting=2)

@@ -36,6 +36,7 @@ _WRITING = (
     ("study", "run", f"../in/{ready.STUDY}", "--out", "{}"),
     ("study", "run", f"../in/{ready.STUDY}", "--out", "{}", "--missions", "7", "--accept-code"),
     ("study", "run", f"../in/{ready.SELECTION}", "--out", "{}"),
+    ("study", "run", f"../in/{ready.STUDIED}", "--out", "{}"),
 )
 _RENDERING = (
     ("report", "{}", "--out", "../out/pages"),
@@ -76,9 +77,10 @@ def _cases(commands: tuple[tuple[str, ...], ...], place: str) -> st.SearchStrate
     """A changed results folder under one of the commands."""
     folder = f"{place}/changed"
     plain = (ready.SCENARIO, ready.STUDY, ready.SELECTION, ready.RESULTS, ready.PAGE)
+    plain += (ready.SECTIONS, ready.STORM, ready.STUDIED)
     inputs = tuple(Copy(one, f"in/{one}") for one in plain)
     lines = [tuple(word.replace("{}", f"../{folder}") for word in line) for line in commands]
-    names = st.sampled_from([ready.RESULTS, ready.RESULTS, ready.SELECTED])
+    names = st.sampled_from([ready.RESULTS, ready.EXTENDED, ready.EXTENDED, ready.SELECTED])
     changes = st.lists(_changes(folder), min_size=1, max_size=2)
 
     def case(line: tuple[str, ...], name: str, changed: list[Step]) -> Case:

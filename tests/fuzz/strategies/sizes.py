@@ -27,6 +27,7 @@ def sizes(draw: st.DrawFn) -> Case:
         st.sampled_from([grid, sobol, cube])
     )
     fields = ("uavs", "grid", "max_slots", "quota", "communication_slots", "lanes", "flying_time")
+    fields += ("arrivals.buffer", "charging.power", "failures.uav_repair", "wind.strength")
     config = draw(st.sampled_from(["hidden", "replay", "num_envs", "batch", "n_step", "ticks"]))
     nodes = f"nodes=[{','.join('[1,1]' for _ in range(min(n, 20_000)))}]"
     commands = (

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.pages import render
+from reports.pages import notebook, render
 from tests.analysis.small import files_of
 
 
@@ -62,6 +62,20 @@ def test_a_notebook_that_fails_is_one_line(dess, monkeypatch, tmp_path):
     code, out, err = dess("report", tmp_path / "fleets")
     assert (code, out) == (1, "")
     assert err.splitlines()[-1].startswith("dess: error: report study-fleets: cell 3 of 9")
+
+
+def test_yes_is_for_the_notebooks_that_simulate(dess, monkeypatch):
+    given = []
+
+    def note(names, results, out, progress=None, parameters=None):
+        given.append(parameters)
+        return Path(out, "index.html")
+
+    monkeypatch.setattr(render, "render", note)
+    assert dess("report", "what-if", "--yes")[0] == dess("report", "sweep")[0] == 0
+    assert given == [{"yes": True}, {}]
+    for name in ("what-if", "sweep", "own-sea"):
+        assert notebook.read(name).parameters["yes"] is False
 
 
 def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, monkeypatch, tmp_path):

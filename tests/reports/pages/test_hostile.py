@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 from nbconvert.filters import markdown2html
 
-from analysis import run_study
+from analysis import numbers, run_study
 from analysis.figures import style
 from reports.pages import html
 from reports.pages.index import index_of, pages_in
@@ -131,7 +131,7 @@ def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
 
 def test_a_name_is_no_formula_in_a_spreadsheet() -> None:
     names = ["=1+1", "+1", "-1", "@x", "\t=1", "a=1", "a"]
-    rows = html.csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
+    rows = numbers.csv(pd.DataFrame({"policy": names, "mean": -1.5})).splitlines()[1:]
     assert [row.startswith("'") for row in rows] == [True] * 5 + [False] * 2
     assert all(row.endswith(",-1.5") for row in rows)
 

@@ -1,0 +1,47 @@
+"""Settings of the fields of scenarios, those of sections above all: plain, odd, and of no field."""
+
+from hypothesis import strategies as st
+
+from dess.scenario import EXTENSIONS, ScenarioSpace, fields_of
+from tests.fuzz.strategies.values import texts, toml_values
+
+FIELDS = (*fields_of(ScenarioSpace), *EXTENSIONS)
+# Plain settings of sections, single fields and whole tables.
+PLAIN = (
+    "age.measured=true",
+    "age={measured=true, reward=-0.1}",
+    'arrivals.process="continuous"',
+    'arrivals={process="continuous", buffer=2, service="newest", schedule=[[3, 2.0], [9, 0.0]]}',
+    "charging.measured=true",
+    'charging={order="lowest-battery", power=7, plan_waits=true}',
+    "failures.node_rate=0.2",
+    'failures={uav_rate=0.02, uav_repair=5, uav_data="lost", node_rate=0.1, node_data="lost"}',
+    "failures={pad_rate=0.3, pad_repair=2}",
+    "wind={strength=0.7, direction=225, gusts=0.3, seed=9}",
+    "fleet=[{slots_per_cell=2, rate=0.5}, {flying_time=60, quota=9}]",
+)
+# Values at the ends of what sections allow, and past them.
+_ENDS = st.sampled_from(
+    [
+        "0",
+        "1",
+        "0.0",
+        "1.0",
+        "-1e-9",
+        "1.0000001",
+        "0.5",
+        "64",
+        "65",
+        "6400",
+        "6401",
+        "1e6",
+        "360.1",
+    ]
+    + ["true", '"lost"', '"kept"', '"newest"', '"continuous"', '"lowest-battery"', "[[1, 2]]"]
+    + ["[[0, 1], [0, 2]]", "[[1.5, 1]]", "[0.1, 0.1, 0.1]", '"storm.csv"', '"/dev/zero"', "[{}]"]
+    + ["{}", "{measured=true}", "[{slots_per_cell=0}]", "[{slots_per_cell=100000}]", "[{a=1}]"]
+)
+_names = st.sampled_from(FIELDS) | st.sampled_from(EXTENSIONS).flatmap(
+    lambda section: texts.map(lambda name: f"{section}.{name}")
+)
+odd_settings = st.tuples(_names, _ENDS | toml_values).map("=".join)
