@@ -20,6 +20,9 @@ __all__ = ["Policy", "View"]
 class Policy(Protocol):
     """A policy chooses actions for many UAVs at once, and keeps no state between calls.
 
+    A slow policy may have the attribute ``chunk``: how many missions a study computes and stores
+    together at most, so that an interruption loses little.
+
     Attributes:
         name: The name under which results are stored.
     """

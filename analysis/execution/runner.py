@@ -7,10 +7,11 @@ rounds. What a round needs depends only on the missions of the rounds before.
 
 import shlex
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +30,7 @@ from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
+from policies import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
 BOUNDS_CHUNK = 5
@@ -164,13 +166,20 @@ class _Run:
         """Simulate the missing missions of a round with these parts, and the event logs."""
         self._take_over(parts)
         jobs, present = [*logs], 0
-        for chunk in split(parts, CHUNK[self.study.engine]):
+        for chunk in self._chunks(parts):
             missing = self.store.missing(chunk)
             present += chunk.missions - (missing.missions if missing else 0)
             if missing:
                 jobs.append(self._missions_job(missing))
         self._begin(parts, present)
         self._do(jobs)
+
+    def _chunks(self, parts: Sequence[Part]) -> Iterator[Chunk]:
+        """The parts, in the order of their teams, as chunks of the size that suits the team."""
+        for team, of_team in groupby(parts, lambda part: part.cell.team):
+            policies = load_team(self.study.policies[team])
+            own = (policy.chunk for policy in policies if hasattr(policy, "chunk"))
+            yield from split(of_team, min([CHUNK[self.study.engine], *own]))
 
     def _bounds(self, counts: list[int]) -> None:
         """Compute the missing bounds of as many missions of every design point."""
@@ -195,7 +204,7 @@ class _Run:
 
     def _take_over(self, parts: Sequence[Part]) -> None:
         """Copy missing missions of the parts from the other folders, as far as they have them."""
-        if self.reuse and any(map(self.store.missing, split(parts, CHUNK[self.study.engine]))):
+        if self.reuse and any(map(self.store.missing, self._chunks(parts))):
             for source in self._sources:
                 self.store.take_over(source, parts)
 

@@ -60,9 +60,10 @@ class Planner:
 
     Attributes:
         new, kept: How many edits the search tries, for a new plan and for a kept one.
+        chunk: How many missions a study computes at a time, so that an interruption loses little.
     """
 
-    name = "planner"
+    name, chunk = "planner", 10
     new, kept = 30_000, 700
 
     def act(self, view: View) -> np.ndarray:

@@ -2,17 +2,24 @@
 
 import ast
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import IPython.display
+import numpy as np
 import pytest
 
 from analysis import load_study, run_study
+from analysis.bound import Bound
 from analysis.execution import decision_time as timing
+from analysis.execution import jobs
 from analysis.verification import cross_check
+from dess.scenario import ScenarioSpace
+from policies.planner import Planner
 from reports.pages import html
 from reports.pages.notebook import Report, read
 from reports.player import library
@@ -59,6 +66,7 @@ STUDIES: dict[str, dict[str, Any]] = {
             },
         },
     },
+    "gap": {"policies": [*POLICIES, "planner"], "missions": 12, "logged": 2},
     "sensitivity": {
         "policies": ["greedy"],
         "design": {
@@ -71,13 +79,30 @@ STUDIES: dict[str, dict[str, Any]] = {
 }
 
 
+def made_up(space: ScenarioSpace, seed: int, replication: int, **_: int) -> Bound:
+    """A bound of the study gap that takes no time."""
+    prices = np.full((2, len(space.nodes)), 0.1) * (1 + np.arange(len(space.nodes)) % 4)
+    return Bound(0.97, prices, np.array([60, 120]), 1)
+
+
+@contextmanager
+def quick() -> Iterator[None]:
+    """Bounds that take no time, and planners that search little."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jobs, "upper_bound", made_up)
+        patch.setattr(Planner, "new", 500)
+        patch.setattr(Planner, "kept", 20)
+        yield
+
+
 def run_small_studies(folder: Path, *names: str) -> Path:
     """Run the studies, all or some, each into a folder of its name; with all, a timing.
 
     Beside the study verification stand missions of its cross-check, fewer than a page has.
     """
     for name in names or STUDIES:
-        study = run_study(load_study(name, **STUDIES[name]), folder / name)
+        with quick():
+            study = run_study(load_study(name, **STUDIES[name]), folder / name)
         if name == cross_check.STUDY:
             cross_check.write(cross_check.simulate_missions(study, 2), folder)
     if not names:

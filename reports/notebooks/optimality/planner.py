@@ -17,7 +17,7 @@
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders gap and timing
 planner = "planner"  # the policy that plans
-longer = "planner-long"  # the same with a longer search
+longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
 
 # %%
@@ -37,7 +37,8 @@ from reports.pages import html
 # %%
 study = load_results(Path(results) / "gap")
 times = decision_time.read(Path(results) / "timing")
-differences = questions.differences(study, [planner, longer], learner)
+planners = [name for name in (planner, longer) if name in study.policies]
+differences = questions.differences(study, planners, learner)
 gaps = gap.by_fleet(study)
 pair = head_to_head.pair_of(study, planner, learner)
 missions = head_to_head.duels(study, pair)
@@ -47,7 +48,7 @@ logged = study.manifest["study"]["logged"]
 html.say("{answer}", answer=html.composed(questions.answer(differences, planner)))
 
 # %%
-html.say("{gap}", gap=html.composed(gap.in_words(study, longer)))
+html.say("{gap}", gap=html.composed(gap.in_words(study, planners[-1])))
 
 # %% [markdown]
 # ## Differences by number of UAVs

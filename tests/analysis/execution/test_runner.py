@@ -14,6 +14,7 @@ from dess import InputError, load_scenario, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.state import END_NAMES
 from policies import load_team
+from policies.heuristics import Greedy
 from reports import cli
 from reports.cli.settings import setting
 from tests.analysis.small import environment, files_of, grid, small_study
@@ -121,6 +122,21 @@ def test_raising_the_missions_tops_up_and_lowering_loads_fewer(tmp_path):
     assert all(after[name] == before[name] for name in before if name != "manifest.json")
     lowered = run_study(few, tmp_path / "out")
     assert_same(lowered, run_study(few, tmp_path / "few"))
+
+
+def test_a_slow_policy_is_stored_in_chunks_of_its_own_size(tmp_path, monkeypatch):
+    whole = run_study(small_study(tmp_path), tmp_path / "whole")
+    monkeypatch.setattr(Greedy, "chunk", 3, raising=False)
+    parts = run_study(small_study(tmp_path), tmp_path / "parts")
+    assert_same(whole, parts)
+    counts = [
+        sorted(
+            len(pd.read_parquet(path))
+            for path in (tmp_path / "parts" / "missions" / f"policy={policy}").iterdir()
+        )
+        for policy in ("greedy", "random")
+    ]
+    assert counts == [[1, 3, 3, 3], [2, 4, 4]]
 
 
 def test_policies_and_points_can_be_added(tmp_path):

@@ -35,10 +35,11 @@ BEYOND = """[...document.querySelectorAll("main *")].filter(
 # The drawings of every page of the small results.
 FIGURES = {
     "mission": 4,
-    "performance": 8,
+    "performance": 9,
     "learning": 7 + len(trained_names()),
     "parameters": 9,
     "comparison": 8 + 4,
+    "planner": 14,
     "explorer": 3,
     "what-if": 9,
     "sweep": 3,

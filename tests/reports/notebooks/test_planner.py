@@ -1,0 +1,56 @@
+"""The page on planner and learner begins with the sentence that answers its question."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis import load_results, load_study, run_study
+from analysis.execution import decision_time
+from analysis.questions.optimality import gap, planner
+from reports.pages.notebook import read
+from tests.analysis.small import write_timing
+from tests.reports.small import quick, run_small_studies, said_by, words
+
+NAMES = {"planner": "tour", "longer": "greedy", "learner": "random"}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results")
+    study = load_study("gap", policies=[*NAMES.values()], missions=30, logged=3)
+    with quick():
+        run_study(study, folder / "gap")
+    write_timing(decision_time.measure(["greedy", "tour"], missions=1), folder / "timing")
+    return folder
+
+
+def test_it_begins_with_the_answer(results: Path) -> None:
+    text = said_by("planner", results=str(results), **NAMES)
+    study = load_results(results / "gap")
+    table = planner.differences(study, ["tour", "greedy"], "random")
+    answer = words(planner.answer(table, "tour"))
+    assert text.lstrip().startswith(answer[:60])
+    assert words(gap.in_words(study, "greedy"))[:60] in text
+    row = gap.listed(gap.by_fleet(study)).iloc[0]
+    assert row["Gap [points]"] in text
+    assert "Collected by tour: means over n = 3 missions" in text
+    assert "mission 0" in text or "mission 1" in text or "mission 2" in text
+
+
+def test_the_answer_is_the_first_cell_that_says_something() -> None:
+    shown = [cell.source for cell in read("planner").cells if cell.source.startswith("html.")]
+    assert shown[0].startswith('html.say("{answer}"')
+
+
+def test_the_performance_page_has_the_gap_where_the_study_was_run(
+    results: Path, tmp_path: Path
+) -> None:
+    run_small_studies(tmp_path, "table4", "fig4")
+    without = said_by("performance", results=str(tmp_path))
+    assert "is not known here: `dess study run gap` computes" in without
+    (tmp_path / "gap").symlink_to(results / "gap", target_is_directory=True)
+    text = said_by("performance", results=str(tmp_path))
+    study = load_results(tmp_path / "gap")
+    assert words(gap.in_words(study))[:60] in text
+    assert "Scorecard: at most so many points from the best possible" in text
+    assert gap.at_most(gap.by_fleet(study))["1 UAV"].iloc[0] in text
