@@ -78,10 +78,19 @@ def upper_bound(
     Raises:
         InputError: If the scenario has a section, or the seed or the replication is out of range.
     """
-    if scenario.is_extended:
-        raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
+    check_scenario(scenario)
     mission = _mission_of(scenario, seed, replication)
     return _improve(mission, iterations)
+
+
+def check_scenario(scenario: ScenarioSpace) -> None:
+    """Refuse a scenario whose missions have no bound.
+
+    Raises:
+        InputError: If it has a section beyond the paper.
+    """
+    if scenario.is_extended:
+        raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
 
 
 def _mission_of(scenario: ScenarioSpace, seed: int, replication: int) -> _Mission:

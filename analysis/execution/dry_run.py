@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis import numbers
+from analysis.bound import upper_bound
 from analysis.execution.effort import (
     CONFIRMED,
     FEW,
+    TRIAL_SEED,
     Clock,
     are_few,
     check_time,
@@ -18,7 +20,8 @@ from analysis.execution.effort import (
 )
 from analysis.execution.engines import simulate_missions
 from analysis.execution.reuse import sources
-from analysis.results.chunks import Chunk, check_parts, parts_of
+from analysis.results.chunks import Chunk, bound_parts, check_parts, parts_of
+from analysis.results.manifest import NO_TEAM
 from analysis.results.store import MANIFEST, Store
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
@@ -30,6 +33,7 @@ from policies import load_team
 # The memory [bytes] of a design point and of a mission, measured on studies of many of either.
 POINT_MEMORY, MISSION_MEMORY = 12_000, 1_200
 
+FEW_BOUNDS = 300  # upper bounds that need no estimate of their time
 FEW_LOGS = 1_000  # event logs that are counted as missing without a look into the folder
 
 
@@ -59,13 +63,15 @@ class Plan:
         points: Number of design points.
         at_most: Largest number of missions that a rule may ask for, over all policies; None without
             a rule.
-        seconds: Estimated time of the missing missions with all workers [s].
+        seconds: Estimated time of what is missing with all workers [s].
+        bounds: What the run would do for the upper bounds; None if the study has none.
     """
 
     policies: tuple[Planned, ...]
     points: int
     at_most: int | None
     seconds: float
+    bounds: Planned | None = None
 
     @property
     def missions(self) -> int:
@@ -106,8 +112,14 @@ def plan_study(
         seconds = missing * each
         rows.append(Planned(study.policies[team], total, total - missing, seconds))
     at_most = len(study.policies) * _budget(study) if study.rule else None
-    seconds = sum(planned.seconds for planned in rows) / workers
-    return Plan(tuple(rows), study.size, at_most, seconds)
+    bounds = None
+    if study.bounds:
+        total, missing = study.size * study.first, _missing_bounds(study, store)
+        each = _seconds_per_bound(study, clock) if missing else 0.0
+        bounds = Planned("upper bounds", total, total - missing, missing * each)
+    parts = [*rows, bounds] if bounds else rows
+    seconds = sum(planned.seconds for planned in parts) / workers
+    return Plan(tuple(rows), study.size, at_most, seconds, bounds)
 
 
 def check_effort(
@@ -142,6 +154,7 @@ def check_effort(
     teams = range(len(study.policies))
     if study.size > MANY_POINTS:
         missing, logs = [study.size * study.first for _ in teams], _logs(study)
+        bounds = _missing_bounds(study, None)
     else:
         store = Store.peek(study, out, accept_code)
         missing = [_missing(study, store, team)[0] for team in teams]
@@ -149,7 +162,7 @@ def check_effort(
             for source in sources(reuse, store.manifest):
                 store.count(source)
             missing = [_missing(study, store, team)[0] for team in teams]
-        logs = _logs(study, store)
+        logs, bounds = _logs(study, store), _missing_bounds(study, store)
     what = (
         f"study {study.name}: {'at least ' if study.rule else ''}{sum(missing):,} missions to "
         f"simulate (policies: {len(study.policies)}, design points: {study.size:,}, "
@@ -157,14 +170,17 @@ def check_effort(
     )
     if study.size > MAX_SIZE:
         raise InputError(f"{what}; allowed: {MAX_SIZE:,} design points")
-    if yes or not sum(missing) + logs:
+    if yes or not sum(missing) + logs + bounds:
         return sum(missing)
     if study.size > MANY_POINTS:
         seconds = _seconds(study, missing, logs, clock) / workers
         raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
     ends = [study.point(number).scenario for number in {0, study.size - 1}]
-    if not all(are_few(sum(missing) + logs, space) for space in ends):
-        check_time(what, _seconds(study, missing, logs, clock) / workers)
+    few = all(are_few(sum(missing) + logs, space) for space in ends)
+    seconds = 0.0 if few else _seconds(study, missing, logs, clock)
+    if bounds > FEW_BOUNDS:
+        seconds += bounds * _seconds_per_bound(study, clock)
+    check_time(what, seconds / workers)
     held = study.size * (POINT_MEMORY + study.first * len(teams) * MISSION_MEMORY)
     check_workers_memory(what, workers, ends, held)
     return sum(missing)
@@ -199,6 +215,23 @@ def _missing(study: Study, store: Store | None, team: int) -> tuple[int, int]:
     parts = parts_of(manifest, team) + check_parts(manifest, team)
     missing = store.missing(Chunk(team, tuple(parts)))
     return missing.missions if missing else 0, sum(len(part.replications) for part in parts)
+
+
+def _missing_bounds(study: Study, store: Store | None) -> int:
+    """Number of upper bounds that are missing and needed for now; all, if there is no folder."""
+    if store is None:
+        return study.size * study.first * study.bounds
+    chunk = store.bounds.missing(Chunk(NO_TEAM, tuple(bound_parts(store.manifest))))
+    return chunk.missions if chunk else 0
+
+
+def _seconds_per_bound(study: Study, clock: Clock) -> float:
+    """The time of an upper bound [s], measured on one."""
+    space = study.point(0).scenario
+    upper_bound(space, TRIAL_SEED, 0, iterations=1)  # compiles
+    begin = clock()
+    upper_bound(space, TRIAL_SEED, 0)
+    return clock() - begin
 
 
 def _budget(study: Study) -> int:

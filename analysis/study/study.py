@@ -16,6 +16,7 @@ from pydantic import (
     model_validator,
 )
 
+from analysis.bound import check_scenario
 from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
@@ -152,16 +153,23 @@ class Study(StudyData):
             )
         self._check_budget()
         self._check_teams()
+        if self.bounds:
+            for space in self._spaces:
+                check_scenario(space)
         return self
+
+    @property
+    def _spaces(self) -> list[ScenarioSpace]:
+        """The scenarios of the design points; of very many, only the first."""
+        if self.size > MANY_POINTS:
+            return [self.point(0).scenario]
+        return [point.scenario for point in self.points]
 
     def _choose_engine(self) -> None:
         """Take the SimPy engine if the study does not say which and a design point needs it."""
-        spaces = [self.point(0).scenario]
-        if self.size <= MANY_POINTS:
-            spaces = [point.scenario for point in self.points]
         asked = self.engine if "engine" in self.model_fields_set else None
         # The model is frozen, and this is a part of its making.
-        self.__dict__["engine"] = engine_of(spaces, asked)
+        self.__dict__["engine"] = engine_of(self._spaces, asked)
 
     def _check_rule(self) -> None:
         if self.precision and self.selection:

@@ -101,7 +101,7 @@ def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and an estimate of the time."""
     rows = [
         [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
-        for p in plan.policies
+        for p in (*plan.policies, *filter(None, [plan.bounds]))
     ]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
     per_cell = f"{study.first} replications"

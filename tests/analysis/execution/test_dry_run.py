@@ -134,3 +134,22 @@ def test_event_logs_take_time_too(tmp_path):
     check_effort(study, tmp_path / "out", clock=Clock(6.0), yes=True)
     few = small_study(tmp_path, missions=6000, policies=["random"])
     check_effort(few, tmp_path / "out", clock=Clock(6.0))
+
+
+def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(dry_run, "upper_bound", lambda *_, **__: None)
+    study = small_study(tmp_path, bounds=True)
+    plan = plan_study(study, tmp_path / "out", clock=Clock(60.0))
+    assert (plan.bounds.missions, plan.bounds.present, plan.bounds.seconds) == (10, 0, 600.0)
+    assert plan.seconds == pytest.approx(sum(p.seconds for p in plan.policies) + 600.0)
+    assert plan_study(small_study(tmp_path), tmp_path / "out").bounds is None
+
+
+def test_bounds_that_take_long_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(dry_run, "upper_bound", lambda *_, **__: None)
+    monkeypatch.setattr(dry_run, "FEW_BOUNDS", 9)
+    study = small_study(tmp_path, bounds=True)
+    with pytest.raises(InputError, match="about 100 minutes; allowed: --yes"):
+        check_effort(study, tmp_path / "out", clock=Clock(600.0))
+    assert check_effort(study, tmp_path / "out", clock=Clock(6.0)) == 20
+    assert check_effort(study, tmp_path / "out", clock=Clock(600.0), yes=True) == 20

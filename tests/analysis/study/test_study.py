@@ -231,3 +231,9 @@ def test_nodes_of_a_file_stay_where_they_are(tmp_path):
         study(design=grid(grid=[12, 14]))
     fixed = grid(grid=[12, 14])
     assert study(design=fixed, set={"nodes": [[1, 1]]}).points[1].scenario.nodes == ((1, 1),)
+
+
+def test_bounds_of_extended_scenarios_are_refused_before_the_run(tmp_path):
+    with pytest.raises(InputError, match="trial.toml: bound: the scenario has sections") as error:
+        small_study(tmp_path, bounds=True, set={"age.measured": True})
+    assert "\n" not in str(error.value)
