@@ -93,7 +93,7 @@ def _courses(view: View, planner: Planner) -> list[Course]:
     """The courses of a planner's present plan for the mission of a view."""
     state, rates = view.state, rates_of(view)
     mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
-    memory = memory_of(state, planner.new, planner.kept)
+    memory = memory_of(state, planner.budget)
     plan = Plan(memory.waypoints[0].copy(), memory.lengths[0].copy())
     flight = empty_flight(MOST_SLOTS, len(uavs), len(residual))
     begin(mission, uavs, residual, rates, flight)

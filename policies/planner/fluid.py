@@ -71,6 +71,9 @@ STRIDE, MOST_SLOTS = 8, 2048
 # An emptied node has data again when so much is expected to have arrived [data units]. If it had
 # some at once, UAVs would serve crumbs instead of the data of other nodes.
 _HALF_A_PACKET = 0.5
+# A communication slot in which no node has data counts toward the quota if at least so many data
+# units arrive per slot: then some node far away is likely to have got some.
+_SOME_ARRIVE = 0.1
 # Penalties [data units]: a depleted battery, and each slot that then lacks for the quota; each
 # percent of battery below the guard's reserve at the charging zone; a slot in which the guard would
 # send the UAV home; a move that a teammate blocks.
@@ -310,8 +313,7 @@ def fly(mission, rates, plan, source, first, flight, slots):
                     found = t >= node.since
                     rank += 1
                 if not found:
-                    # where data arrive, some node far away has got some
-                    v.counted += rate > 0.0
+                    v.counted += rate * mission.nodes >= _SOME_ARRIVE
                     continue
                 held, amount = node.base + rate * t, c.rate * v.rate
                 if amount < held:

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.code.kernels import kernel
+from dess.code.kernels import inlined, kernel
 from dess.observations.guard import guard, must_charge
-from dess.rules import zone_cell
-from dess.state import State
+from dess.rules import in_zone, zone_cell
+from dess.state import HOVER, State
 from dess.view import View
 from policies.heuristics import step_towards
 from policies.planner.fluid import (
@@ -32,8 +32,24 @@ from policies.planner.fluid import (
 from policies.planner.rates import rates_of
 from policies.planner.search import empty_workspace, improve
 
-# The temperature of the first step of a search [data units], for a new plan and for a kept one.
-_NEW, _KEPT = 2.0, 0.3
+# The temperature of the first step of a search [data units]: for a new plan, for a thorough search,
+# and for a short one. Every so many slots, a search is thorough.
+_NEW, _THOROUGH, _SHORT = 2.0, 1.0, 0.3
+_ROUND = 8
+
+
+class Budget(NamedTuple):
+    """How many edits of a plan a search tries.
+
+    Attributes:
+        new: For a new plan.
+        thorough: For a plan that is kept, in every eighth slot.
+        short: In each other slot.
+    """
+
+    new: int
+    thorough: int
+    short: int
 
 
 class Memory(NamedTuple):
@@ -52,19 +68,21 @@ class Memory(NamedTuple):
 
 
 # The memories by the identity of the arrays that they belong to, and the budget of the search.
-_MEMORIES: dict[tuple[int, int, int], tuple[weakref.ref, Memory]] = {}
+_MEMORIES: dict[tuple[int, Budget], tuple[weakref.ref, Memory]] = {}
 
 
 class Planner:
     """Plan for the whole team by simulated annealing in a fluid model of the mission.
 
+    The plan is improved in every slot. It works for any fleet on any sea.
+
     Attributes:
-        new, kept: How many edits the search tries, for a new plan and for a kept one.
+        budget: How long it searches.
         chunk: How many missions a study computes at a time, so that an interruption loses little.
     """
 
     name, chunk = "planner", 10
-    new, kept = 30_000, 700
+    budget = Budget(30_000, 4_000, 200)
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
@@ -72,25 +90,24 @@ class Planner:
         slots = int(state.missions["max_slots"].max())
         return _decide(
             state.missions, state.uavs, state.residual, view.world.nodes, rates_of(view),
-            memory_of(state, self.new, self.kept),
+            memory_of(state, self.budget),
             empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1]),
-            view.mission, view.uav, guard(view), self.new, self.kept,
+            view.mission, view.uav, guard(view), self.budget,
         )  # fmt: skip
 
 
 class LongPlanner(Planner):
-    """Plan as ``planner`` does, with a longer search."""
+    """Plan as ``planner`` does, with a search that is ten times as long."""
 
     name = "planner-long"
-    new, kept = 300_000, 7_000
+    budget = Budget(300_000, 40_000, 2_000)
 
 
-def memory_of(state: State, new: int, kept: int) -> Memory:
+def memory_of(state: State, budget: Budget) -> Memory:
     """The plans of the missions in a state by a planner with this budget."""
-    missions = state.missions
-    key = (id(missions), new, kept)
+    missions, shape = state.missions, state.uavs.shape
+    key = (id(missions), budget)
     if key not in _MEMORIES:
-        shape = state.uavs.shape
         memory = Memory(
             np.zeros((len(missions), 3), np.uint64),
             np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
@@ -104,7 +121,7 @@ def memory_of(state: State, new: int, kept: int) -> Memory:
 @kernel
 def _decide(
     missions, uavs, residual, nodes, rates, memory, workspace,
-    rows_mission, rows_uav, safe, new, kept,
+    rows_mission, rows_uav, safe, budget,
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
     for row in range(len(rows_mission)):
@@ -114,9 +131,11 @@ def _decide(
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
         if not is_same or made[2] != slot:
-            steps, hottest = new, _NEW
+            steps, hottest = budget.new, _NEW
             if is_same and 0 < made[2] < slot:
-                steps, hottest = kept, _KEPT
+                steps, hottest = budget.short, _SHORT
+                if mission.slot % _ROUND == 0:
+                    steps, hottest = budget.thorough, _THOROUGH
                 _take_up(mission, team, plan, memory.first[b])
             else:
                 _start(mission, team, residual[b].sum(), plan)
@@ -127,6 +146,10 @@ def _decide(
                 memory.first[b, j] = ahead.team[ahead.last[0], j]
             made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
         action = memory.first[b, i].action
+        if _must_charge_here(
+            mission, team[i], residual[b].sum(), plan.waypoints[i], plan.lengths[i]
+        ):
+            action = HOVER
         if not safe[row, action]:
             x, y, number = team[i].x, team[i].y, memory.first[b, i].next
             if number < plan.lengths[i]:
@@ -134,6 +157,20 @@ def _decide(
             action = step_towards(mission, team, i, safe[row], x, y)
         actions[row] = action
     return actions
+
+
+@inlined
+def _must_charge_here(mission, u, data, waypoints, length):
+    """Whether a UAV in the zone must charge though its plan has no charge.
+
+    The fluid model may expect that the battery suffices for the quota where the guard does not.
+    """
+    if not (u.latch and in_zone(mission, u.x, u.y) and must_charge(mission, u, data)):
+        return False
+    is_planned = False
+    for number in range(length):
+        is_planned = is_planned or waypoints[number].stay == CHARGE
+    return not is_planned
 
 
 @kernel

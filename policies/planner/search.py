@@ -36,12 +36,14 @@ from policies.planner.fluid import (
 )
 
 # The temperature [data units] falls to this in the last step.
-_COLDEST = 0.03
+_COLDEST = 0.05
 # How often each edit is tried, in percent.
-_INSERT, _REMOVE, _MOVE, _SWAP, _STAY, _TURN, _NUDGE, _REVERSE, _CHARGE = range(9)
-_KINDS = np.repeat(np.arange(9), [30, 10, 14, 8, 12, 6, 12, 4, 4])
+_INSERT, _REMOVE, _MOVE, _SWAP, _STAY, _TURN, _NUDGE, _REVERSE, _CHARGE, _CROSS = range(10)
+_KINDS = np.repeat(np.arange(10), [12, 10, 30, 10, 12, 6, 12, 4, 2, 2])
 # How often a waypoint is inserted where its detour is the shortest, in 1/65536.
-_SHORTEST = 45_000
+_SHORTEST = 30_000
+# The most waypoints that are moved together.
+_MOST_MOVED = 3
 _NO_EDIT = -1
 _LOW = np.uint64(0xFFFF)
 _HIGH = np.uint64(16)
@@ -147,12 +149,12 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     if not uavs[i].active:
         return _NO_EDIT
     length = plan.lengths[i]
-    p = _pick_low(words[1], length + (kind in (_INSERT, _CHARGE)))
+    p = _pick_low(words[1], length + (kind in (_INSERT, _CHARGE, _CROSS)))
     if kind == _INSERT:
         return _insert_node(mission, nodes, flight, plan, i, p, words)
     if kind == _CHARGE:
         return _edit_charge(mission, plan, i, p, words)
-    if length == 0:
+    if length == 0 and kind != _CROSS:
         return _NO_EDIT
     w = plan.waypoints[i, p]
     slot = w.begun
@@ -163,7 +165,7 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     elif kind == _STAY:
         if w.stay == CHARGE:
             return _NO_EDIT
-        w.stay = max(w.stay + 1 - 2 * _pick(words[2], 2), 0)
+        w.stay += 1 if w.stay == 0 or _pick(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
         x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
@@ -176,37 +178,81 @@ def _edit(mission, uavs, nodes, flight, plan, words):
             _swap(plan.waypoints[i, p], plan.waypoints[i, q])
             p, q = p + 1, q - 1
     else:
-        slot = _exchange(
-            mission, uavs, flight, plan, kind, i, p, _pick(words[2], mission.uavs), words
-        )
+        j = _pick(words[2], mission.uavs)
+        if not uavs[j].active:
+            slot = _NO_EDIT
+        elif kind == _MOVE:
+            slot = _move(flight, plan, i, p, j, words)
+        elif kind == _SWAP:
+            slot = _swap_with(plan, i, p, j, _pick(words[3], plan.lengths[j]))
+        else:
+            slot = _cross(plan, i, p, j, _pick(words[3], plan.lengths[j] + 1))
     return slot
 
 
 @kernel
-def _exchange(mission, uavs, flight, plan, kind, i, p, j, words):
-    """Move waypoint ``p`` of UAV ``i`` to UAV ``j``, or swap it with one of its."""
-    w = plan.waypoints[i, p]
-    slot, x, y, stay, turned = w.begun, w.x, w.y, w.stay, w.turned
-    is_other = j != i
-    if not uavs[j].active or (is_other and stay == CHARGE):
+def _move(flight, plan, i, p, j, words):
+    """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
+    count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
+    if plan.lengths[j] + count > MOST_WAYPOINTS:
         return _NO_EDIT
-    if kind == _MOVE:
-        if plan.lengths[j] == MOST_WAYPOINTS:
-            return _NO_EDIT
+    moved, slot, has_charge = (
+        np.empty((_MOST_MOVED, 4), np.int64),
+        plan.waypoints[i, p].begun,
+        False,
+    )
+    for number in range(count):
+        w = plan.waypoints[i, p + number]
+        moved[number, 0], moved[number, 1] = w.x, w.y
+        moved[number, 2], moved[number, 3] = w.stay, w.turned
+        has_charge = has_charge or w.stay == CHARGE
+    if has_charge and j != i:
+        return _NO_EDIT
+    for _ in range(count):
         remove(plan, i, p)
-        q = _pick(words[3], plan.lengths[j] + 1)
-        if stay != CHARGE and _pick_low(words[2], 1 << 16) < _SHORTEST:
-            q = _shortest_detour(flight, plan, j, x, y)
-        slot = min(slot, plan.waypoints[j, q].begun)
-        insert(plan, j, q, x, y, stay, turned)
-        return slot
-    if plan.lengths[j] == 0:
+    q = _pick(words[3], plan.lengths[j] + 1)
+    if not has_charge and _pick_low(words[2], 1 << 16) < _SHORTEST:
+        q = _shortest_detour(flight, plan, j, moved[0, 0], moved[0, 1])
+    if j == i and q == p:
+        return NEVER
+    slot = min(slot, plan.waypoints[j, q].begun)
+    is_reversed = words[0] & np.uint64(1) == np.uint64(1)
+    for number in range(count):
+        x, y, stay, turned = moved[number]
+        insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
+    return slot
+
+
+@kernel
+def _swap_with(plan, i, p, j, q):
+    """Swap waypoint ``p`` of UAV ``i`` with ``q`` of UAV ``j``."""
+    if q == plan.lengths[j] or (i == j and p == q):
         return _NO_EDIT
-    other = plan.waypoints[j, _pick(words[3], plan.lengths[j])]
-    if is_other and other.stay == CHARGE:
+    w, other = plan.waypoints[i, p], plan.waypoints[j, q]
+    if j != i and (w.stay == CHARGE or other.stay == CHARGE):
         return _NO_EDIT
-    slot = min(slot, other.begun)
+    slot = min(w.begun, other.begun)
     _swap(w, other)
+    return slot
+
+
+@kernel
+def _cross(plan, i, p, j, q):
+    """Swap all waypoints of UAV ``i`` from ``p`` on with those of UAV ``j`` from ``q`` on."""
+    slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
+    own, other = plan.lengths[i] - p, plan.lengths[j] - q
+    count, charges = max(own, other), 0
+    if j == i or max(p, q) + count > MOST_WAYPOINTS:
+        return _NO_EDIT
+    for number in range(own):
+        charges += plan.waypoints[i, p + number].stay == CHARGE
+    for number in range(other):
+        charges -= plan.waypoints[j, q + number].stay == CHARGE
+    if charges != 0:
+        return _NO_EDIT
+    for number in range(count):
+        _swap(plan.waypoints[i, p + number], plan.waypoints[j, q + number])
+    plan.lengths[i], plan.lengths[j] = p + other, q + own
     return slot
 
 
