@@ -82,7 +82,7 @@ class Planner:
     """
 
     name, chunk = "planner", 10
-    budget = Budget(30_000, 4_000, 200)
+    budget = Budget(40_000, 4_000, 100)
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
@@ -97,10 +97,10 @@ class Planner:
 
 
 class LongPlanner(Planner):
-    """Plan as ``planner`` does, with a search that is ten times as long."""
+    """Plan as ``planner`` does, with a search that is six times as long."""
 
     name = "planner-long"
-    budget = Budget(300_000, 40_000, 2_000)
+    budget = Budget(240_000, 24_000, 600)
 
 
 def memory_of(state: State, budget: Budget) -> Memory:

