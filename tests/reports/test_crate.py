@@ -18,6 +18,7 @@ from analysis.results.tables import Results
 from dess import InputError
 from reports.crate import licence_of, write_crate
 from tests.analysis.small import files_of, grid, small_study
+from tests.reports.small import quick
 
 DAY = date(2026, 3, 14)
 STUDIES = {
@@ -37,12 +38,14 @@ STUDIES = {
         "costs": {"uav": 3, "pad": 1},
         "design": grid(uavs=[1, 2]),
     },
+    "bounds": {"bounds": True, "missions": 6},
     "costs": {"costs": {"uav": 3, "currency": "EUR"}, "set": {"arrival_rate": 0.01}},
 }
 
 
 def results_of(folder: Path, name: str = "plain") -> Results:
-    run_study(small_study(folder, **STUDIES[name]), folder / "out")
+    with quick():
+        run_study(small_study(folder, **STUDIES[name]), folder / "out")
     return load_results(folder / "out")
 
 
@@ -73,6 +76,7 @@ def test_what_is_unpacked_is_the_study(name, tmp_path):
         assert getattr(there, table).equals(getattr(results, table))
     assert there.manifest == results.manifest
     assert len(there.store.logged) == len(results.store.logged)
+    assert there.bounds.keys() == results.bounds.keys()
     again = Manifest.of(load_study(tmp_path / "unpacked" / "study.toml"))
     made = results.store.manifest
     assert again.scenario == made.scenario

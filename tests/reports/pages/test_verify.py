@@ -3,24 +3,29 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 
 from analysis import load_study, run_study
+from analysis.bound import Bound
 from analysis.results.evidence import Evidence, learned_files
 from analysis.results.tables import load_results
 from dess import InputError
 from policies.registry import TRAINED
 from reports.cli import main
-from reports.pages import html
+from reports.pages import html, verify
 from reports.pages.html import STUDY, embedded
 from reports.pages.index import index_of, pages_in
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import render
 from reports.pages.verify import check_records, sealed, verify_page, verify_results
+from tests.analysis.small import small_study
+from tests.reports.small import made_up, quick
 
 ALL = 10**6
 
@@ -283,3 +288,22 @@ def test_what_is_neither_a_page_nor_results_is_refused(
         captured = capsys.readouterr()
         assert captured.out == "" and captured.err.count("\n") == 1
         assert message in captured.err and "allowed: " in captured.err
+
+
+def test_forged_bounds_are_found_by_computing_them_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with quick():
+        run_study(small_study(tmp_path, bounds=True, missions=6), tmp_path / "out")
+    monkeypatch.setattr(verify, "upper_bound", made_up)
+    checks = verify_results(tmp_path / "out", ALL, 0)
+    assert [check.what for check in checks] == ["trial", "trial, bounds"]
+    assert (checks[1].compared, checks[1].differing) == (verify.BOUNDS_CHECKED, [])
+
+    def lower(*mission: Any) -> Bound:
+        return replace(made_up(*mission), ratio=0.5)
+
+    monkeypatch.setattr(verify, "upper_bound", lower)
+    lines = lines_of(tmp_path / "out")
+    assert len(lines) == verify.BOUNDS_CHECKED
+    assert lines[0].endswith("is 0.97, and 0.5 when computed again")
