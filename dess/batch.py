@@ -23,6 +23,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sections.section import is_extended
 from dess.state import (
     check_seed,
     constants_of,
@@ -144,7 +145,7 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
         way_home = (s.zone, *s.wind.model_dump().values()) if s.wind.is_on or speeds else ()
-        return (s.grid, s.communication_slots, channel, s.nodes, speeds, way_home)
+        return (s.is_extended, s.grid, s.communication_slots, channel, s.nodes, speeds, way_home)
 
     ordered = sorted(range(len(spaces)), key=key)
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
@@ -164,7 +165,7 @@ class _Batch:
     def run(self, jobs, which, numbers, records, progress, stop) -> None:
         """Simulate the missions ``jobs`` and write their records, until ``stop`` is set."""
         size, nodes = min(self.batch_size, len(jobs)), len(self.world.nodes)
-        state = empty_state(size, self.uavs, nodes, self.lengths)
+        state = empty_state(size, self.uavs, nodes, self.lengths, self.constants.dtype)
         scratch = empty_scratch(self.uavs, nodes)
         job_of = np.full(size, -1)
         queue = np.array([0, 0])  # next job, jobs done
@@ -219,7 +220,7 @@ def _advance(job_of, queue, source, state, world, scratch, records):
         if mission.active == 0:
             job = job_of[b]
             write_record(mission, team, data, records.missions[job], records.uavs[job])
-            if mission.is_extended:
+            if is_extended(mission):
                 write_operations(mission, team, sensors[b], teeth[b], records.operations[job])
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

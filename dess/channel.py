@@ -138,7 +138,7 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
 @inlined
 def open_group(mission, i, u, nodes, mean_snr, order, means, search):
     """Begin a group of communication slots for UAV ``i``, without drawing any shadowing."""
-    row = ((fleet.leg(u) * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
+    row = ((fleet.leg(mission, u) * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
     search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
     if order[row, mission.nodes] == 0:
         _fill_row(u, row, nodes, mean_snr, order, means)

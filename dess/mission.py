@@ -110,13 +110,13 @@ class MissionModel:
         replication: int,
         log: EventLog | None,
     ):
+        self.is_extended = scenario.is_extended
         self.team, self.log, self.world = team, log, world_of(scenario)
-        self.state = empty_state(
-            1, scenario.uavs[1], len(scenario.nodes), teeth_lengths([scenario])
-        )
+        constants, lengths = constants_of(scenario), teeth_lengths([scenario])
+        self.state = empty_state(1, scenario.uavs[1], len(scenario.nodes), lengths, constants.dtype)
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.arrivals = np.zeros(len(scenario.nodes), np.int64)
-        self.state.missions[:] = constants_of(scenario)
+        self.state.missions[:] = constants
         self.state.missions["seed"] = seed
         self.state.missions["replication"] = replication
         self.mission = self.state.missions[0]
@@ -139,11 +139,10 @@ class MissionModel:
             self.env.process(self._arrivals(self.packets))
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
-        is_extended = bool(self.mission["is_extended"])
-        records = empty_records(1, len(self.fleet), is_extended)
+        records = empty_records(1, len(self.fleet), self.is_extended)
         write_record(self.mission, self.uavs, self.residual, records.missions[0], records.uavs[0])
         operations = None
-        if is_extended:
+        if self.is_extended:
             operations = records.operations[0]
             write_operations(self.mission, self.uavs, self.sensors, self.teeth, operations)
             if self.packets is not None:

@@ -22,6 +22,7 @@ from dess.code.kernels import inlined, kernel
 from dess.sections import age, fleet, wind
 from dess.sections.charging import is_before, request_pad, share_power
 from dess.sections.failures import strike, take_pad, working_pads
+from dess.sections.section import is_extended
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -150,13 +151,13 @@ def resolve(mission, uavs):
     count = mission.uavs
     for i in range(count):
         u = uavs[i]
-        if u.active and fleet.continue_move(u):
+        if u.active and fleet.continue_move(mission, u):
             continue
         u.from_x, u.from_y = u.x, u.y
         u.overruled = False
         if not u.active:
             continue
-        if u.charging or u.grounded:
+        if u.charging or is_grounded(mission, u):
             u.action = HOVER
         u.executed = u.action
         u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
@@ -173,7 +174,7 @@ def resolve(mission, uavs):
         # Mark all collisions first, then cancel, so that the order of the UAVs does not matter.
         for i in range(count):
             u = uavs[i]
-            if u.active and u.executed != HOVER and fleet.begins_move(u):
+            if u.active and u.executed != HOVER and fleet.begins_move(mission, u):
                 for j in range(count):
                     if j != i and uavs[j].active and _collide(mission, u, uavs[j]):
                         if not u.overruled:
@@ -210,15 +211,21 @@ def _cancel(u):
 
 
 @inlined
-def flies(u):
-    """Whether a UAV is in the air: it is active and neither charges nor is grounded."""
-    return u.active and not u.charging and not u.grounded
+def is_grounded(mission, u):
+    """Whether a UAV is under repair."""
+    return is_extended(mission) and u.grounded
 
 
 @inlined
-def may_act(u):
+def flies(mission, u):
+    """Whether a UAV is in the air: it is active and neither charges nor is grounded."""
+    return u.active and not u.charging and not is_grounded(mission, u)
+
+
+@inlined
+def may_act(mission, u):
     """Whether a UAV is asked for an action: it flies, and is not in the middle of a move."""
-    return flies(u) and u.slots_left == 0
+    return flies(mission, u) and (not is_extended(mission) or u.slots_left == 0)
 
 
 @inlined
@@ -228,7 +235,7 @@ def may_charge(mission, u):
     The UAV flies, is in the zone, has its charging latch set, and its policy chose Hover. A move
     that the safety controller turned into Hover does not start charging.
     """
-    is_ready = u.active and not u.grounded and u.latch
+    is_ready = u.active and not is_grounded(mission, u) and u.latch
     return is_ready and u.action == HOVER and in_zone(mission, u.x, u.y)
 
 
@@ -240,7 +247,9 @@ def grant_pads(mission, uavs):
     requests a pad or stays in the queue. A UAV that no longer meets it leaves the queue. A UAV that
     has a pad keeps it until it is charged.
     """
-    free = working_pads(mission) if mission.has_failures else mission.pads
+    free = mission.pads
+    if is_extended(mission):
+        free = working_pads(mission)
     waiting = 0
     for i in range(mission.uavs):
         u = uavs[i]
@@ -265,7 +274,7 @@ def grant_pads(mission, uavs):
 @inlined
 def start_charging(mission, uavs, i):
     """Give a free pad to UAV ``i``."""
-    if mission.has_failures:
+    if is_extended(mission) and mission.has_failures:
         take_pad(mission, uavs, uavs[i])
     uavs[i].charging = True
 
@@ -273,21 +282,22 @@ def start_charging(mission, uavs, i):
 @inlined
 def spend(mission, uavs):
     """Update the batteries for one slot (eq. 8): charging UAVs gain, flying UAVs lose."""
-    if mission.power > 0:
+    limited = is_extended(mission) and mission.power > 0
+    if limited:
         share_power(mission, uavs)
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
             continue
         if u.charging:
-            if mission.power == 0:
+            if not limited:
                 u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
             u.slots_charging += 1
-        elif u.grounded:
+        elif is_grounded(mission, u):
             mission.slots_grounded += 1
         else:
             u.battery -= mission.flight_cost
-            if mission.wind_most > 0:
+            if is_extended(mission) and mission.wind_most > 0:
                 _spend_against_wind(mission, u)
             u.slots_flying += 1
             if u.pad_request >= 0:
@@ -298,7 +308,7 @@ def spend(mission, uavs):
 @inlined
 def _spend_against_wind(mission, u):
     """Take the surcharge of a move, in its first slot; a battery is never below 0."""
-    if fleet.begins_move(u):
+    if fleet.begins_move(mission, u):
         extra = wind.move_surcharge(mission, u.x - u.from_x, u.y - u.from_y, u.x, u.y)
         u.battery = max(u.battery - mission.flight_cost * extra, 0)
 
@@ -316,16 +326,19 @@ def communicate(
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
-        if not u.active or u.charging or u.grounded:  # faster here than a call of ``flies``
+        if not flies(mission, u):
             continue
-        if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
+        if (n - 1) % channel.GROUP == 0 or (is_extended(mission) and mission.continuous != 0):
             channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
-        amount = min(channel.rate(mission, snr) * u.rate, residual[node])
+        rate = channel.rate(mission, snr)
+        if is_extended(mission):
+            rate *= u.rate
+        amount = min(rate, residual[node])
         residual[node] -= amount
-        if residual[node] == 0.0 and mission.continuous == 0:
+        if residual[node] == 0.0:
             age.empty(mission, sensors[node], teeth, n)
         u.served = node
         u.amount = amount
@@ -344,7 +357,9 @@ def arrive(mission, residual, arrivals):
         residual: (K,) residual data [data units], increased.
         arrivals: (K,) new data of the slot [data units], overwritten.
     """
-    if mission.continuous != 0:  # then they are events of their own (dess.sections.packets)
+    if (
+        is_extended(mission) and mission.continuous != 0
+    ):  # then they are events of their own (dess.sections.packets)
         return
     probability_of_none = math.exp(-mission.arrival_rate)
     for k in range(0, mission.nodes, 4):
@@ -379,7 +394,7 @@ def reward_terms(mission, u, charged):
         mission.reward_charging if charged else 0.0,
         mission.reward_quota if u.end == QUOTA else 0.0,
         mission.reward_depleted if u.end == BATTERY else 0.0,
-        mission.age_reward * age.mean_age(mission),
+        mission.age_reward * age.mean_age(mission) if is_extended(mission) else 0.0,
     )
 
 
@@ -427,5 +442,5 @@ def advance(
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)
-    if mission.has_failures:
+    if is_extended(mission) and mission.has_failures:
         strike(mission, uavs, residual, sensors, LOST)

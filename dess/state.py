@@ -108,7 +108,15 @@ MISSION = np.dtype(
         ("slots_grounded", np.int64),  # of UAVs under repair
         ("pad_requests", np.int64),  # how often UAVs have asked for a pad
         ("pads_out", np.int8, MOST_PADS),  # 1 for a pad out of order
-    ]
+    ],
+    align=True,
+)
+
+# The same for scenarios without sections. It differs in the name of a field only, which tells the
+# compiler to leave out the code of the sections (``dess.sections.section.is_extended``).
+PLAIN_MISSION = np.dtype(
+    [("is_plain", *field[1:]) if field[0] == "is_extended" else field for field in MISSION.descr],
+    align=True,
 )
 
 # One UAV: its state and the outcome of the present slot.
@@ -179,13 +187,16 @@ class State(NamedTuple):
     teeth: np.ndarray
 
 
-def empty_state(missions: int, uavs: int, nodes: int, lengths: int = 0) -> State:
+def empty_state(
+    missions: int, uavs: int, nodes: int, lengths: int = 0, kind: np.dtype = MISSION
+) -> State:
     """A state filled with zeros, for that many missions, UAVs per mission and nodes.
 
-    ``lengths`` is the number of lengths that the teeth of ages can have (``teeth_lengths``).
+    ``lengths`` is the number of lengths that the teeth of ages can have (``teeth_lengths``), and
+    ``kind`` is ``MISSION``, or ``PLAIN_MISSION`` for scenarios without sections.
     """
     return State(
-        np.zeros(missions, MISSION),
+        np.zeros(missions, kind),
         np.zeros((missions, uavs), UAV),
         np.zeros((missions, nodes)),
         np.zeros((missions, nodes), SENSOR),
@@ -200,7 +211,7 @@ def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
-    """A (1,) ``MISSION`` array with the constants of a scenario.
+    """A (1,) array with the constants of a scenario: ``MISSION``, or ``PLAIN_MISSION`` if it is one.
 
     Sampled parameters have the low end of their range; ``draw_parameters`` overwrites them.
     """
@@ -234,7 +245,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         if isinstance(section, Section):
             for field, value in section.constants().items():
                 mission[field] = value
-    return mission
+    return mission if scenario.is_extended else mission.view(PLAIN_MISSION)
 
 
 def ranges_of(scenario: ScenarioSpace) -> np.ndarray:

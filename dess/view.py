@@ -97,7 +97,7 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
         b, i = rows_mission[row], rows_uav[row]
         u = uavs[b, i]
         legal[row, HOVER] = True
-        if i >= 0 and may_act(u):
+        if i >= 0 and may_act(missions[b], u):
             for action in range(4):
                 x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
                 legal[row, action] = on_grid(missions[b], x, y)
@@ -118,7 +118,7 @@ def acting_rows(missions, uavs, policies, number):
     for b in range(len(missions)):
         if missions[b].active > 0:
             for i in range(number, missions[b].uavs, policies):
-                if may_act(uavs[b, i]):
+                if may_act(missions[b], uavs[b, i]):
                     rows_mission[count] = b
                     rows_uav[count] = i
                     count += 1

@@ -240,7 +240,7 @@ def _slots(u, x, y):
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
-        if j != i and flies(o):
+        if j != i and flies(mission, o):
             other = _slots(o, x, y)
             if other < slots or (other == slots and j < i):
                 return True

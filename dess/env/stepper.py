@@ -16,6 +16,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_operations, write_record
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sections.section import is_extended
 from dess.state import (
     ACTION_NAMES,
     TRUNCATED,
@@ -91,7 +92,8 @@ class MissionStepper:
         fleet, nodes = self.space.uavs[1], len(self.space.nodes)
         self.world, self._ranges = world_of(self.space), ranges_of(self.space)
         self._constants, self._types = constants_of(self.space), types_of(self.space)
-        self.state = empty_state(num_envs, fleet, nodes, teeth_lengths([self.space]))
+        lengths, kind = teeth_lengths([self.space]), self._constants.dtype
+        self.state = empty_state(num_envs, fleet, nodes, lengths, kind)
         self._scratch = empty_scratch(fleet, nodes)
         self.start_at(seed, 0)
 
@@ -147,8 +149,8 @@ class MissionStepper:
 
     def records(self, environments: np.ndarray) -> Records:
         """The records of the missions in these environments, up to the present slot."""
-        fleet, is_extended = self.state.uavs.shape[1], self.space.is_extended
-        records = empty_records(len(environments), fleet, is_extended)
+        fleet = self.state.uavs.shape[1]
+        records = empty_records(len(environments), fleet, self.space.is_extended)
         _record(environments, self.state, records)
         return records
 
@@ -176,7 +178,7 @@ def _record(environments, state, records):
             state.missions[b], state.uavs[b], state.residual[b],
             records.missions[row], records.uavs[row],
         )  # fmt: skip
-        if state.missions[b].is_extended:
+        if is_extended(state.missions[b]):
             write_operations(
                 state.missions[b], state.uavs[b], state.sensors[b], state.teeth[b],
                 records.operations[row],

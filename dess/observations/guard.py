@@ -13,8 +13,9 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
-from dess.rules import flies, in_zone, on_grid, zone_cell, zone_number
+from dess.rules import flies, in_zone, is_grounded, on_grid, zone_cell, zone_number
 from dess.sections.failures import working_pads
+from dess.sections.section import is_extended
 from dess.sections.wind import move_surcharge
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
@@ -49,6 +50,8 @@ def must_charge(mission, u, data):
     # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
+    if not is_extended(mission):
+        return u.battery < mission.flight_cost * needed
     if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and working_pads(mission) == 0:
         return False
     moves = (needed + u.slots_per_cell - 1) // u.slots_per_cell
@@ -58,7 +61,7 @@ def must_charge(mission, u, data):
 @inlined
 def is_parked(mission, u):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
-    return u.active and (u.grounded or (u.latch and in_zone(mission, u.x, u.y)))
+    return u.active and (is_grounded(mission, u) or (u.latch and in_zone(mission, u.x, u.y)))
 
 
 @inlined
@@ -149,6 +152,8 @@ def margin(mission, u):
 
     A detour goes forth and back, so the wind costs the most in one direction only.
     """
+    if not is_extended(mission):
+        return (mission.active - 1) * MARGIN_PER_TEAMMATE
     return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
 
 
@@ -167,14 +172,16 @@ def waiting_time(mission, uavs, i):
         i: Index of the UAV.
     """
     u = uavs[i]
-    if not (mission.plans_waits or mission.pad_rate > 0.0) or u.pad_request >= 0:
+    if not is_extended(mission) or u.pad_request >= 0:
+        return 0
+    if not (mission.plans_waits or mission.pad_rate > 0.0):
         return 0
     ahead = lacking = 0
     for j in range(mission.uavs):
         o = uavs[j]
         has_asked = o.active and o.pad_request >= 0
         is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
-        must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
+        must = flies(mission, o) and o.battery < mission.flight_cost * slots_needed(mission, o)
         if j != i and (has_asked or (must and is_lower)):
             ahead += 1
             lacking += mission.charge_complete - min(o.battery, mission.charge_start)
@@ -198,7 +205,7 @@ def battery_home(mission, u, slots, reach):
         reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
             in it; if the parking cell is farther, each further cell may cost the most.
     """
-    if reach.size == 0:
+    if not is_extended(mission) or reach.size == 0:
         return slots
     return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, slots)
 
@@ -218,7 +225,7 @@ def round_trip(mission, u, x, y, home_x, home_y, reach):
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
     """
     cells = abs(u.x - x) + abs(u.y - y)
-    if reach.size == 0:
+    if not is_extended(mission) or reach.size == 0:
         return cells + abs(home_x - x) + abs(home_y - y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
     return cells * u.slots_per_cell + int(against) + reach[u.slots_per_cell - 1, y, x]
@@ -279,7 +286,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
         contested[action] = contest(mission, uavs, i, x, y)
         safe[action] = on_grid(mission, x, y) and contested[action] < 3
         if safe[action] and charge:
-            if reach.size == 0:
+            if not is_extended(mission) or reach.size == 0:
                 needed = 1 + path_length(mission, uavs, i, x, y, home_x, home_y)
             else:
                 needed = _needed(mission, uavs, i, action, x, y, home_x, home_y, reach)

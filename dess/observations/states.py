@@ -119,7 +119,7 @@ def _fill(missions, uavs, residual, guarded, reach, out):
             row[MUST_CHARGE] = must_charge(mission, u, data)
             home_x, home_y, slots = parking_cell(mission, team, i, taken)
             row[HOME] = min(battery_home(mission, u, slots, reach), _MOST)
-            if may_act(u):
+            if may_act(mission, u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
                     safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)

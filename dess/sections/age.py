@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Number, Section
+from dess.sections.section import Number, Section, is_extended
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
 # teeth of each mission by their length, in an array with an entry per communication slot.
@@ -45,9 +45,12 @@ def empty(mission, sensor, teeth, n):
         n: Communication slot, 1..m.
     """
     now = mission.slot + n / mission.communication_slots
-    if mission.age_measured != 0:
-        teeth[_length(mission, sensor, now)] += 1
-    mission.newest += now - sensor.newest
+    if is_extended(mission):
+        if mission.continuous != 0:  # then the packets have times
+            return
+        if mission.age_measured != 0:
+            teeth[_length(mission, sensor, now)] += 1
+        mission.newest += now - sensor.newest
     sensor.newest = now
 
 

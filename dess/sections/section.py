@@ -2,6 +2,7 @@
 
 from typing import Annotated, Any, Self
 
+from numba.extending import overload
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 # A strict integer: 2.0, true and "2" are refused.
@@ -44,3 +45,19 @@ class Section(BaseModel):
     def off(cls) -> Self:
         """The section with all fields at their defaults."""
         return cls.model_validate({})
+
+
+def is_extended(mission: Any) -> bool:
+    """Whether a section of the scenario of a ``MISSION`` record is on; for compiled code.
+
+    Of a record without this field, the compiler knows that none is: it leaves out the code of the
+    sections, which would make the mission slots of all other scenarios slower.
+    """
+    return bool(mission["is_extended"])
+
+
+@overload(is_extended, jit_options={"forceinline": True})
+def _is_extended(mission):
+    if "is_extended" in mission.fields:
+        return lambda mission: mission.is_extended != 0
+    return lambda mission: False
