@@ -59,12 +59,12 @@ def _count(
         rules.resolve(mission, uavs)
         rules.grant_pads(mission, uavs)
         rules.spend(mission, uavs)
+        channel.open_slot(mission, uavs, nodes, mean_snr, order, means, search)
         needed = np.zeros((mission.uavs, len(nodes)), np.bool_)
         for n in range(1, mission.communication_slots + 1):
             before = residual.copy()
             rules.communicate(
-                mission, uavs, residual, sensors, teeth,
-                nodes, mean_snr, order, means, batches, search, n,
+                mission, uavs, residual, sensors, teeth, order, means, batches, search, n
             )  # fmt: skip
             for i in range(mission.uavs):
                 if not uavs[i].active or uavs[i].charging or uavs[i].served < 0:

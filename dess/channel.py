@@ -136,12 +136,22 @@ def _fill_row(u, row, nodes, mean_snr, order, means):
 
 
 @inlined
-def open_group(mission, i, u, nodes, mean_snr, order, means, search):
+def open_slot(mission, uavs, nodes, mean_snr, order, means, search):
+    """Begin a mission slot: find the rows of the UAVs' steps, and fill them where they are new."""
+    for i in range(mission.uavs):
+        u = uavs[i]
+        if u.active:
+            leg = fleet.leg(mission, u)
+            row = ((leg * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
+            search[i, ROW] = row
+            if order[row, mission.nodes] == 0:
+                _fill_row(u, row, nodes, mean_snr, order, means)
+
+
+@inlined
+def open_group(i, search):
     """Begin a group of communication slots for UAV ``i``, without drawing any shadowing."""
-    row = ((fleet.leg(mission, u) * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
-    search[i, DRAWN], search[i, RANK], search[i, ROW] = 0, 0, row
-    if order[row, mission.nodes] == 0:
-        _fill_row(u, row, nodes, mean_snr, order, means)
+    search[i, DRAWN], search[i, RANK] = 0, 0
 
 
 @inlined
@@ -157,7 +167,8 @@ def best_node(mission, i, residual, order, means, batches, search, n):
         i: Index of the UAV.
         residual: (K,) residual data [data units].
         order, means: As in ``World``.
-        batches, search: As in ``Scratch``; ``open_group`` must have begun the group of slot ``n``.
+        batches, search: As in ``Scratch``; ``open_slot`` and ``open_group`` must have begun the
+            mission slot and the group of slot ``n``.
         n: Communication slot, 1..m.
     """
     group, word = (n - 1) // GROUP, (n - 1) % GROUP

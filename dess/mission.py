@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 import simpy
 
-from dess import rules
+from dess import channel, rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.record import (
@@ -317,9 +317,11 @@ def _spend(missions, uavs):
 def _communicate(
     missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n
 ):  # fmt: skip
+    if n == 1:
+        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, search)
     rules.communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
-        nodes, mean_snr, order, means, batches, search, n,
+        order, means, batches, search, n,
     )  # fmt: skip
 
 
@@ -328,9 +330,11 @@ def _communicate_packets(
     missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n,
     packets, queues, delivered, counts, newest_first,
 ):  # fmt: skip
+    if n == 1:
+        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, search)
     rules.communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
-        nodes, mean_snr, order, means, batches, search, n,
+        order, means, batches, search, n,
     )  # fmt: skip
     deliver(missions, uavs, residual, sensors, n, packets, queues, delivered, counts, newest_first)
 

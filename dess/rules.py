@@ -7,6 +7,7 @@ The batch engine runs a slot in the order of Section III-C (see ``advance``):
     resolve(mission, uavs)               # moves, safety controller
     grant_pads(mission, uavs)            # the SimPy engine has a simpy.Resource instead
     spend(mission, uavs)                 # energy
+    channel.open_slot(mission, uavs, ...)
     communicate(mission, uavs, ..., n)   # for each communication slot n = 1..m
     arrive(mission, residual, arrivals)  # new data
     settle(mission, uavs)                # rewards, operational status
@@ -315,13 +316,14 @@ def _spend_against_wind(mission, u):
 
 @inlined
 def communicate(
-    mission, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n
+    mission, uavs, residual, sensors, teeth, order, means, batches, search, n
 ):  # fmt: skip
     """Run communication slot ``n`` = 1..m: each flying UAV serves its best node (eq. 9-11).
 
     UAVs are served in index order; each takes ``min(R, D_k)`` of the node with the highest SNR
     among those with residual data, the lowest index on a tie. ``served`` and ``amount`` of each
-    UAV are set. The arguments after ``teeth`` are the arrays of ``World`` and ``Scratch``.
+    UAV are set. The arguments after ``teeth`` are arrays of ``World`` and ``Scratch``;
+    ``channel.open_slot`` must have begun the mission slot.
     """
     for i in range(mission.uavs):
         u = uavs[i]
@@ -329,7 +331,7 @@ def communicate(
         if not flies(mission, u):
             continue
         if (n - 1) % channel.GROUP == 0 or (is_extended(mission) and mission.continuous != 0):
-            channel.open_group(mission, i, u, nodes, mean_snr, order, means, search)
+            channel.open_group(i, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
@@ -426,7 +428,7 @@ def settle(mission, uavs):
         _update_latch(mission, u)
 
 
-@kernel
+@inlined
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
     nodes, mean_snr, order, means, batches, search,
@@ -435,10 +437,10 @@ def advance(
     resolve(mission, uavs)
     grant_pads(mission, uavs)
     spend(mission, uavs)
+    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, search)
     for n in range(1, mission.communication_slots + 1):
         communicate(
-            mission, uavs, residual, sensors, teeth,
-            nodes, mean_snr, order, means, batches, search, n,
+            mission, uavs, residual, sensors, teeth, order, means, batches, search, n,
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)

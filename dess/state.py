@@ -211,7 +211,7 @@ def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
 
 
 def constants_of(scenario: ScenarioSpace) -> np.ndarray:
-    """A (1,) array with the constants of a scenario: ``MISSION``, or ``PLAIN_MISSION`` if it is one.
+    """The constants of a scenario: (1,) ``MISSION``, or ``PLAIN_MISSION`` if it has no sections.
 
     Sampled parameters have the low end of their range; ``draw_parameters`` overwrites them.
     """

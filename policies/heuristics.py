@@ -122,25 +122,38 @@ def _decide(
     actions = np.empty(len(rows_mission), np.int64)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
     safe = np.empty(5, np.bool_)
+    ages = np.empty(len(nodes))
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
-        mission, team, data = missions[b], uavs[b], residual[b]
-        u = team[i]
-        charge = kind != _UNGUARDED and must_charge(mission, u, data.sum())
-        home_x, home_y = u.x, u.y
-        if charge:
-            home_x, home_y, _ = parking_cell(mission, team, i, taken)
-        safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
-        if kind in (_RANDOM, _UNGUARDED):
-            actions[row] = _random_action(mission, team, i, safe)
-            continue
-        node = _goal(
-            kind, mission, team, i, data, sensors[b], nodes, circuit, charge, home_x, home_y, reach
+        actions[row] = _action(
+            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, reach,
+            taken, safe, ages,
         )  # fmt: skip
-        if node >= 0:
-            home_x, home_y = nodes[node, 0], nodes[node, 1]
-        actions[row] = step_towards(mission, team, i, safe, home_x, home_y)
     return actions
+
+
+@inlined
+def _action(
+    kind, mission, team, i, data, sensors, nodes, circuit, reach, taken, safe, ages
+):  # fmt: skip
+    """The action of UAV ``i``; ``taken``, ``safe`` and ``ages`` are working memory."""
+    u = team[i]
+    charge = kind != _UNGUARDED and must_charge(mission, u, data.sum())
+    home_x, home_y = u.x, u.y
+    if charge:
+        home_x, home_y, _ = parking_cell(mission, team, i, taken)
+    safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
+    if kind in (_RANDOM, _UNGUARDED):
+        return _random_action(mission, team, i, safe)
+    if kind == _AGE:
+        for k in range(len(nodes)):  # at the end of this slot
+            age = mission.slot + 1 - sensors[k].newest
+            ages[k] = age if data[k] > 0.0 else 0.0
+        data = ages
+    node = _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y, reach)
+    if node >= 0:
+        home_x, home_y = nodes[node, 0], nodes[node, 1]
+    return step_towards(mission, team, i, safe, home_x, home_y)
 
 
 @kernel
@@ -180,9 +193,12 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
+    kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y, reach
 ):  # fmt: skip
-    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
+    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none.
+
+    ``data`` are the residual data of the nodes; for ``age``, the ages of the nodes with data.
+    """
     u = team[i]
     spare = slots_needed(mission, u)
     if charge:
@@ -202,7 +218,7 @@ def _goal(
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == _AGE:
-            score = _staleness(mission, data, sensors, nodes, k, slots)
+            score = _staleness(data, nodes, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, x, y, slots):
@@ -215,14 +231,13 @@ def _goal(
 
 
 @inlined
-def _staleness(mission, data, sensors, nodes, k, slots):
+def _staleness(ages, nodes, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
     here = beyond = 0.0
-    for other in range(mission.nodes):
-        if data[other] > 0.0:
+    for other in range(len(nodes)):
+        if ages[other] > 0.0:
             further = abs(nodes[k, 0] - nodes[other, 0]) + abs(nodes[k, 1] - nodes[other, 1])
-            age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
-            score = age / (slots + further + _SLOTS_AT_NODE)
+            score = ages[other] / (slots + further + _SLOTS_AT_NODE)
             if other == k:
                 here = score
             else:

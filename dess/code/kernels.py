@@ -19,7 +19,8 @@ from numba.core.caching import IndexDataCacheFile
 from dess.code.sources import code_of, combined
 from dess.errors import InputError
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+# Without a value of its own, a function would take over ``_nrt`` from the function that calls it.
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": True}
 
 
 def kernel(function: Callable, **options: Any) -> Any:
@@ -63,10 +64,11 @@ def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
 def inlined(function: Callable) -> Any:
     """Compile a function like ``kernel``, and inline its code into the compiled callers.
 
-    A call between kernels updates the reference counts of the arrays that it passes. For the small
-    functions of a mission slot, this would take longer than the functions themselves.
+    The function must neither create nor return arrays, since its code does not count references to
+    arrays. For the small functions of a mission slot, counting would take longer than the functions
+    themselves.
     """
-    return kernel(function, forceinline=True)
+    return kernel(function, forceinline=True, _nrt=False)
 
 
 @lru_cache

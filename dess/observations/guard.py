@@ -205,7 +205,7 @@ def battery_home(mission, u, slots, reach):
         reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
             in it; if the parking cell is farther, each further cell may cost the most.
     """
-    if not is_extended(mission) or reach.size == 0:
+    if reach is None:
         return slots
     return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, slots)
 
@@ -225,7 +225,7 @@ def round_trip(mission, u, x, y, home_x, home_y, reach):
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
     """
     cells = abs(u.x - x) + abs(u.y - y)
-    if not is_extended(mission) or reach.size == 0:
+    if reach is None:
         return cells + abs(home_x - x) + abs(home_y - y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
     return cells * u.slots_per_cell + int(against) + reach[u.slots_per_cell - 1, y, x]
@@ -257,7 +257,7 @@ def contest(mission, uavs, i, x, y):
     return level
 
 
-@kernel
+@inlined
 def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
@@ -277,32 +277,42 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
         safe: (5,) mask, overwritten.
     """
     u = uavs[i]
-    reserve = margin(mission, u) + waiting_time(mission, uavs, i) if charge else 0
-    late = np.zeros(5, np.int64)  # battery [%] that lacks on the way to the parking cell
-    contested = np.empty(5, np.int64)
-    least = 1_000_000
+    spare = margin(mission, u)
+    reserve = spare + waiting_time(mission, uavs, i) if charge else 0
+    # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
+    # that lead nearest to the parking cell, and those that are not later than the margin allows.
+    clear = nearest = in_time = 0
+    least = 1_000_000  # battery [%] that lacks on the way to the parking cell
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        contested[action] = contest(mission, uavs, i, x, y)
-        safe[action] = on_grid(mission, x, y) and contested[action] < 3
-        if safe[action] and charge:
-            if not is_extended(mission) or reach.size == 0:
+        contested = contest(mission, uavs, i, x, y)
+        if not on_grid(mission, x, y) or contested == 3:
+            continue
+        late = 0
+        if charge:
+            if reach is None:
                 needed = 1 + path_length(mission, uavs, i, x, y, home_x, home_y)
             else:
                 needed = _needed(mission, uavs, i, action, x, y, home_x, home_y, reach)
             # One slot is the charging slot itself; the battery must not be depleted before it.
-            late[action] = max(needed + 1 + reserve - u.battery, 0)
-            least = min(least, late[action])
-    clear = safe & (contested < 2)
-    nearest = safe & (late == least) if charge else safe.copy()
-    if (nearest & clear).any() and (late[nearest].any() or u.overruled):
-        safe[:] = nearest & clear
-    elif late[nearest].any() and clear.any():
+            late = max(needed + 1 + reserve - u.battery, 0)
+        bit = 1 << action
+        if contested < 2:
+            clear |= bit
+        if late <= spare:
+            in_time |= bit
+        if late < least:
+            least, nearest = late, 0
+        if late == least:
+            nearest |= bit
+    chosen = nearest
+    if nearest & clear and (least > 0 or u.overruled):
+        chosen = nearest & clear
+    elif least > 0 and clear & in_time:
         # the margin is there to wait or step aside until the teammate has passed
-        wait = clear & (late <= margin(mission, u))
-        safe[:] = wait if wait.any() else nearest
-    else:
-        safe[:] = nearest
+        chosen = clear & in_time
+    for action in range(5):
+        safe[action] = chosen >> action & 1
 
 
 @inlined

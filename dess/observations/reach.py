@@ -4,7 +4,7 @@
     table[s - 1, y, x]          # [%] from a cell, for a UAV that takes s mission slots per cell
 
 The cost of a way depends on the wind and on the speed of the UAV. A table has the cheapest way from
-every cell (Dijkstra's algorithm). Without wind and slow UAVs it is empty and not used.
+every cell (Dijkstra's algorithm). Without wind and slow UAVs there is no table.
 """
 
 from functools import lru_cache
@@ -16,7 +16,6 @@ from scipy.sparse.csgraph import dijkstra
 from dess.sections.wind import surcharges
 from dess.state import STEP_X, STEP_Y
 
-EVEN = np.zeros((0, 0, 0), np.int64)  # every cell costs one percent
 # The fields of ``MISSION`` that a table depends on.
 _FIELDS = (
     *("grid", "zone_x", "zone_y", "zone_width", "zone_height", "slowest"),
@@ -24,15 +23,17 @@ _FIELDS = (
 )
 
 
-def reach_of(missions: np.ndarray) -> np.ndarray:
+def reach_of(missions: np.ndarray) -> np.ndarray | None:
     """(S, M, M) battery [%] to the nearest cell of the zone, for 1 to S slots per cell.
+
+    None if every cell costs one percent; then the compiler leaves out the code for the table.
 
     Args:
         missions: (B,) ``MISSION`` records of one batch, which share grid, zone, wind and fleet.
     """
     mission = missions[0]
     if mission["wind_most"] == 0 and mission["slowest"] == 1:
-        return EVEN
+        return None
     return _table(*(mission[field].item() for field in _FIELDS))
 
 

@@ -8,8 +8,8 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from scipy import special
 
-from dess import rules, streams
-from dess.channel import World, empty_scratch, world_of
+from dess import channel, rules, streams
+from dess.channel import Scratch, World, empty_scratch, world_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
     ACTIVE,
@@ -46,6 +46,14 @@ def _launched(scenario: Scenario, seed: int = 1, replication: int = 2) -> tuple[
         state.teeth[0],
     )
     return state, world_of(space), empty_scratch(space.uavs[1], len(space.nodes))
+
+
+def _communicate(state: State, world: World, scratch: Scratch, n: int) -> None:
+    """Communication slot ``n`` of a mission slot."""
+    mission, uavs, residual, sensors, teeth = (array[0] for array in state)
+    nodes, mean_snr, *tables = world
+    channel.open_slot(mission, uavs, nodes, mean_snr, *tables, scratch.search)
+    rules.communicate(mission, uavs, residual, sensors, teeth, *tables, *scratch, n)
 
 
 # --- launch ---
@@ -428,9 +436,7 @@ def _compare_with_reference(
     collected, decided = 0.0, []
     for n in range(1, scenario.communication_slots + 1):
         left = residual.copy()
-        rules.communicate(
-            mission, team, residual, state.sensors[0], state.teeth[0], *world, *scratch, n
-        )
+        _communicate(state, world, scratch, n)
         for i, u in enumerate(team):
             if not (left > 0).any():
                 assert u["served"] == -1
@@ -481,28 +487,10 @@ def test_ties_go_to_the_node_of_lowest_index() -> None:
             grid=3, zone=[1, 1, 1, 1], nodes=nodes, uavs=1, shadowing_variance=0.0
         )
         state, world, scratch = _launched(scenario)
-        rules.communicate(
-            state.missions[0],
-            state.uavs[0],
-            state.residual[0],
-            state.sensors[0],
-            state.teeth[0],
-            *world,
-            *scratch,
-            1,
-        )
+        _communicate(state, world, scratch, 1)
         assert state.uavs[0, 0]["served"] == 0
         state.residual[0, 0] = 0.0
-        rules.communicate(
-            state.missions[0],
-            state.uavs[0],
-            state.residual[0],
-            state.sensors[0],
-            state.teeth[0],
-            *world,
-            *scratch,
-            2,
-        )
+        _communicate(state, world, scratch, 2)
         assert state.uavs[0, 0]["served"] == 1
 
 
@@ -510,16 +498,7 @@ def test_charging_and_inactive_uavs_do_not_communicate() -> None:
     state, world, scratch = _launched(Scenario.of(uavs=3))
     team = state.uavs[0]
     team["charging"][0], team["active"][1] = True, False
-    rules.communicate(
-        state.missions[0],
-        team,
-        state.residual[0],
-        state.sensors[0],
-        state.teeth[0],
-        *world,
-        *scratch,
-        1,
-    )
+    _communicate(state, world, scratch, 1)
     assert team["served"].tolist()[:2] == [-1, -1]
     assert team["communications"].tolist() == [0, 0, 1]
 
