@@ -2,18 +2,20 @@
 
 The home node of a flying slot is that of the block in which the slot ends. A *visit* is a sequence
 of flying slots with the same home node. In a visit the UAV takes at most what the node has had by
-then; what is left of that is its *allowance*. The worth of the future is bounded by affine
-functions of the allowance a, one per local price p::
+then; what is left of that is its *allowance* a. A UAV that returns from the next block finds the
+allowance b that it left. The worth of the future is bounded by affine functions of both, one for
+each pair of local prices p of the home node and r of the node remembered::
 
-    worth <= ceilings[f, phase, x, y, q] + p[q] * a        for every q
+    worth <= ceilings[f, phase, x, y, memory, q] + p * a + r * b
 
-The recursion needs no rounding of the allowance, and adapting to the shadowing is allowed for
+The recursion needs no rounding of the allowances, and adapting to the shadowing is allowed for
 (docs/concepts/bound.md, step 4 of the proof).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from analysis.bound.service import step_takings
 from dess.code.kernels import inlined, kernel
 from dess.rules import in_zone
 from dess.state import STEP_X, STEP_Y
@@ -21,37 +23,114 @@ from dess.state import STEP_X, STEP_Y
 CHARGE, STOP = 5, 6  # what a UAV can do besides the actions
 
 
-@inlined
-def _had(data, phases, phase, f, home):
-    """The data [data units] that a node can have had by flying slot f; 0 before the first one."""
-    return data[phases.clock[phase, min(f, phases.clock.shape[1] - 1)], home] if f >= 0 else 0.0
+class Blocks(NamedTuple):
+    """The blocks of the nodes, and what a UAV remembers of the block before.
+
+    Attributes:
+        home: (M, M) home node of each cell ``x, y``.
+        near: (K, N) nodes that a UAV in a node's block can remember; -1 for none.
+        place: (K, K) place of a node in the row ``near`` of another one, -1 if it is not there.
+        levels: (R,) indices of the local prices at which a node is remembered; the first is 0.
+    """
+
+    home: np.ndarray
+    near: np.ndarray
+    place: np.ndarray
+    levels: np.ndarray
+
+
+def blocks_of(nodes: np.ndarray, grid: int, most: int, levels: np.ndarray) -> Blocks:
+    """The cells that are nearest to each node, and up to ``most`` blocks beside each block."""
+    cells = np.stack(np.meshgrid(np.arange(grid), np.arange(grid), indexing="ij"), axis=-1)
+    home = np.argmin(((cells[:, :, None] - nodes) ** 2).sum(axis=-1), axis=-1)
+    borders = np.zeros((len(nodes), len(nodes)), np.int64)
+    for one, other in ((home[1:], home[:-1]), (home[:, 1:], home[:, :-1])):
+        np.add.at(borders, (one, other), 1)
+        np.add.at(borders, (other, one), 1)
+    np.fill_diagonal(borders, 0)
+    most = min(most, max(int((borders > 0).sum(axis=1).max()), 1))
+    near = np.argsort(-borders, axis=1, kind="stable")[:, :most]
+    near[np.take_along_axis(borders, near, axis=1) == 0] = -1
+    place = np.full(borders.shape, -1)
+    for node, row in enumerate(near):
+        place[node, row[row >= 0]] = np.nonzero(row >= 0)[0]
+    return Blocks(home, near, place, levels)
 
 
 @inlined
-def _may_charge(mission, phases, phase, f, x, y):
+def data_had(data, phases, phase, f):
+    """(K,) the data [data units] that each node can have had by flying slot f."""
+    return data[phases.clock[phase, min(f, phases.clock.shape[1] - 1)]]
+
+
+@inlined
+def may_charge(mission, phases, phase, f, x, y):
     """Whether a UAV may charge after f flying slots."""
     return phases.opens[phase] <= f <= phases.closes[phase] and in_zone(mission, x, y)
 
 
 @inlined
-def _stop(phases, phase, f, waiting):
-    """The worth of a mission that ends after f flying slots."""
-    return -waiting[min(f + phases.charged[phase], len(waiting) - 1)]
+def _is_reached(mission, phases, phase, f, x, y):
+    """Whether a UAV can be in a cell after f flying slots: it has left the zone before them."""
+    radius = f if phase == 0 else f - phases.opens[0]
+    east, south = mission.zone_x + mission.zone_width, mission.zone_y + mission.zone_height
+    along_x = max(mission.zone_x - x, x - east + 1, 0)
+    return along_x + max(mission.zone_y - y, y - south + 1, 0) <= radius
 
 
 @inlined
-def _meeting(gain, ahead, local, allowance):
-    """The least of the bounds for an action at an allowance, and its local price."""
+def end_of(phases, phase, f, slots):
+    """The mission slots after which a UAV can have stopped with f flying slots, at the earliest."""
+    return min(f + phases.charged[phase], slots)
+
+
+@inlined
+def memory_of(blocks, home, node, level):
+    """The memory of a UAV at ``home`` that remembers a node; 0 for none."""
+    place = blocks.place[home, node]
+    return 1 + place * (len(blocks.levels) - 1) + level - 1 if level > 0 and place >= 0 else 0
+
+
+@inlined
+def remembered(blocks, home, memory):
+    """The node and the level of a memory; -1 and 0 for none."""
+    if memory == 0:
+        return -1, 0
+    others = len(blocks.levels) - 1
+    return blocks.near[home, (memory - 1) // others], (memory - 1) % others + 1
+
+
+@inlined
+def beginning(blocks, local, now, ahead, had, then_had, home, there, level, later, start):
+    """The least bound of a step into another block: its value and the local price there.
+
+    Args:
+        blocks, local: As in ``bound_paths``.
+        now, ahead: (Q,) worth of the slot; (J, Q) ceilings after it.
+        had, then_had: (K,) what the nodes have had by this slot, and by the next one.
+        home, there: The node left and the node entered.
+        level: Level at which the node entered is remembered.
+        later: Level at which the node left is going to be remembered.
+        start: Index of a local price of ``home``: its allowance is priced at that.
+    """
+    memory = memory_of(blocks, there, home, later)
+    left = local[home, blocks.levels[later]] if memory > 0 else 0.0
+    new = then_had[there] - (had[there] if level > 0 else 0.0)
+    known = local[there, blocks.levels[level]]
     least, best = np.inf, 0
-    for q in range(len(local)):
-        value = gain[q] + ahead[q] + local[q] * allowance
+    for q in range(local.shape[1]):
+        price = local[there, q]
+        value = now[q] + ahead[memory, q] + price * new
+        if level > 0:
+            value += max(price - known, 0.0) * had[there]
         if value < least:
             least, best = value, q
-    return least, best
+    least += left * (then_had[home] - had[home])
+    return least + max(left - start, 0.0) * had[home], best
 
 
 @kernel
-def bound_paths(mission, phases, data, period, block, local, values, waiting, ceilings):
+def bound_paths(mission, phases, data, period, blocks, local, values, waiting, ceilings):
     """Bound what a UAV can earn from every state.
 
     Args:
@@ -59,133 +138,107 @@ def bound_paths(mission, phases, data, period, block, local, values, waiting, ce
         phases: ``Phases``.
         data: (T + 1, K) data [data units] that each node has had by the start of slot t.
         period: (T + 1,) period between cuts of slot t.
-        block: (M, M) home node of each cell ``x, y``.
-        local: (K, Q) local prices, ascending.
+        blocks: ``Blocks``.
+        local: (K, Q) local prices, ascending; the first is 0.
         values: From ``step_values``.
         waiting: (T + 1,) what it costs a UAV that the mission ends after t slots.
-        ceilings: (F + 1, P, M, M, Q) worth of the future at each local price, overwritten.
+        ceilings: (F + 1, P, M, M, J, Q) worth of the future per memory and local price,
+            overwritten where a UAV can be.
     """
-    slots, grid, prices = len(ceilings) - 1, len(block), local.shape[1]
-    begins = np.empty((5, grid, grid))
+    slots, grid, levels = len(ceilings) - 1, len(blocks.home), len(blocks.levels)
+    begins = np.empty((5, grid, grid, levels, levels))
     for phase in range(len(phases.deadline)):
-        ceilings[slots, phase] = _stop(phases, phase, slots, waiting)
+        ceilings[slots, phase] = -waiting[end_of(phases, phase, slots, len(waiting) - 1)]
     for f in range(slots - 1, -1, -1):
         for phase in range(len(phases.deadline) - 1, -1, -1):
-            here, then = ceilings[f, phase], ceilings[f + 1, phase]
-            here[:] = _stop(phases, phase, f, waiting)
+            if phase > 0 and f < phases.opens[0]:
+                continue
+            here = ceilings[f, phase]
+            here[:] = -waiting[end_of(phases, phase, f, len(waiting) - 1)]
+            had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
             if f < phases.deadline[phase]:
-                gain = values[period[phases.clock[phase, f]]]
-                for action in range(5):
-                    for x in range(grid):
-                        for y in range(grid):
-                            home = block[x, y]
-                            allowance = _had(data, phases, phase, f + 1, home)
-                            begins[action, x, y], _ = _meeting(
-                                gain[action, x, y], then[x, y], local[home], allowance
-                            )
+                gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
+                _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
                 for x in range(grid):
                     for y in range(grid):
-                        _act(phases, data, block, local, gain, then, f, phase, begins, x, y,
-                             here[x, y])  # fmt: skip
+                        if _is_reached(mission, phases, phase, f, x, y):
+                            _act(blocks, local, gain, then, had, then_had, begins, x, y, here[x, y])
             target = phases.after[f]
             for x in range(grid):
                 for y in range(grid):
-                    if _may_charge(mission, phases, phase, f, x, y):
-                        home = block[x, y]
-                        new = _had(data, phases, target, f, home)
-                        new -= _had(data, phases, phase, f, home)
-                        for q in range(prices):
-                            value = ceilings[f, target, x, y, q] + local[home, q] * new
-                            here[x, y, q] = max(here[x, y, q], value)
+                    if may_charge(mission, phases, phase, f, x, y):
+                        new = data_had(data, phases, target, f) - had
+                        _charge(blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y])
 
 
 @inlined
-def _act(phases, data, block, local, gain, then, f, phase, begins, x, y, here):
+def _charge(blocks, local, new, charged, x, y, here):
+    """Raise the ceilings of a state to what it is worth after a charge."""
+    home = blocks.home[x, y]
+    for memory in range(len(here)):
+        node, level = remembered(blocks, home, memory)
+        more = local[node, blocks.levels[level]] * new[node] if memory > 0 else 0.0
+        for q in range(local.shape[1]):
+            value = charged[memory, q] + local[home, q] * new[home] + more
+            here[memory, q] = max(here[memory, q], value)
+
+
+@inlined
+def _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
+    """The least bounds of all steps into another block, per level of memory before and after."""
+    grid, levels = len(blocks.home), len(blocks.levels)
+    for action in range(4):
+        for x in range(grid):
+            for y in range(grid):
+                x2, y2 = x + STEP_X[action], y + STEP_Y[action]
+                if not (0 <= x2 < grid and 0 <= y2 < grid):
+                    continue
+                home, there = blocks.home[x, y], blocks.home[x2, y2]
+                if there == home or not _is_reached(mission, phases, phase, f, x, y):
+                    continue
+                for level in range(levels):
+                    for later in range(levels):
+                        begins[action, x2, y2, level, later], _ = beginning(
+                            blocks, local, gain[action, x2, y2], then[x2, y2], had, then_had,
+                            home, there, level, later, np.inf,
+                        )  # fmt: skip
+
+
+@inlined
+def _act(blocks, local, gain, then, had, then_had, begins, x, y, here):
     """Raise the ceilings of a state to what its actions can earn."""
-    grid, home = len(block), block[x, y]
-    prices, last = local[home], local.shape[1] - 1
-    allowance = _had(data, phases, phase, f, home)
-    new = _had(data, phases, phase, f + 1, home) - allowance
+    grid, home, prices = len(blocks.home), blocks.home[x, y], local.shape[1]
+    line, least = np.empty(prices), np.empty(prices)
     for action in range(5):
         x2, y2 = x + STEP_X[action], y + STEP_Y[action]
         if not (0 <= x2 < grid and 0 <= y2 < grid):
             continue
-        if block[x2, y2] != home:
-            for q in range(last + 1):
-                here[q] = max(here[q], begins[action, x2, y2])
-            continue
-        now, ahead = gain[action, x2, y2], then[x2, y2]
-        at_all, full = _meeting(now, ahead, prices, allowance + new)
-        at_none, empty = _meeting(now, ahead, prices, new)
-        for q in range(last + 1):
-            value = now[q] + ahead[q] + prices[q] * new
-            if q < full:
-                value = at_all - prices[q] * allowance
-            elif q > empty:
-                value = at_none
-            here[q] = max(here[q], value)
-
-
-@kernel
-def add_takings(
-    mission, phases, data, period, block, local, values, waiting, ceilings,
-    x, y, worth, nodes, rates, below, takings,
-):  # fmt: skip
-    """Follow a best path from a cell and add what it takes to ``takings`` (S, K), per period.
-
-    The path takes the mean rates. It serves to improve the prices; no bound depends on it.
-    Returns the worth of the state at the start.
-    """
-    grid, phase, f = len(block), 0, 0
-    allowance = _had(data, phases, phase, 0, block[x, y])
-    start, _ = _meeting(
-        ceilings[0, 0, x, y], np.zeros(local.shape[1]), local[block[x, y]], allowance
-    )
-    slot_takings = np.zeros(len(nodes))
-    while f < len(ceilings) - 1:
-        home = block[x, y]
-        best, choice, price = _stop(phases, phase, f, waiting), STOP, 0
-        if _may_charge(mission, phases, phase, f, x, y):
-            target = phases.after[f]
-            new = _had(data, phases, target, f, home) - _had(data, phases, phase, f, home)
-            value, _ = _meeting(
-                ceilings[f, target, x, y], np.zeros(local.shape[1]), local[home], allowance + new
-            )
-            if value > best:
-                best, choice = value, CHARGE
-        s = period[phases.clock[phase, f]]
-        if f < phases.deadline[phase]:
-            for action in range(5):
-                x2, y2 = x + STEP_X[action], y + STEP_Y[action]
-                if not (0 <= x2 < grid and 0 <= y2 < grid):
-                    continue
-                there = block[x2, y2]
-                left = _had(data, phases, phase, f + 1, there)
-                if there == home:
-                    left += allowance - _had(data, phases, phase, f, home)
-                value, q = _meeting(
-                    values[s, action, x2, y2], ceilings[f + 1, phase, x2, y2], local[there], left
-                )
-                if value > best:
-                    best, choice, price = value, action, q
-        if choice == STOP:
-            break
-        if choice == CHARGE:
-            target = phases.after[f]
-            allowance += _had(data, phases, target, f, home) - _had(data, phases, phase, f, home)
-            phase = target
-            continue
-        x, y = x + STEP_X[choice], y + STEP_Y[choice]
-        if block[x, y] != home:
-            home = block[x, y]
-            allowance = _had(data, phases, phase, f, home)
-        priced = worth[s].copy()
-        priced[home] = max(priced[home] - local[home, price], 0.0)
-        slot_takings[:] = 0.0
-        step_takings(x, y, choice, priced, nodes, rates, below, slot_takings)
-        slot_takings[home] = min(slot_takings[home], allowance)
-        takings[s] += slot_takings
-        allowance -= slot_takings[home]
-        allowance += _had(data, phases, phase, f + 1, home) - _had(data, phases, phase, f, home)
-        f += 1
-    return start
+        there = blocks.home[x2, y2]
+        for memory in range(len(here)):
+            node, level = remembered(blocks, home, memory)
+            if node < 0 and memory > 0:  # this block has fewer neighbours
+                break
+            if there != home:
+                begin = begins[action, x2, y2, level if node == there else 0]
+                for q in range(prices):
+                    value = np.inf
+                    for later in range(len(begin)):
+                        left = local[home, blocks.levels[later]]
+                        rise = max(left - local[home, q], 0.0) * had[home]
+                        value = min(value, begin[later] + rise)
+                    here[memory, q] = max(here[memory, q], value)
+                continue
+            more = 0.0
+            if memory > 0:
+                more = local[node, blocks.levels[level]] * (then_had[node] - had[node])
+            low = np.inf
+            for q in range(prices):
+                value = gain[action, x2, y2, q] + then[x2, y2, memory, q] + more
+                line[q] = value + local[home, q] * (then_had[home] - had[home])
+                low = min(low, line[q])
+                least[q] = low
+            low = np.inf
+            for q in range(prices - 1, -1, -1):
+                low = min(low, line[q] + local[home, q] * had[home])
+                value = min(least[q], low - local[home, q] * had[home])
+                here[memory, q] = max(here[memory, q], value)

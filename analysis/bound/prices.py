@@ -13,9 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.bound.bundle import next_prices
 from analysis.bound.energy import Phases, phases_of
-from analysis.bound.paths import add_takings, bound_paths
+from analysis.bound.paths import blocks_of, bound_paths
 from analysis.bound.service import POINTS, rates_of, spread, step_values
+from analysis.bound.slopes import add_slopes
 from dess import rules
 from dess.channel import world_of
 from dess.code.kernels import kernel
@@ -23,11 +25,26 @@ from dess.errors import InputError
 from dess.scenario import ScenarioSpace
 from dess.state import constants_of, empty_state, ranges_of, sample_scenario, types_of
 
-ITERATIONS = 25
-_CUTS = 4
-_MOMENTUM = 0.7  # part of the direction of the step before that a step keeps
-# Local prices, as parts of what a data unit is worth after the last but one cut.
-_LOCAL = np.array([0.0, 0.15, 0.3, 0.45, 0.6, 0.8, 1.0])
+ITERATIONS = 20
+_FIRST_DECREASE = 0.1  # of the bound, that the first step aims at
+
+
+class Detail(NamedTuple):
+    """How finely the bound distinguishes states; every choice gives a valid bound.
+
+    Attributes:
+        cuts: Cuts before the end, as parts of the longest mission.
+        local: Local prices, as parts of what a data unit is worth after the last of these cuts.
+        levels: Indices of the local prices at which the block before is remembered.
+        near: Neighbouring blocks that can be remembered.
+    """
+
+    cuts: tuple[float, ...] = (0.5,)
+    local: tuple[float, ...] = (0.0, 0.12, 0.25, 0.4, 0.55, 0.7, 0.85, 1.0)
+    levels: tuple[int, ...] = (0, 4, 7)
+    near: int = 4
+
+
 _ROUNDING = 1e-6  # more than the rounding errors of the calculation
 
 
@@ -37,9 +54,11 @@ class Bound:
 
     Attributes:
         ratio: Upper bound on the expected collection ratio, and so on the product; at most 1.
-        prices: (S, K) prices of the cuts [data units per data unit].
-        cuts: (S,) the last mission slot of each cut.
-        iterations: Number of prices tried.
+        prices: (S, K) prices of the cuts [share of a data unit's worth]. A data unit of node k
+            in a slot is worth 1 less the prices of all cuts at this slot or later. With prices
+            of 1 at the last cut the bound is 1.
+        cuts: (S,) the last mission slot of each cut; the last cut is the end of the mission.
+        iterations: How many prices have been tried.
     """
 
     ratio: float
@@ -48,7 +67,7 @@ class Bound:
     iterations: int
 
 
-class _Mission(NamedTuple):
+class Known(NamedTuple):
     """What is known of a mission before its first slot, arrivals included."""
 
     record: np.ndarray
@@ -57,7 +76,6 @@ class _Mission(NamedTuple):
     nodes: np.ndarray
     rates: np.ndarray
     below: np.ndarray
-    block: np.ndarray
     phases: Phases
 
 
@@ -79,8 +97,7 @@ def upper_bound(
         InputError: If the scenario has a section, or the seed or the replication is out of range.
     """
     check_scenario(scenario)
-    mission = _mission_of(scenario, seed, replication)
-    return _improve(mission, iterations)
+    return improve(known_of(scenario, seed, replication), iterations, Detail())
 
 
 def check_scenario(scenario: ScenarioSpace) -> None:
@@ -93,7 +110,8 @@ def check_scenario(scenario: ScenarioSpace) -> None:
         raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
 
 
-def _mission_of(scenario: ScenarioSpace, seed: int, replication: int) -> _Mission:
+def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
+    """What seed and replication tell of a mission."""
     sampled = sample_scenario(scenario, seed, replication)
     phases = phases_of(sampled)
     state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
@@ -110,8 +128,7 @@ def _mission_of(scenario: ScenarioSpace, seed: int, replication: int) -> _Missio
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
     below = spread(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
     rates = rates_of(record, world.mean_snr, points)
-    block = _blocks(world.nodes, scenario.grid)
-    return _Mission(record, starts, data, world.nodes, rates, below, block, phases)
+    return Known(record, starts, data, world.nodes, rates, below, phases)
 
 
 @kernel
@@ -128,46 +145,101 @@ def _data_by(mission, residual, slots):
     return data
 
 
-def _blocks(nodes: np.ndarray, grid: int) -> np.ndarray:
-    """(M, M) the node that is nearest to each cell; the first of several."""
-    cells = np.stack(np.meshgrid(np.arange(grid), np.arange(grid), indexing="ij"), axis=-1)
-    distance = ((cells[:, :, None] - nodes) ** 2).sum(axis=-1)
-    return np.argmin(distance, axis=-1)
+class _Bounds:
+    """The bound of one mission as a function of the prices."""
 
+    def __init__(self, known: Known, detail: Detail):
+        self.known = known
+        grid, slots, phases = int(known.record["grid"]), *known.phases.clock.shape[::-1]
+        self.blocks = blocks_of(known.nodes, grid, detail.near, np.array(detail.levels))
+        self.parts = np.array(detail.local)
+        last = int(known.phases.clock.max())
+        inner = np.array([int(part * last) for part in detail.cuts], np.int64)
+        self.cuts = np.append(inner, last)
+        times = np.arange(len(known.data))
+        self.period = np.searchsorted(inner, times)
+        self.values = np.empty((len(self.cuts), 5, grid, grid, len(self.parts)))
+        memories = 1 + self.blocks.near.shape[1] * (len(detail.levels) - 1)
+        self.ceilings = np.empty((slots + 1, phases, grid, grid, memories, len(self.parts)))
 
-def _improve(mission: _Mission, iterations: int) -> Bound:
-    """Search for low prices by subgradient steps; the lowest bound found is kept."""
-    record, starts, data, nodes, rates, below, block, phases = mission
-    slots, count, grid = len(phases.after), len(phases.deadline), len(block)
-    total = data.sum(axis=1)
-    last = int(phases.clock.max())
-    cuts = np.unique(np.ceil(np.arange(1, _CUTS + 1) * last / _CUTS).astype(np.int64))
-    period = np.minimum(np.searchsorted(cuts, np.arange(len(data))), len(cuts) - 1)
-    waiting = total / len(starts)
-    values = np.empty((len(cuts), 5, grid, grid, len(_LOCAL)))
-    ceilings = np.empty((slots + 1, count, grid, grid, len(_LOCAL)))
-    prices = np.zeros((len(cuts), len(nodes)))
-    lowest, kept, direction = np.inf, prices, np.zeros(prices.shape)
-    for _ in range(iterations):
+    def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
+        """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""
+        known, cuts = self.known, self.cuts[:-1]
+        team, data, total = len(known.starts), known.data, known.data[-1].sum()
         worth = np.maximum(1.0 - prices[::-1].cumsum(axis=0)[::-1], 0.0)
-        local = worth[-1][:, None] * _LOCAL
-        step_values(worth, local, nodes, block, rates, below, values)
-        bound_paths(record, phases, data, period, block, local, values, waiting, ceilings)
-        takings = np.zeros(prices.shape)
-        bound = total[-1] + (prices * data[cuts]).sum()
-        for x, y in starts:
-            bound += add_takings(
-                record, phases, data, period, block, local, values, waiting, ceilings,
-                x, y, worth, nodes, rates, below, takings,
+        local = worth[-1][:, None] * self.parts
+        waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
+        service = (known.nodes, known.rates, known.below)
+        step_values(worth, local, known.nodes, self.blocks.home, *service[1:], self.values)
+        before = (known.record, known.phases, data, self.period, self.blocks, local)
+        bound_paths(*before, self.values, waiting, self.ceilings)
+        bound = total + (prices[:-1] * data[cuts]).sum()
+        slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
+        slope[:-1] = data[cuts]
+        for x, y in known.starts:
+            most, end = add_slopes(
+                *before, self.parts, self.values, waiting, self.ceilings, x, y, worth, *service,
+                takings,
             )  # fmt: skip
-        if bound < lowest:
-            lowest, kept = bound, prices
-        slope = data[cuts] - takings.cumsum(axis=0)
-        slope[(prices == 0) & (slope > 0)] = 0.0
-        direction = slope + _MOMENTUM * direction
-        if not direction.any():
-            break
-        size = max(bound - 0.98 * lowest, 0.0) / (direction**2).sum()
-        prices = np.maximum(prices - size * direction, 0.0)
-    ratio = lowest / total[-1] * (1 + _ROUNDING) if total[-1] > 0 else 1.0
-    return Bound(min(ratio, 1.0), kept, cuts, iterations)
+            bound += most
+            slope[-1] += data[end] / team
+        takings[worth == 0] = 0.0
+        return bound / total, (slope - takings.cumsum(axis=0)) / total
+
+
+def improve(known: Known, iterations: int, detail: Detail) -> Bound:
+    """Search for prices with a low bound; the lowest bound found is kept."""
+    bounds = _Bounds(known, detail)
+    shape = len(bounds.cuts), len(known.nodes)
+    most = np.full(shape, np.inf)
+    most[-1] = 1.0
+    kept, lowest = most, 1.0  # with prices of 1 at the end
+    if known.data[-1].sum() > 0 and iterations > 0:
+        kept, lowest = _descend(bounds, _first_prices(known, shape), most, iterations)
+    if lowest * (1.0 + _ROUNDING) >= 1.0:
+        kept, lowest = np.where(np.isinf(most), 0.0, most), 1.0
+    return Bound(min(lowest * (1.0 + _ROUNDING), 1.0), kept, bounds.cuts, iterations)
+
+
+def _first_prices(known: Known, shape: tuple[int, int]) -> np.ndarray:
+    """High prices near the zone, where data are easy to fetch, and low ones far away."""
+    record = known.record
+    corner = np.array([record["zone_x"], record["zone_y"]])
+    centre = corner + np.array([record["zone_width"], record["zone_height"]]) / 2
+    distance = np.abs(known.nodes - centre).sum(axis=1)
+    prices = np.zeros(shape)
+    prices[-1] = 1.0 - (1.0 - (1.0 - distance / (distance.max() + 1)) ** 2) / len(known.starts) ** 2
+    return prices
+
+
+def _descend(
+    bounds: _Bounds, prices: np.ndarray, most: np.ndarray, iterations: int
+) -> tuple[np.ndarray, float]:
+    """The prices with the lowest bound of those that the bundle method tries, and the bound."""
+    points, found = np.empty((iterations, prices.size)), np.empty(iterations)
+    slopes = np.empty(points.shape)
+    centre, lowest, width, predicted = prices, np.inf, 0.0, np.inf
+    for i in range(iterations):
+        found[i], slope = bounds.at(prices)
+        points[i], slopes[i] = prices.ravel(), slope.ravel()
+        if i == 0:
+            width = _FIRST_DECREASE / (slope**2).sum() if slope.any() else 1.0
+        elif found[i] < lowest - 0.5 * (lowest - predicted):
+            width *= 2.0
+        elif found[i] > lowest + (lowest - predicted):
+            width *= 0.6
+        if found[i] < lowest:
+            centre, lowest = prices, float(found[i])
+        if i + 1 < iterations:
+            chosen, predicted = next_prices(
+                centre.ravel(), most.ravel(), lowest, points[: i + 1], found[: i + 1],
+                slopes[: i + 1], width,
+            )  # fmt: skip
+            prices = _at_most_one(chosen.reshape(prices.shape))
+    return centre, lowest
+
+
+def _at_most_one(prices: np.ndarray) -> np.ndarray:
+    """Prices whose sum over the cuts is at most 1: more would raise the bound and change no worth."""
+    sums = np.minimum(prices[::-1].cumsum(axis=0)[::-1], 1.0)
+    return sums - np.vstack([sums[1:], np.zeros(prices.shape[1])])

@@ -16,7 +16,8 @@ from dess.code.kernels import inlined, kernel
 from dess.state import EAST, HOVER, NORTH, SOUTH, STEP_X, STEP_Y, WEST
 from dess.streams import MAX_NORMAL
 
-_HALF = (0.4, 0.9, 1.5, 2.2, 3.2, MAX_NORMAL)
+_HALF = (0.6, 1.3, 2.2, 3.4, MAX_NORMAL)
+_UNLIKELY = 1e-5
 POINTS = np.array([*(-z for z in _HALF[::-1]), 0.0, *_HALF])  # standard normal deviates
 
 
@@ -69,33 +70,47 @@ def _levels_at(x, y, offset, along_x, nodes, rates, levels):
 
 
 @inlined
-def _best_of(levels, worth, without, below, values, chances, winners, rank):
+def _best_of(levels, worth, without, below, values, chances, winners, rank, order):
     """The distribution of ``max_k w_k R_k``: its values downwards, their chances, who has them.
 
     Returns the number of values. Node ``without`` is left out. Without any worth there is the one
-    value 0, of no node.
+    value 0, of no node. The last value stands for all further ones, which are very unlikely.
     """
     top = levels.shape[1] - 1
-    floor, lowest, count = 0.0, -1, 0  # the maximum is never below the floor
+    floor, lowest = 0.0, -1  # the maximum is never below the floor
     for k in range(len(worth)):
         if k != without and worth[k] * levels[k, 0] > floor:
             floor, lowest = worth[k] * levels[k, 0], k
+    able = 0  # nodes that can be above the floor, in descending order of their highest value
     for k in range(len(worth)):
-        rank[k] = top if k != without and worth[k] * levels[k, top] > floor else -1
+        value = worth[k] * levels[k, top]
+        if k != without and value > floor:
+            place = able
+            while place > 0 and worth[order[place - 1]] * levels[order[place - 1], top] < value:
+                order[place] = order[place - 1]
+                place -= 1
+            order[place] = k
+            able += 1
+    begun, count = 0, 0  # nodes whose highest value has been reached, and those of the result
     left = 1.0  # chance that the maximum is smaller than the values so far
-    while left > 1e-9:
-        best, node = floor, -1
-        for k in range(len(worth)):
-            if rank[k] >= 0 and worth[k] * levels[k, rank[k]] > best:
-                best, node = worth[k] * levels[k, rank[k]], k
-        values[count], winners[count] = best, node
-        if node < 0:
-            chances[count], winners[count] = left, lowest
-            return count + 1
-        smaller = left * below[rank[node]] / below[rank[node] + 1]
+    while left > _UNLIKELY:
+        best, chosen = floor, -1
+        for i in range(begun):
+            value = worth[order[i]] * levels[order[i], rank[i]]
+            if value > best:
+                best, chosen = value, i
+        if begun < able and worth[order[begun]] * levels[order[begun], top] > best:
+            best, chosen = worth[order[begun]] * levels[order[begun], top], begun
+            rank[begun] = top
+            begun += 1
+        values[count] = best
+        winners[count] = order[chosen] if chosen >= 0 else lowest
+        smaller = 0.0
+        if chosen >= 0:
+            smaller = left * below[rank[chosen]] / below[rank[chosen] + 1]
+            rank[chosen] -= 1
         chances[count] = left - smaller
         left = smaller
-        rank[node] -= 1
         count += 1
     chances[count - 1] += left
     return count
@@ -105,9 +120,9 @@ def _best_of(levels, worth, without, below, values, chances, winners, rank):
 def _place_values(x, y, offset, along_x, home, worth, local, nodes, rates, below, scratch,
                   result):  # fmt: skip
     """Add to ``result`` (Q,) the worth of a communication slot, for each local price."""
-    levels, values, chances, winners, rank = scratch
+    levels, values, chances, winners, rank, order = scratch
     _levels_at(x, y, offset, along_x, nodes, rates, levels)
-    count = _best_of(levels, worth, home, below, values, chances, winners, rank)
+    count = _best_of(levels, worth, home, below, values, chances, winners, rank, order)
     for q in range(local.shape[1]):
         own = max(worth[home] - local[home, q], 0.0)
         above, mass, i, total = 0.0, 0.0, 0, 0.0
@@ -139,6 +154,7 @@ def step_values(worth, local, nodes, block, rates, below, values):
     scratch = (
         np.empty((count, levels)), np.empty(count * levels + 1), np.empty(count * levels + 1),
         np.empty(count * levels + 1, np.int64), np.empty(count, np.int64),
+        np.empty(count, np.int64),
     )  # fmt: skip
     for s in range(len(worth)):
         values[s] = 0.0
@@ -174,11 +190,12 @@ def step_takings(x, y, action, worth, nodes, rates, below, takings):
     m = (rates.shape[1] - 1) // (rates.shape[0] - 1)
     rows = np.empty((count, levels))
     values, chances = np.empty(count * levels + 1), np.empty(count * levels + 1)
-    winners, rank = np.empty(count * levels + 1, np.int64), np.empty(count, np.int64)
+    winners = np.empty(count * levels + 1, np.int64)
+    rank, order = np.empty(count, np.int64), np.empty(count, np.int64)
     for n in range(1, m + 1):
         offset = (n - m) * (STEP_X[action] + STEP_Y[action])
         _levels_at(x, y, offset, action in (EAST, WEST), nodes, rates, rows)
-        found = _best_of(rows, worth, -1, below, values, chances, winners, rank)
+        found = _best_of(rows, worth, -1, below, values, chances, winners, rank, order)
         for i in range(found):
             if winners[i] >= 0:
                 takings[winners[i]] += values[i] * chances[i] / worth[winners[i]]
