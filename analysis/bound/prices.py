@@ -240,6 +240,6 @@ def _descend(
 
 
 def _at_most_one(prices: np.ndarray) -> np.ndarray:
-    """Prices whose sum over the cuts is at most 1: more would raise the bound and change no worth."""
+    """Prices whose sum over the cuts is at most 1; more raises the bound and changes no worth."""
     sums = np.minimum(prices[::-1].cumsum(axis=0)[::-1], 1.0)
     return sums - np.vstack([sums[1:], np.zeros(prices.shape[1])])
