@@ -34,7 +34,6 @@ from policies import load_team
 POINT_MEMORY, MISSION_MEMORY = 12_000, 1_200
 
 FEW_BOUNDS = 300  # upper bounds that need no estimate of their time
-FEW_LOGS = 1_000  # event logs that are counted as missing without a look into the folder
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Planned:
         policy: The team.
         missions: Number of missions needed; a lower bound if a rule decides it.
         present: Number of these missions that are already in the results folder.
-        seconds: Estimated time of the others [s].
+        seconds: Estimated time of the others and of missing event logs [s].
     """
 
     policy: str
@@ -105,11 +104,10 @@ def plan_study(
         )
     many = study.size > MANY_POINTS and not (Path(out) / MANIFEST).exists()
     store = None if many else Store.peek(study, out, accept_code)
-    rows = []
+    rows, logs = [], _logs(study, store) / len(study.policies)
     for team in range(len(study.policies)):
         missing, total = _missing(study, store, team)
-        each = _seconds_per_mission(study, team, study.engine, clock) if missing else 0.0
-        seconds = missing * each
+        seconds = _seconds(study, team, missing, logs, clock)
         rows.append(Planned(study.policies[team], total, total - missing, seconds))
     at_most = len(study.policies) * _budget(study) if study.rule else None
     bounds = None
@@ -173,11 +171,11 @@ def check_effort(
     if yes or not sum(missing) + logs + bounds:
         return sum(missing)
     if study.size > MANY_POINTS:
-        seconds = _seconds(study, missing, logs, clock) / workers
+        seconds = _all_seconds(study, missing, logs, clock) / workers
         raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
     ends = [study.point(number).scenario for number in {0, study.size - 1}]
     few = all(are_few(sum(missing) + logs, space) for space in ends)
-    seconds = 0.0 if few else _seconds(study, missing, logs, clock)
+    seconds = 0.0 if few else _all_seconds(study, missing, logs, clock)
     if bounds > FEW_BOUNDS:
         seconds += bounds * _seconds_per_bound(study, clock)
     check_time(what, seconds / workers)
@@ -246,19 +244,23 @@ def _budget(study: Study) -> int:
 def _logs(study: Study, store: Store | None = None) -> int:
     """Number of event logs that are missing; all, if the folder is not known."""
     needed = study.logged * study.size * len(study.policies)
-    if store is None or needed <= FEW_LOGS:
-        return needed
-    cells = (cell for of_team in store.manifest.cells for cell in of_team)
-    return sum(len(store.missing_logs(cell, study.logged)) for cell in cells)
+    present = store.logged if store and needed else []
+    return needed - sum(number < cell.first + study.logged for cell, number in present)
 
 
-def _seconds(study: Study, missing: Sequence[int], logs: int, clock: Clock) -> float:
+def _all_seconds(study: Study, missing: Sequence[int], logs: int, clock: Clock) -> float:
     """Estimated time [s] of missing missions of every team, and of event logs, on one core."""
-    seconds = 0.0
-    for team, missions in enumerate(missing):
-        seconds += missions and missions * _seconds_per_mission(study, team, study.engine, clock)
-        seconds += logs and logs / len(missing) * _seconds_per_mission(study, team, "events", clock)
-    return seconds
+    each = logs / len(missing)
+    return sum(_seconds(study, team, count, each, clock) for team, count in enumerate(missing))
+
+
+def _seconds(study: Study, team: int, missions: int, logs: float, clock: Clock) -> float:
+    """Estimated time [s] of missions and event logs of a team on one core."""
+    return sum(
+        count * _seconds_per_mission(study, team, engine, clock)
+        for engine, count in ((study.engine, missions), ("events", logs))
+        if count
+    )
 
 
 def _seconds_per_mission(study: Study, team: int, engine: str, clock: Clock) -> float:

@@ -80,8 +80,9 @@ class Manifest(Origin):
         shape = [len(self.points)] * len(names)
         if [*map(len, self.missions)] != shape or len(self.selected) != len(names):
             raise ValueError("missions, selected: not one for every policy and design point")
-        if min(map(min, self.missions)) < study.first:
-            raise ValueError("missions: are fewer than those of the study")
+        counts = [count for of_team in self.missions for count in of_team]
+        if min(counts) < study.first or max(counts) > study.most:
+            raise ValueError("missions: are fewer or more than those of the study")
         teams = range(len(names))
         if not {p for team in teams for p in self.selected_points(team)} <= {*range(*shape[:1])}:
             raise ValueError("selected: is not a design point")

@@ -111,6 +111,11 @@ class StudyData(StrictTable):
         return self.rule.first if self.rule else self.missions
 
     @property
+    def most(self) -> int:
+        """The largest number of replications of a cell that a rule may ask for."""
+        return self.rule.budget if self.rule else self.missions
+
+    @property
     def size(self) -> int:
         """The number of design points, computed without making them."""
         return self.design.count if self.design else 1

@@ -51,6 +51,14 @@ def test_the_time_is_that_of_a_trial(step, trial, tmp_path):
     assert by_two.seconds == pytest.approx(plan.seconds / 2)
 
 
+def test_event_logs_take_time_as_well(tmp_path):
+    logged = small_study(tmp_path, logged=4)
+    plan = plan_study(logged, tmp_path / "out", clock=Clock(1.0))
+    assert [p.seconds for p in plan.policies] == pytest.approx([(10 + 4) / TRIAL] * 2)
+    run_study(logged, tmp_path / "out")
+    assert plan_study(logged, tmp_path / "out").seconds == 0.0
+
+
 def test_a_rule_has_a_least_and_a_most(tmp_path):
     targets = {"success": {"absolute": 0.1}}
     precise = {"first": 5, "look_ahead": 5, "budget": 50, "targets": targets}

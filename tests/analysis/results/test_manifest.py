@@ -109,6 +109,24 @@ def test_a_text_that_is_no_manifest_is_one_line(
         assert "Traceback" not in (line := capsys.readouterr().err) and len(line) < 700
 
 
+@pytest.mark.parametrize("rule", [True, False])
+def test_more_missions_than_the_study_asks_for_are_refused(
+    rule: bool, sound: Path, tmp_path: Path
+) -> None:
+    if not rule:
+        run_study(small_study(tmp_path), tmp_path / "out")
+    folder, most = (sound, 40) if rule else (tmp_path / "out", 10)
+    document = json.loads((folder / "manifest.json").read_text())
+    for count, refused in ((most, False), (most + 1, True), (10**9, True)):
+        forged = [[count] * len(of_team) for of_team in document["missions"]]
+        try:
+            Manifest.parse(json.dumps(document | {"missions": forged}), "manifest", "allowed: less")
+        except InputError as error:
+            assert refused and "fewer or more than those of the study" in str(error)
+        else:
+            assert not refused
+
+
 def test_claims_that_no_file_supports_are_refused_at_once(sound: Path, tmp_path: Path) -> None:
     document = json.loads((sound / "manifest.json").read_text())
     claims: dict[str, Any] = {
