@@ -57,7 +57,7 @@ def blocks_of(nodes: np.ndarray, grid: int, most: int, levels: np.ndarray) -> Bl
     return Blocks(home, near, place, levels)
 
 
-@inlined
+@kernel
 def data_had(data, phases, phase, f):
     """(K,) the data [data units] that each node can have had by flying slot f."""
     return data[phases.clock[phase, min(f, phases.clock.shape[1] - 1)]]
@@ -147,6 +147,7 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
     """
     slots, grid, levels = len(ceilings) - 1, len(blocks.home), len(blocks.levels)
     begins = np.empty((5, grid, grid, levels, levels))
+    scratch = np.empty(local.shape[1]), np.empty(local.shape[1])
     for phase in range(len(phases.deadline)):
         ceilings[slots, phase] = -waiting[end_of(phases, phase, slots, len(waiting) - 1)]
     for f in range(slots - 1, -1, -1):
@@ -162,7 +163,10 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
                 for x in range(grid):
                     for y in range(grid):
                         if _is_reached(mission, phases, phase, f, x, y):
-                            _act(blocks, local, gain, then, had, then_had, begins, x, y, here[x, y])
+                            _act(
+                                blocks, local, gain, then, had, then_had, begins, x, y, scratch,
+                                here[x, y],
+                            )  # fmt: skip
             target = phases.after[f]
             for x in range(grid):
                 for y in range(grid):
@@ -205,10 +209,10 @@ def _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, 
 
 
 @inlined
-def _act(blocks, local, gain, then, had, then_had, begins, x, y, here):
+def _act(blocks, local, gain, then, had, then_had, begins, x, y, scratch, here):
     """Raise the ceilings of a state to what its actions can earn."""
     grid, home, prices = len(blocks.home), blocks.home[x, y], local.shape[1]
-    line, least = np.empty(prices), np.empty(prices)
+    line, least = scratch
     for action in range(5):
         x2, y2 = x + STEP_X[action], y + STEP_Y[action]
         if not (0 <= x2 < grid and 0 <= y2 < grid):

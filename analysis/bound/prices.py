@@ -145,7 +145,7 @@ def _data_by(mission, residual, slots):
     return data
 
 
-class _Bounds:
+class Bounds:
     """The bound of one mission as a function of the prices."""
 
     def __init__(self, known: Known, detail: Detail):
@@ -189,7 +189,7 @@ class _Bounds:
 
 def improve(known: Known, iterations: int, detail: Detail) -> Bound:
     """Search for prices with a low bound; the lowest bound found is kept."""
-    bounds = _Bounds(known, detail)
+    bounds = Bounds(known, detail)
     shape = len(bounds.cuts), len(known.nodes)
     most = np.full(shape, np.inf)
     most[-1] = 1.0
@@ -213,7 +213,7 @@ def _first_prices(known: Known, shape: tuple[int, int]) -> np.ndarray:
 
 
 def _descend(
-    bounds: _Bounds, prices: np.ndarray, most: np.ndarray, iterations: int
+    bounds: Bounds, prices: np.ndarray, most: np.ndarray, iterations: int
 ) -> tuple[np.ndarray, float]:
     """The prices with the lowest bound of those that the bundle method tries, and the bound."""
     points, found = np.empty((iterations, prices.size)), np.empty(iterations)

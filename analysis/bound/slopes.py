@@ -45,7 +45,7 @@ def _leave(blocks, local, now, ahead, had, then_had, home, there, level, q):
     return least, best, chosen
 
 
-@inlined
+@kernel
 def _choose(
     mission, phases, data, period, blocks, local, values, waiting, ceilings,
     f, phase, x, y, memory, q,
