@@ -122,7 +122,8 @@ def coverage(space: ScenarioSpace, shares: Mapping[str, np.ndarray]) -> dict[str
         title = f"Collected by {policy}"
         maps[title] = _map(space, title, values, [f"{100 * v:.0f}" for v in values])
     title, most = f"{first} − {second}", max(float(np.abs(one - other).max()), 0.01)
-    texts = [numbers.difference(*pair) for pair in zip(one, other, strict=True)]
+    points = np.round(100 * (one - other)).astype(int)
+    texts = [numbers.minus(f"{lead:+}") if lead else "0" for lead in points]
     maps[title] = _map(space, title, (one - other) / most, texts, _BOTH, -1.0)
     return maps
 

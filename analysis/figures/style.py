@@ -30,7 +30,7 @@ UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a
 # Policies that look the same in all figures, whatever other policies are drawn.
 KNOWN_POLICIES = (
     *("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"),
-    *("random-unguarded", "age", "planner", "planner-long"),
+    *("planner-long", "age", "random-unguarded", "planner"),
 )
 LINES = ("-", "--", ":", "-.")
 WIDTH, DPI = 5.2, 150  # inches, dots per inch

@@ -72,7 +72,7 @@ def test_maps_of_coverage_show_both_shares_and_the_difference() -> None:
     assert [*maps] == ["Collected by one", "Collected by two", "one − two"]
     texts = [[text.get_text() for text in figure.axes[0].texts] for figure in maps.values()]
     assert texts[0][:2] == ["0", "4"] and {*texts[1]} == {"50"}
-    assert (texts[2][0], texts[2][12], texts[2][24]) == ("−50.0", "0.0", "+50.0")
+    assert (texts[2][0], texts[2][12], texts[2][24]) == ("−50", "0", "+50")
 
 
 def test_the_share_at_home_is_a_line_per_policy() -> None:
