@@ -90,8 +90,9 @@ class WhatIf:
 
     @property
     def measured(self) -> list[str]:
-        """What is measured beyond the paper's metrics, such as the age of information."""
-        return answer.measured(self.results)
+        """What is measured beyond the paper's metrics and not 0 throughout, such as the age."""
+        names, missions = answer.measured(self.results), self.results.missions
+        return [name for name in names if missions[name].any()]
 
     def fields(self) -> pd.DataFrame:
         """The fields that the variation changes, that both sides set, and that missions draw."""

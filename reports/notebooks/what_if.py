@@ -98,8 +98,8 @@ html.gallery(
 # The tables have means per mission and mean paired differences with their 95 % intervals. Data are
 # in data units. The signs mean: ▲ the whole interval is above 0, ▼ it is below 0, ≈ it contains 0.
 # A UAV waits while it requests a charging pad and none is free. Its battery counts as depleted if
-# it becomes empty before the quota is filled. Nothing stands where only one side measures
-# something.
+# it becomes empty before the quota is filled. A side that does not measure something has a dash,
+# and then there is no difference.
 
 # %%
 for policy in asked.policies:

@@ -224,7 +224,7 @@ def pairing(table: pd.DataFrame) -> pd.DataFrame:
         left = 1 - row.variance_reduction
         narrower = numbers.percent(1 - left**0.5) if left < 1 else "none"
         worth = f"{row.n / left:,.0f}" if left else "any number"
-        amounts = (_amount(row.correlation), numbers.percent(left), narrower, worth)
+        amounts = (numbers.minus(f"{row.correlation:.2f}"), numbers.percent(left), narrower, worth)
         lines.append((row.policy, _SHORT[row.metric], *amounts))
     heads = ["Policy", "Metric", "Correlation", "Variance left", "Narrower by", "Worth"]
     return pd.DataFrame(lines, columns=heads)

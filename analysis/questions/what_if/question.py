@@ -69,6 +69,9 @@ def question(
         if not isinstance(values, Mapping):
             raise InputError(f"{name}: {values!r}; allowed: fields and values, such as {{uavs=5}}")
     fixed, changed = dotted(dict(baseline or {})), dotted(dict(settings))
+    measuring = {field for field in changed if field.endswith(".measured")}
+    if changed.keys() - measuring:  # what changes is something else, which both sides measure
+        fixed |= {field: changed.pop(field) for field in sorted(measuring)}
     fixed = _measured(fixed | changed) | fixed
     _check_changes(
         load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed

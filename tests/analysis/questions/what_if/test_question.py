@@ -50,6 +50,7 @@ def test_the_two_points_are_the_scenario_before_and_after(settings, baseline):
         ({"age": {"reward": -1.0}}, {}, (True, True)),
         ({"uavs": 5}, {"age.reward": -1.0}, (True, True)),
         ({"age.measured": True}, {}, (False, True)),
+        ({"age.measured": True, "uavs": 5}, {}, (True, True)),
         ({"age.reward": -1.0}, {"age.measured": False}, (False, False)),
         ({"wind.strength": 1.0}, {}, (False, False)),
     ],
