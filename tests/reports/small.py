@@ -19,7 +19,7 @@ from analysis.execution import decision_time as timing
 from analysis.execution import jobs
 from analysis.verification import cross_check
 from dess.scenario import ScenarioSpace
-from policies.planner import Planner
+from policies.planner import Budget, Planner
 from reports.pages import html
 from reports.pages.notebook import Report, read
 from reports.player import library
@@ -90,8 +90,7 @@ def quick() -> Iterator[None]:
     """Bounds that take no time, and planners that search little."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "upper_bound", made_up)
-        patch.setattr(Planner, "new", 500)
-        patch.setattr(Planner, "kept", 20)
+        patch.setattr(Planner, "budget", Budget(500, 20, 20))
         yield
 
 

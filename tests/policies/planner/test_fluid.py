@@ -9,6 +9,7 @@ from dess.view import View, acting_rows
 from policies.planner.fluid import (
     CHARGE,
     MOST_SLOTS,
+    NEVER,
     Plan,
     begin,
     empty_flight,
@@ -98,3 +99,82 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int) -> None:
         assert [*zip(log["x"][moves], log["y"][moves], log["value"][moves], strict=True)] == (
             flown[: moves.sum()]
         )
+
+
+@pytest.mark.parametrize("replication", range(4))
+def test_more_search_is_never_worse(replication: int) -> None:
+    """The value that is returned is that of the plan, and each search keeps the best it finds."""
+    view = _view(load_scenario("paper"), 777001, replication)
+    plan, values = empty_plan(view.state.uavs.shape[1]), []
+    for i in range(int(view.state.missions[0]["uavs"])):
+        insert(plan, i, 0, 26 + i, 5, CHARGE, 0)
+    for steps in (0, 1, 10, 100, 1000, 1000):
+        values.append(_improved(view, plan, steps))
+        assert values[-1] == _flown(view, plan, 400)[1]
+    assert values == sorted(values) and values[-1] > values[0] + 100
+
+
+def test_a_resumed_flight_is_the_whole_flight() -> None:
+    view = _view(load_scenario("paper", uavs=2), 777001)
+    (mission,), uavs, residual = view.state.missions, view.state.uavs[0], view.state.residual[0]
+    rates, whole = rates_of(view), empty_flight(500, 2, len(residual))
+    again = empty_flight(500, 2, len(residual))
+    plan = _plan(2, [(23, 6, 1), (18, 6, 2), (26, 5, CHARGE), (23, 11, 0)], [(27, 5, CHARGE)])
+    begin(mission, uavs, residual, rates, whole)
+    value = fly(mission, rates, plan, whole, 0, whole, 500)
+    begun = plan.waypoints["begun"].copy()
+    for first in range(whole.last[0]):
+        assert fly(mission, rates, plan, whole, first, again, 500) == value
+        assert (plan.waypoints["begun"] == begun).all()
+        assert (again.last == whole.last).all()
+    assert 0 == begun[0, 0] < begun[0, 1] < begun[0, 2] < begun[0, 3] < NEVER
+
+
+# --- hand-worked: a lone UAV at a single node ---
+
+ALONE = {
+    **{"grid": 8, "zone": [2, 2, 1, 1], "nodes": [[2, 2]], "uavs": 1, "quota": 40},
+    **{"initial_data": 10.0, "charge_start": 10, "charge_complete": 60, "flying_time": 30},
+}
+
+
+def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> None:
+    scenario = Scenario.of(**ALONE, shadowing_variance=0.0, arrival_rate=0.1)
+    view = _view(scenario)
+    empty = empty_plan(1)
+    _, value, _ = _flown(view, empty, 1)
+    assert value == pytest.approx(10.0 * 10.0 / 10.1)  # it hovers at the node and empties it
+    taken = [_flown(view, empty, slots)[2] for slots in range(1, 8)]
+    # Emptied in slot 0; in slot 5, five slots of 0.1 data units are there.
+    assert taken == pytest.approx([10.0] * 5 + [10.5] * 2)
+
+
+def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set() -> None:
+    scenario = Scenario.of(**ALONE, **CALM)
+    plan = _plan(1, [(2, 2, CHARGE), (4, 2, 0)])
+    crafts, _, _ = _flown(_view(scenario), plan, 28)
+    batteries = [int(craft["battery"][0]) for craft in crafts]
+    # 20 slots until C_S = 10, five slots to C_C = 60, and then two cells to the east.
+    assert batteries == [*range(30, 9, -1), 20, 30, 40, 50, 60, 59, 58, 57]
+    assert [int(craft["x"][0]) for craft in crafts[-4:]] == [2, 3, 4, 4]
+
+
+def test_a_teammate_in_the_way_costs_something() -> None:
+    scenario = Scenario.of(**(ALONE | {"zone": [2, 2, 2, 1], "uavs": 2}), **CALM)
+    view = _view(scenario)
+    cells = [(int(u["x"]), int(u["y"])) for u in view.state.uavs[0]]
+    into = _plan(2, [], [(*cells[0], 0)])  # the second flies to the cell of the first
+    apart = _plan(2, [], [])
+    blocked, free = (_flown(view, plan, 3) for plan in (into, apart))
+    assert [tuple(map(tuple, craft[["x", "y"]].tolist())) for craft in blocked[0]] == [
+        tuple(cells)
+    ] * 4
+    assert blocked[1] < free[1]
+
+
+def test_a_depleted_battery_costs_more_than_all_data() -> None:
+    scenario = Scenario.of(**(ALONE | {"quota": 200}), shadowing_variance=0.0, arrival_rate=0.2)
+    away, home = _plan(1, [(6, 6, 90)]), _plan(1, [(2, 2, CHARGE)])
+    view = _view(scenario)
+    values = [_flown(view, plan, 200)[1] for plan in (away, home)]
+    assert values[0] < -100 < 0 < values[1]

@@ -19,7 +19,7 @@ def test_names_are_listed(dess):
         "scenarios": ["bay", "fig1", "fig4", "paper"],
         "studies": [
             *("age", "charge-limits", "comparison", "explorer", "failures", "fig1", "fig4", "fig5"),
-            *("pads", "precise", "screening", "sensitivity", "sweet-spot", "table4"),
+            *("gap", "pads", "precise", "screening", "sensitivity", "sweet-spot", "table4"),
             "verification",
         ],
     }.items():

@@ -11,7 +11,7 @@ from analysis.questions.optimality import planner
 from analysis.questions.optimality.gap import ALL
 from analysis.results.event_log import uav_slots
 from dess import InputError
-from policies.planner import Planner
+from policies.planner import Budget, Planner
 from tests.analysis.small import small_study
 
 LOGGED = 3
@@ -130,7 +130,7 @@ def test_only_planners_have_a_plan(results):
 
 
 def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
-    monkeypatch.setattr(Planner, "new", 500)
+    monkeypatch.setattr(Planner, "budget", Budget(500, 0, 0))
     for replication in range(LOGGED):
         courses = planner.plan(results, "planner", replication)
         log = results.events("greedy", 0, replication)
