@@ -79,9 +79,9 @@ def _is_reached(mission, phases, phase, f, x, y):
 
 
 @inlined
-def end_of(phases, phase, f, slots):
-    """The mission slots after which a UAV can have stopped with f flying slots, at the earliest."""
-    return min(f + phases.charged[phase], slots)
+def last_slot(phases, phase, f, slots):
+    """The earliest mission slot of the last of f flying slots."""
+    return min(max(f - 1, 0) + phases.charged[phase], slots)
 
 
 @inlined
@@ -141,7 +141,7 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
         blocks: ``Blocks``.
         local: (K, Q) local prices, ascending; the first is 0.
         values: From ``step_values``.
-        waiting: (T + 1,) what it costs a UAV that the mission ends after t slots.
+        waiting: (T + 1,) what it costs a UAV that its last flying slot is not before slot t.
         ceilings: (F + 1, P, M, M, J, Q) worth of the future per memory and local price,
             overwritten where a UAV can be.
     """
@@ -149,13 +149,13 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
     begins = np.empty((5, grid, grid, levels, levels))
     scratch = np.empty(local.shape[1]), np.empty(local.shape[1])
     for phase in range(len(phases.deadline)):
-        ceilings[slots, phase] = -waiting[end_of(phases, phase, slots, len(waiting) - 1)]
+        ceilings[slots, phase] = -waiting[last_slot(phases, phase, slots, len(waiting) - 1)]
     for f in range(slots - 1, -1, -1):
         for phase in range(len(phases.deadline) - 1, -1, -1):
             if phase > 0 and f < phases.opens[0]:
                 continue
             here = ceilings[f, phase]
-            here[:] = -waiting[end_of(phases, phase, f, len(waiting) - 1)]
+            here[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
             had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
             if f < phases.deadline[phase]:
                 gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]

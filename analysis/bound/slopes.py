@@ -10,7 +10,7 @@ from analysis.bound.paths import (
     STOP,
     beginning,
     data_had,
-    end_of,
+    last_slot,
     may_charge,
     memory_of,
     remembered,
@@ -54,7 +54,7 @@ def _choose(
     home = blocks.home[x, y]
     node, level = remembered(blocks, home, memory)
     had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
-    most = -waiting[end_of(phases, phase, f, len(waiting) - 1)]
+    most = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
     choice, line, later = STOP, q, 0
     if may_charge(mission, phases, phase, f, x, y):
         new = data_had(data, phases, phases.after[f], f) - had
@@ -102,7 +102,7 @@ def add_slopes(
         slopes: (S, K) derivatives by ``worth``, increased.
 
     Returns:
-        The bound of the UAV, and the mission slots after which it stops.
+        The bound of the UAV, and the earliest mission slot of its last flying slot.
     """
     phase, f, memory, home, last = 0, 0, 0, blocks.home[x, y], slopes[-1]
     had = data_had(data, phases, phase, 0)
@@ -150,4 +150,4 @@ def add_slopes(
         slopes[s] += takings
         last[home] -= parts[q] * takings[home]
         f += 1
-    return least, end_of(phases, phase, f, len(waiting) - 1)
+    return least, last_slot(phases, phase, f, len(waiting) - 1)

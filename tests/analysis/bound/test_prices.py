@@ -18,7 +18,7 @@ def tiny(**values: object) -> ScenarioSpace:
     return load_scenario("paper", **TINY | values)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck))
 @given(
     uavs=st.integers(1, 4),
     quota=st.integers(1, 120),
@@ -40,14 +40,14 @@ def test_no_policy_collects_more_without_shadowing(
         edge_snr=edge_snr, flight_cost=flight_cost, shadowing_variance=0.0,
     )  # fmt: skip
     ratio = simulate_batch(space, policies.load(policy), seed).missions["collection_ratio"][0]
-    assert ratio <= upper_bound(space, seed, 0, iterations=6).ratio
+    assert ratio - 1e-12 <= upper_bound(space, seed, 0, iterations=3).ratio
 
 
 def test_no_policy_has_a_higher_mean_with_shadowing() -> None:
     values = {"uavs": (1, 2), "quota": 40, "initial_data": (40.0, 60.0)}
     space = tiny(**values, flying_time=8, charge_start=10, charge_complete=30)
     bounds = [upper_bound(space, 3, r, iterations=6).ratio for r in range(20)]
-    for policy in ("greedy", "tour"):
+    for policy in ("greedy", "tour", "planner"):
         ratios = simulate_batch(space, policies.load(policy), 3, 20).missions["collection_ratio"]
         assert ratios.mean() <= np.mean(bounds)
     assert min(bounds) < 1

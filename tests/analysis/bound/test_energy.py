@@ -1,0 +1,53 @@
+"""What batteries allow: compared with hand-worked cases and with all ways to charge."""
+
+from functools import cache
+
+import pytest
+
+from analysis.bound.energy import most_charging, phases_of
+from dess.scenario import Scenario
+
+
+def scenario(**values: object) -> Scenario:
+    return Scenario.of(**{"uavs": 1, "quota": 80, "communication_slots": 4} | values)
+
+
+def test_phases_of_a_case_worked_by_hand() -> None:
+    # 20 flying slots; the battery lasts 12, and 15 after a charge that may begin at slot 2.
+    phases = phases_of(scenario(flying_time=12, charge_start=10, charge_complete=15, charge_rate=5))
+    # A charge before slot 20 - 15 = 5 does not suffice: one phase for charges at slots 2 to 4.
+    assert phases.deadline.tolist() == [12, 4 + 15, 20]
+    assert (phases.opens[0], phases.closes[0]) == (2, 11)
+    assert (phases.opens[1], phases.closes[1]) == (2 + 5, 4 + 14)
+    assert phases.after[[2, 4, 5, 19]].tolist() == [1, 1, 2, 2]
+    assert phases.charged.tolist() == [0, 1, 1]
+    assert phases.clock[0].tolist() == [*range(20)]
+
+
+def test_without_battery_decrease_there_is_one_phase() -> None:
+    phases = phases_of(scenario(flight_cost=0, flying_time=10, charge_start=10, charge_complete=35))
+    assert phases.deadline.tolist() == [20]
+    assert phases.clock[0].tolist() == [f + 3 for f in range(20)]  # 25 % at 10 % per slot
+    never = phases_of(scenario(flight_cost=0, flying_time=11, charge_start=10, charge_complete=35))
+    assert never.slots == 20
+
+
+@pytest.mark.parametrize(
+    ("start", "low", "full", "rate"), [(12, 10, 15, 5), (7, 10, 11, 3), (20, 12, 14, 1)]
+)
+def test_no_way_to_charge_takes_longer(start: int, low: int, full: int, rate: int) -> None:
+    values = {"flying_time": start, "charge_start": low, "charge_complete": full}
+    most = most_charging(scenario(**values, charge_rate=rate), 20)
+
+    @cache
+    def longest(battery: int, slots: int) -> int:
+        """The most charging slots before ``slots`` further flying slots, trying all ways."""
+        ways = [0]
+        if slots > 0 and battery > 1:
+            ways.append(longest(battery - 1, slots - 1))
+        if battery <= low:
+            needed = -(-(full - battery) // rate)
+            ways.append(needed + longest(full, slots))
+        return max(ways)
+
+    assert most.tolist() == [longest(start, f) for f in range(20)]
