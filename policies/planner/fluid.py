@@ -1,7 +1,8 @@
 """The fluid model: what a plan collects if every rate is its mean and data arrive evenly.
 
-    value = fly(mission, rates, plan, flight, 0, flight)     # the whole plan
-    value = fly(mission, rates, other, flight, 5, trial)     # again, from the sixth snapshot on
+    begin(mission, uavs, residual, rates, flight)
+    value = fly(mission, rates, plan, flight, 0, flight, 500)   # the whole plan
+    value = fly(mission, rates, other, flight, 5, ahead, 500)   # again, from the sixth snapshot on
 
 The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
 batteries, the charging latch, pads, quotas, and communication slots in which each UAV serves the

@@ -9,6 +9,7 @@ They go when these arrays go. In slot 0 every mission is planned anew.
 """
 
 import weakref
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -36,6 +37,8 @@ from policies.planner.search import empty_workspace, improve
 # and for a short one. Every so many slots, a search is thorough.
 _NEW, _THOROUGH, _SHORT = 2.0, 1.0, 0.3
 _ROUND = 8
+# Rows that are decided together. Ctrl-C waits until they are.
+_ROWS = 4
 
 
 class Budget(NamedTuple):
@@ -88,12 +91,17 @@ class Planner:
         """Choose the (R,) actions for the rows of the view."""
         state = view.state
         slots = int(state.missions["max_slots"].max())
-        return _decide(
-            state.missions, state.uavs, state.residual, view.world.nodes, rates_of(view),
-            memory_of(state, self.budget),
-            empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1]),
-            view.mission, view.uav, guard(view), self.budget,
-        )  # fmt: skip
+        rates, safe = rates_of(view), guard(view)
+        memory = memory_of(state, self.budget)
+        workspace = empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1])
+        actions = np.empty(len(view), np.int64)
+        for start in range(0, len(view), _ROWS):
+            rows = slice(start, start + _ROWS)
+            actions[rows] = _decide(
+                state.missions, state.uavs, state.residual, view.world.nodes, rates,
+                memory, workspace, view.mission[rows], view.uav[rows], safe[rows], self.budget,
+            )  # fmt: skip
+        return actions
 
 
 class LongPlanner(Planner):
@@ -114,7 +122,8 @@ def memory_of(state: State, budget: Budget) -> Memory:
             np.zeros(shape, np.int64),
             np.zeros(shape, CRAFT),
         )
-        _MEMORIES[key] = weakref.ref(missions, lambda _: _MEMORIES.pop(key)), memory
+        forget = partial(_MEMORIES.pop, key)  # called with the reference, as the default of ``pop``
+        _MEMORIES[key] = weakref.ref(missions, forget), memory
     return _MEMORIES[key][1]
 
 

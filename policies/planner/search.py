@@ -1,6 +1,6 @@
 """The search for a plan: simulated annealing over the waypoints of the whole team.
 
-    value = improve(mission, uavs, residual, nodes, rates, plan, 20_000, 2.0)
+    value = improve(mission, uavs, residual, nodes, rates, plan, workspace, 20_000, 2.0)
 
 Each step edits the plan, flies it in the fluid model from the first slot that the edit can change,
 and keeps the edit or takes it back (S. Kirkpatrick, C. Gelatt, M. Vecchi, *Optimization by
