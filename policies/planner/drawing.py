@@ -11,7 +11,8 @@ import numpy as np
 from dess.mission import MissionModel, simulate
 from dess.scenario import Scenario, ScenarioSpace
 from dess.view import View, decide
-from policies.planner.fluid import MOST_SLOTS, Plan, begin, empty_flight, fly
+from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
+from policies.planner.plan import Plan
 from policies.planner.policy import Planner, memory_of
 from policies.planner.rates import rates_of
 

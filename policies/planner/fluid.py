@@ -20,22 +20,10 @@ from dess.observations.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.rules import in_zone
 from dess.sections.failures import working_pads
 from dess.state import HOVER, STEP_X, STEP_Y
+from policies.planner.plan import CHARGE, NEVER
 
 # The data of a flight are records: the compiled code passes them on without counting references,
 # which would take longer than the model itself.
-WAYPOINT = np.dtype(
-    [
-        ("x", np.int64),
-        ("y", np.int64),
-        ("stay", np.int64),  # slots to hover there; ``CHARGE`` means: until it is charged
-        ("turned", np.int64),  # 1 if the leg to it begins along y
-        ("begun", np.int64),  # slot in which that leg begins, ``NEVER`` if it does not
-    ]
-)
-CHARGE, NEVER = -1, 1 << 40
-# The most waypoints of a UAV. One record more tells when the last one is done with.
-MOST_WAYPOINTS = 48
-
 # A UAV in the model.
 CRAFT = np.dtype(
     [
@@ -79,57 +67,6 @@ _SOME_ARRIVE = 0.1
 # percent of battery below the guard's reserve at the charging zone; a slot in which the guard would
 # send the UAV home; a move that a teammate blocks.
 _DEPLETED, _SLOT_MISSED, _LATE, _UNPLANNED, _BLOCKED = 100.0, 5.0, 4.0, 0.5, 0.2
-
-
-class Plan(NamedTuple):
-    """Waypoints of I UAVs.
-
-    Attributes:
-        waypoints: (I, ``MOST_WAYPOINTS`` + 1) ``WAYPOINT`` records.
-        lengths: (I,) how many of them there are.
-    """
-
-    waypoints: np.ndarray
-    lengths: np.ndarray
-
-
-def empty_plan(uavs: int) -> Plan:
-    """A plan of that many UAVs without waypoints."""
-    return Plan(np.zeros((uavs, MOST_WAYPOINTS + 1), WAYPOINT), np.zeros(uavs, np.int64))
-
-
-@kernel
-def copy_plan(mission, source, target):
-    """Make one plan equal to another."""
-    for i in range(mission.uavs):
-        target.lengths[i] = source.lengths[i]
-        for number in range(source.lengths[i] + 1):
-            target.waypoints[i, number] = source.waypoints[i, number]
-
-
-@kernel
-def insert(plan, i, place, x, y, stay, turned):
-    """Insert a waypoint of UAV ``i`` before one of its."""
-    for number in range(plan.lengths[i], place, -1):
-        w = plan.waypoints[i, number - 1]
-        set_waypoint(plan.waypoints[i, number], w.x, w.y, w.stay, w.turned)
-    set_waypoint(plan.waypoints[i, place], x, y, stay, turned)
-    plan.lengths[i] += 1
-
-
-@kernel
-def remove(plan, i, place):
-    """Take out a waypoint of UAV ``i``."""
-    plan.lengths[i] -= 1
-    for number in range(place, plan.lengths[i]):
-        w = plan.waypoints[i, number + 1]
-        set_waypoint(plan.waypoints[i, number], w.x, w.y, w.stay, w.turned)
-
-
-@inlined
-def set_waypoint(w, x, y, stay, turned):
-    """Set all of a waypoint but when its leg begins, which belongs to its place in the plan."""
-    w.x, w.y, w.stay, w.turned = x, y, stay, turned
 
 
 class Flight(NamedTuple):
@@ -367,10 +304,7 @@ def _towards(v, w, turned):
 
 @inlined
 def _blocks(mission, v, other, has_moved):
-    """Whether a teammate keeps a UAV out of the cell to which its action leads.
-
-    A teammate that has not moved yet will move away, unless it charges.
-    """
+    """Whether a teammate, which will move away unless it charges, is where an action leads."""
     x, y = v.x + STEP_X[v.action], v.y + STEP_Y[v.action]
     stays = has_moved or other.charging != 0 or (other.latch != 0 and in_zone(mission, x, y))
     return stays and other.x == x and other.y == y and other.active != 0

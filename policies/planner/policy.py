@@ -20,16 +20,8 @@ from dess.rules import in_zone, zone_cell
 from dess.state import HOVER, State
 from dess.view import View
 from policies.heuristics import step_towards
-from policies.planner.fluid import (
-    CHARGE,
-    CRAFT,
-    MOST_WAYPOINTS,
-    WAYPOINT,
-    Plan,
-    fly,
-    insert,
-    remove,
-)
+from policies.planner.fluid import CRAFT, fly
+from policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
 from policies.planner.rates import rates_of
 from policies.planner.search import empty_workspace, improve
 

@@ -17,19 +17,21 @@ from dess.code.kernels import inlined, kernel
 from dess.rules import in_zone, on_grid, zone_cell
 from dess.state import STEP_X, STEP_Y
 from policies.planner.fluid import (
-    CHARGE,
     MOST_SLOTS,
-    MOST_WAYPOINTS,
-    NEVER,
     STRIDE,
     Flight,
-    Plan,
     begin,
-    copy_plan,
     copy_snapshot,
     empty_flight,
-    empty_plan,
     fly,
+)
+from policies.planner.plan import (
+    CHARGE,
+    MOST_WAYPOINTS,
+    NEVER,
+    Plan,
+    copy_plan,
+    empty_plan,
     insert,
     remove,
     set_waypoint,

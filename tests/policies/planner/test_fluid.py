@@ -6,17 +6,8 @@ import pytest
 from dess import Scenario, ScenarioSpace, load_scenario, simulate
 from dess.env.stepper import MissionStepper
 from dess.view import View, acting_rows
-from policies.planner.fluid import (
-    CHARGE,
-    MOST_SLOTS,
-    NEVER,
-    Plan,
-    begin,
-    empty_flight,
-    empty_plan,
-    fly,
-    insert,
-)
+from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
+from policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
 from policies.planner.rates import rates_of
 from policies.planner.search import empty_workspace, improve
 
