@@ -145,7 +145,8 @@ html.table(
 # ## Decision time against quality
 #
 # The time is the median time in which a policy decides for the UAVs of one mission, on one core.
-# Policies on the line are not dominated: none is at least as fast and as good.
+# Policies on the line are not dominated: none is at least as fast and as good. A planner takes much
+# longer than the median in the first slot, in which it makes a new plan; the table has slow calls.
 
 # %%
 points = questions.front(study, times)
