@@ -27,6 +27,7 @@ from dess.state import constants_of, empty_state, ranges_of, sample_scenario, ty
 
 ITERATIONS = 20
 _FIRST_DECREASE = 0.1  # of the bound, that the first step aims at
+_HOPE = 4  # the search ends if a quarter of the iterations has found no bound below 1
 
 
 class Detail(NamedTuple):
@@ -58,7 +59,7 @@ class Bound:
             in a slot is worth 1 less the prices of all cuts at this slot or later. With prices
             of 1 at the last cut the bound is 1.
         cuts: (S,) the last mission slot of each cut; the last cut is the end of the mission.
-        iterations: How many prices have been tried.
+        iterations: The most prices that were to be tried.
     """
 
     ratio: float
@@ -230,6 +231,8 @@ def _descend(
             width *= 0.6
         if found[i] < lowest:
             centre, lowest = prices, float(found[i])
+        if lowest > 1.0 and i >= iterations // _HOPE:
+            break  # a bound of 1 is known already
         if i + 1 < iterations:
             chosen, predicted = next_prices(
                 centre.ravel(), most.ravel(), lowest, points[: i + 1], found[: i + 1],
