@@ -48,8 +48,8 @@ TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
 # A class of a Python file.
 FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
 _OTHERS = (
-    "the folder of a trained policy, a class of a Python file (FILE.py:CLASS), or a policy that an "
-    f"installed package registers under the entry point {GROUP}"
+    "the folder of a trained policy, FILE.py:CLASS, or what an installed package registers under "
+    f"the entry point {GROUP}"
 )
 
 

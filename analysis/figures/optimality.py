@@ -147,7 +147,7 @@ def at_home(table: pd.DataFrame) -> Figure:
 
 
 def plan(mission: LoggedMission, courses: Sequence[Course]) -> Figure:
-    """The plan of the first slot, as dashed lines over the mission as it was flown.
+    """The plan of the first slot, as dashed lines over the mission as simulated.
 
     Args:
         mission: The mission.
@@ -164,7 +164,7 @@ def plan(mission: LoggedMission, courses: Sequence[Course]) -> Figure:
                 ax.annotate(str(number), cell, xytext=(6, 6), textcoords="offset points",
                             color=colour, fontsize=8, fontweight="bold", zorder=10,
                             path_effects=[withStroke(linewidth=2, foreground="white")])  # fmt: skip
-        ax.set_title("The first plan (dashed), and the mission as flown")
+        ax.set_title("The first plan (dashed), and the mission as simulated")
         style.legend_below(figure, ax)
     return figure
 

@@ -7,7 +7,7 @@
 The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
 batteries, the charging latch, pads, quotas, and communication slots in which each UAV serves the
 node with the highest mean SNR among those with data. Flights are resumed from snapshots, so a plan
-that differs in its last waypoints from one that was flown is flown from there on.
+that differs in its last waypoints from one that was simulated is simulated from there on.
 """
 
 import math
@@ -70,7 +70,7 @@ _DEPLETED, _SLOT_MISSED, _LATE, _UNPLANNED, _BLOCKED = 100.0, 5.0, 4.0, 0.5, 0.2
 
 
 class Flight(NamedTuple):
-    """A plan as flown by the model: its state every ``STRIDE`` slots, and at the end.
+    """A plan as simulated by the model: its state every ``STRIDE`` slots, and at the end.
 
     Slots are counted from the present one. The last of the S snapshots is working memory.
 
@@ -78,7 +78,7 @@ class Flight(NamedTuple):
         team: (S, I) ``CRAFT`` records.
         sea: (S, K) ``NODE`` records.
         sums: (S, 2) data collected, and penalties [data units].
-        last: (2,) the number of the snapshot of the end, and the slots flown until then.
+        last: (2,) the number of the snapshot of the end, and the slots until then.
     """
 
     team: np.ndarray

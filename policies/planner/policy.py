@@ -5,7 +5,7 @@ kept and improved from what has really happened. The return guard has the last w
 
 A plan must depend on nothing but its mission, so the policy itself keeps nothing. Plans belong to
 the arrays in which an engine or an environment holds its missions: row b of a memory to mission b.
-They go when these arrays go. In slot 0 every mission is planned anew.
+They go when these arrays go. In slot 0 every mission is planned from scratch.
 """
 
 import weakref

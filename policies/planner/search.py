@@ -125,7 +125,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
 
 @kernel
 def _keep(mission, ahead, flight, first):
-    """Make a flight that of a trial, which was flown from a snapshot on."""
+    """Make a flight that of a trial, which was simulated from a snapshot on."""
     for s in range(first, ahead.last[0] + 1):
         copy_snapshot(mission, ahead, s, flight, s)
         flight.sums[s, 0], flight.sums[s, 1] = ahead.sums[s, 0], ahead.sums[s, 1]

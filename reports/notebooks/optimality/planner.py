@@ -177,7 +177,7 @@ prices = figures.prices(study.scenario(), questions.node_prices(study, replicati
 caption = f"n = 1, mission {replication}: data units that one more data unit would add to the bound"
 html.gallery(
     [
-        (plan, "The plan of the first slot, over the mission as it was flown", mission.caption),
+        (plan, "The plan of the first slot, over the mission as simulated", mission.caption),
         (prices, "The price of every node's data in the bound of the same mission", caption),
     ]
 )
