@@ -165,7 +165,7 @@ html.table(decision_costs.listed(times, shown), "Times of decisions, and the spe
 # ## One mission: the plan, and which data are worth fetching
 #
 # The price of a node says what one more data unit there would add to the bound. Where it is near 1,
-# the best possible team fetches all data; where it is 0, some data are left in any case.
+# the data are worth fetching; where it is 0, more data there would not raise the bound.
 
 # %%
 mission = questions.example(study, planner)
