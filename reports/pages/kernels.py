@@ -68,9 +68,10 @@ class Kernels:
             future.cancel()
         while any(not future.done() for future in futures):
             for client in self._clients:
-                kernel: Any = client.km
-                if kernel.has_kernel:
-                    kernel.provisioner.process.kill()
+                provisioner: Any = client.km.provisioner
+                # A kernel that ends meanwhile takes its process away: look at it once only.
+                if process := getattr(provisioner, "process", None):
+                    process.kill()
             wait(futures, timeout=0.2)
 
     def _execute(self, report: Report, reports: Sequence[Report]) -> None:

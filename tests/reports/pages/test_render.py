@@ -10,12 +10,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import nbformat
 import pytest
+from jupyter_client.manager import AsyncKernelManager
+from jupyter_client.provisioning import LocalProvisioner
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 
@@ -445,6 +449,25 @@ def test_a_kernel_that_dies_at_its_start_is_started_once_more(
     assert bool(report.failure) == (deaths > 1)
     if report.failure:
         assert re.match(r"report mission: cell 1 of \d+ \(.*\): Kernel died", report.failure)
+
+
+def test_a_kernel_may_end_while_the_others_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its process is taken away by another thread, at any moment."""
+    report: Future = Future()
+    processes = [SimpleNamespace(kill=lambda: report.set_result(None)), None]
+
+    class Ending(LocalProvisioner):
+        @property
+        def process(self) -> Any:
+            return processes.pop(0)
+
+    manager = AsyncKernelManager()
+    manager.provisioner = Ending()
+    runner = kernels.Kernels()
+    monkeypatch.setattr(runner, "_clients", [SimpleNamespace(km=manager)])
+    report.set_running_or_notify_cancel()
+    runner._stop([report])
+    assert report.done()
 
 
 def test_a_kernel_that_dies_in_a_cell_is_not_started_again(results: Path, tmp_path: Path) -> None:
