@@ -1,75 +1,12 @@
-"""The bound of one mission against the optimum of all action sequences, and its derivatives."""
+"""The bound of one mission: what refinements do to it, and its derivatives."""
 
 import numpy as np
 import pytest
 
 from analysis.bound.paths import blocks_of
-from analysis.bound.prices import Bounds, Detail, improve, known_of, upper_bound
-from dess import load_scenario, rules
-from dess.channel import empty_scratch, world_of
+from analysis.bound.prices import Bounds, Detail, improve, known_of
+from dess import load_scenario
 from dess.scenario import ScenarioSpace
-from dess.state import State, constants_of, empty_state, ranges_of, types_of
-
-
-def small(**values: object) -> ScenarioSpace:
-    """A lone UAV that flies five slots, without shadowing."""
-    world = {"grid": 4, "zone": (1, 1, 1, 1), "nodes": ((0, 1), (3, 2)), "edge_snr": -14.0}
-    mission = {"uavs": 1, "quota": 20, "max_slots": 7, "shadowing_variance": 0.0}
-    battery = {"flying_time": 3, "charge_start": 10, "charge_complete": 11, "charge_rate": 10}
-    return load_scenario("paper", **world | mission | battery | {"initial_data": 6.0} | values)
-
-
-def optimum(space: ScenarioSpace, seed: int) -> float:
-    """The highest collection ratio of all action sequences, arrivals known."""
-    world, scratch = world_of(space), empty_scratch(1, len(space.nodes))
-    arrivals = np.empty(len(space.nodes), np.int64)
-    state = empty_state(1, 1, len(space.nodes))
-    state.missions[:] = constants_of(space)
-    state.missions["seed"] = seed
-    rules.launch(state.missions[0], ranges_of(space), types_of(space), *(a[0] for a in state[1:]))
-
-    def best(before: State) -> float:
-        ratios = []
-        for action in range(5):
-            after = State(*(array.copy() for array in before))
-            mission, uav = after.missions[0], after.uavs[0, 0]
-            uav["action"] = action
-            arrays = (array[0] for array in after)
-            rules.advance(*arrays, arrivals, *world, *scratch)
-            if mission["active"]:
-                ratios.append(best(after))
-            else:
-                ratios.append(mission["collected"] / (mission["initial"] + mission["arrived"]))
-            if before.uavs[0, 0]["charging"]:
-                break  # whatever its action, it hovers
-        return max(ratios)
-
-    return best(state)
-
-
-@pytest.mark.parametrize(
-    "values",
-    [
-        {},
-        {"arrival_rate": 0.3},
-        {"initial_data": (5.0, 20.0)},
-        {"nodes": ((0, 1), (3, 2), (0, 3))},
-        {"flight_cost": 0},
-        {"edge_snr": -20.0},
-    ],
-    ids=["two nodes", "many arrivals", "drawn data", "three nodes", "no battery", "far apart"],
-)
-def test_the_bound_is_above_the_optimum_and_near_it(values: dict) -> None:
-    space = small(**values)
-    best, bound = optimum(space, 0), upper_bound(space, 0, 0, iterations=30).ratio
-    assert best - 1e-12 <= bound <= best + 0.1
-    assert bound < 1
-
-
-def test_a_uav_that_only_hovers_over_its_node_is_bounded_exactly() -> None:
-    space = small(grid=2, nodes=((0, 0),), zone=(0, 0, 1, 1), arrival_rate=0.0, edge_snr=-30.0,
-                  quota=4, initial_data=50.0)  # fmt: skip
-    assert optimum(space, 0) == pytest.approx(upper_bound(space, 0, 0, iterations=10).ratio, 1e-5)
 
 
 def test_the_block_before_is_a_neighbour() -> None:
