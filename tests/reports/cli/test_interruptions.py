@@ -6,6 +6,7 @@ import random
 import signal
 import time
 from contextlib import suppress
+from functools import partial
 from itertools import count
 
 import pyarrow.parquet as pq
@@ -32,31 +33,40 @@ def seeded(*words):
 
 # --- studies ---
 
-CHUNKS = "from analysis.execution import runner; runner.CHUNK['events'] = 5"
+CHUNKS = (
+    "from analysis.execution import runner\nrunner.CHUNK['events'] = 5\nrunner.BOUNDS_CHUNK = 2"
+)
 
 
-def a_study(folder, workers, missions):
-    """The command that runs a study of two policies with chunks of five missions."""
+def a_study(folder, workers, missions, bounds=False):
+    """The command that runs a study of two policies with chunks of five missions, or two bounds."""
     folder.mkdir()
     small_study(folder)
     with open(folder / "trial.toml", "a") as study:
-        study.write('engine = "events"\n')
+        study.write(f'engine = "events"\nbounds = {str(bounds).lower()}\n')
     words = ["study", "run", "trial.toml", "--missions", missions, "--workers", workers]
     return Command([*map(str, words)], folder, CHUNKS)
 
 
 def chunks(command):
-    """The number of chunks in the results folder."""
+    """The number of chunks of missions in the results folder."""
     return len([*command.out.glob("missions/*/*.parquet")])
 
 
-def check_studies(folder, workers, number, kills, missions):
-    """Studies that are killed equal one that is not."""
-    undisturbed = a_study(folder / "undisturbed", workers, missions)
+def bounds(command):
+    """The number of chunks of bounds, which come after all missions."""
+    return len([*command.out.glob("bounds/*.parquet")])
+
+
+def check_studies(folder, workers, number, kills, missions, progress=chunks):
+    """Studies that are killed while there is progress equal one that is not."""
+    study = partial(a_study, workers=workers, missions=missions, bounds=progress is bounds)
+    undisturbed = study(folder / "undisturbed")
     undisturbed.run()
     whole = files_of(undisturbed.out)
-    commands = (a_study(folder / f"killed-{n}", workers, missions) for n in count())
-    for killed in kill(commands, number, kills, chunks, 0.2, seeded("study", number, workers)):
+    assert progress(undisturbed) > 0
+    commands = (study(folder / f"killed-{n}") for n in count())
+    for killed in kill(commands, number, kills, progress, 0.2, seeded("study", number, workers)):
         assert files_of(killed.out) == whole
 
 
@@ -64,11 +74,25 @@ def test_a_study_that_is_told_to_end_equals_an_undisturbed_one(tmp_path):
     check_studies(tmp_path, 2, signal.SIGHUP, 1, 100)
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_study_that_ends_in_its_bounds_equals_an_undisturbed_one(number, tmp_path):
+    check_studies(tmp_path, 1, number, 1, 30, bounds)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("number", SIGNALS)
 def test_studies_that_are_killed_equal_an_undisturbed_one(number, workers, tmp_path):
     check_studies(tmp_path, workers, number, KILLS // 2, 1000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("number", [*SIGNALS, signal.SIGINT])
+def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
+    number, workers, tmp_path
+):
+    check_studies(tmp_path, workers, number, KILLS // 3, 60, bounds)
 
 
 # --- trainings ---
