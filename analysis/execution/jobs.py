@@ -91,7 +91,7 @@ class LogJob:
     space: ScenarioSpace
     policy: str
     seed: int
-    missions = 0
+    missions = 1
 
     @property
     def mission(self) -> Part:

@@ -42,16 +42,16 @@ class Round(NamedTuple):
     """A round of a study.
 
     Attributes:
-        number: The number of the round, from 0.
-        missions: Number of missions needed in all rounds up to this one; for bounds, with theirs.
+        number: The number of the round of missions, from 0.
+        missions: Number of missions, event logs and bounds needed up to this round.
         present: Number of those of this round that are already in the folder.
-        of_bounds: Whether the upper bounds of missions are computed; it is the last round then.
+        work: What is made in place of missions: ``event logs``, or ``bounds`` in the last round.
     """
 
     number: int
     missions: int
     present: int
-    of_bounds: bool = False
+    work: str = ""
 
 
 class ChunkError(Exception):
@@ -86,8 +86,8 @@ def run_study(
         out: The results folder.
         workers: Number of processes.
         scheduler: Address of a ``dask.distributed`` scheduler on which to run instead.
-        progress: Called with the number of missions done since its last call. The first call of a
-            round counts the missions that are already there.
+        progress: Called with the number of missions, event logs or bounds done since its last
+            call. The first call of a round counts those that are already there.
         announce: Called before each round.
         accept_code: Whether to keep missions that other code has simulated. The manifest records
             that they were accepted.
@@ -120,7 +120,7 @@ class _Run:
     announce: Callable[[Round], object] | None
     reuse: Sequence[Path]
     rounds: int = 0  # so far
-    asked: int = 0  # missions needed in these rounds
+    asked: int = 0  # missions, event logs and bounds needed in these rounds
 
     def complete(self) -> None:
         """Compute what is missing, round by round.
@@ -163,16 +163,25 @@ class _Run:
         return self.store.samples(parts_of(self.store.manifest, team, counts))
 
     def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
-        """Simulate the missing missions of a round with these parts, and the event logs."""
+        """Simulate the missing missions of a round with these parts, then make the event logs.
+
+        Raises:
+            ChunkError: If some could not be computed, after all others.
+        """
         self._take_over(parts)
-        jobs, present = [*logs], 0
+        jobs, present = [], 0
         for chunk in self._chunks(parts):
             missing = self.store.missing(chunk)
             present += chunk.missions - (missing.missions if missing else 0)
             if missing:
                 jobs.append(self._missions_job(missing))
-        self._begin(parts, present)
-        self._do(jobs)
+        self._begin(missions_in(parts), present)
+        failures = self._do(jobs)
+        if logs:
+            self._begin(len(logs), 0, "event logs")
+            failures |= self._do(logs)
+        if failures:
+            raise ChunkError(failures)
 
     def _chunks(self, parts: Sequence[Part]) -> Iterator[Chunk]:
         """The parts, in the order of their teams, as chunks of the size that suits the team."""
@@ -185,20 +194,21 @@ class _Run:
         """Compute the missing bounds of as many missions of every design point."""
         cells = self.store.manifest.bound_cells
         parts, jobs = new_parts([cells], [[0] * len(cells)], [counts]), []
-        chunks = [*split(parts, BOUNDS_CHUNK)]
-        for chunk in filter(None, map(self.store.bounds.missing, chunks)):
+        for chunk in filter(None, map(self.store.bounds.missing, split(parts, BOUNDS_CHUNK))):
             spaces = (self.study.points[part.cell.point].scenario for part in chunk.parts)
             jobs.append(BoundsJob(chunk, tuple(spaces), self.study.seed))
         missing = sum(job.missions for job in jobs)
-        self._begin(parts, sum(chunk.missions for chunk in chunks) - missing, of_bounds=True)
-        self._do(jobs)
+        count = missions_in(parts)
+        self._begin(count, count - missing, "bounds")
+        if failures := self._do(jobs):
+            raise ChunkError(failures)
 
-    def _begin(self, parts: Sequence[Part], present: int, of_bounds: bool = False) -> None:
-        """Tell that a round with these parts begins, and how many of its missions are present."""
-        self.asked += sum(len(part.replications) for part in parts)
+    def _begin(self, count: int, present: int, work: str = "") -> None:
+        """Tell that a round begins, of how many missions, and how many of them are present."""
+        self.asked += count
         if self.announce:
-            self.announce(Round(self.rounds, self.asked, present, of_bounds))
-        self.rounds += 1
+            self.announce(Round(self.rounds, self.asked, present, work))
+        self.rounds += not work
         if self.progress:
             self.progress(present)
 
@@ -235,8 +245,8 @@ class _Run:
             self.study.engine,
         )
 
-    def _do(self, jobs: Sequence[Job]) -> None:
-        """Run the jobs and store their results."""
+    def _do(self, jobs: Sequence[Job]) -> dict[Path, Failure]:
+        """Run the jobs and store their results; what could not be computed."""
         failures = {}
         with closing(self.pool.run(jobs, self.progress)) as results:
             for number, result in results:
@@ -245,8 +255,7 @@ class _Run:
                 if problem:
                     failure = self._failure(job, problem)
                     failures[self.store.write_failure(job.chunk, failure)] = failure
-        if failures:
-            raise ChunkError(failures)
+        return failures
 
     def _save(self, job: Job, result: Any) -> Problem | None:
         """Store the result of a job; if the store refuses it, the job has a problem."""
@@ -263,6 +272,11 @@ class _Run:
             which = mission.cell, mission.replications[0]
             command = commands.of_folder(self.store.folder, self.store.manifest, *which)
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
+
+
+def missions_in(parts: Sequence[Part]) -> int:
+    """The number of missions in some parts."""
+    return sum(len(part.replications) for part in parts)
 
 
 def new_parts(all_cells: Sequence[Sequence[Cell]], before: Counts, wanted: Counts) -> list[Part]:

@@ -156,7 +156,7 @@ def _in_turn(job: Job, progress: Progress | None) -> Any:
 
 def reported(job: Job, result: Any, progress: Progress | None) -> Any:
     """Report the missions of a finished job to ``progress``, and return its result."""
-    if progress and job.missions:
+    if progress:
         progress(job.missions)
     return result
 

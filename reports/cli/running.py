@@ -61,8 +61,8 @@ def _bar() -> "Iterator[tuple[Progress, Announce]]":
     with console.bar("mission") as bar:
 
         def begin(started: "Round") -> None:
-            if started.of_bounds:
-                bar.set_description("bounds", refresh=False)
+            if started.work:
+                bar.set_description(started.work, refresh=False)
             elif started.number:
                 bar.set_description(f"round {started.number + 1}", refresh=False)
             else:

@@ -80,7 +80,7 @@ def test_an_event_log_that_fails_is_recorded_too(plugin, tmp_path):
     study = small_study(tmp_path, policies=["raising"], logged=6, missions=6)
     with pytest.raises(ChunkError) as error:
         run_study(study, tmp_path / "out")
-    assert sorted(failure.missions for failure in error.value.failures.values()) == [0, 2]
+    assert sorted(failure.missions for failure in error.value.failures.values()) == [1, 2]
 
 
 def test_a_killed_worker_is_replaced(plugin, tmp_path):

@@ -116,14 +116,15 @@ def test_bounds_can_be_added_to_a_study_and_more_missions_to_bounds(tmp_path):
         run_study(plain, tmp_path / "out")
 
 
-def test_progress_counts_missions_and_bounds(tmp_path):
+def test_progress_counts_missions_logs_and_bounds(tmp_path):
     done, rounds = [], []
-    run_study(bounded(tmp_path), tmp_path / "out", progress=done.append, announce=rounds.append)
-    assert sum(done) == 2 * 7 + 7
-    assert [(round.missions, round.of_bounds) for round in rounds] == [(14, False), (21, True)]
+    study = bounded(tmp_path, logged=2)
+    run_study(study, tmp_path / "out", progress=done.append, announce=rounds.append)
+    assert sum(done) == 2 * 7 + 2 * 2 + 7
+    assert rounds == [(0, 14, 0, ""), (1, 18, 0, "event logs"), (1, 25, 0, "bounds")]
     rounds.clear()
-    run_study(bounded(tmp_path), tmp_path / "out", announce=rounds.append)
-    assert [round.present for round in rounds] == [14, 7]
+    run_study(study, tmp_path / "out", announce=rounds.append)
+    assert rounds == [(0, 14, 14, ""), (1, 21, 7, "bounds")]
 
 
 def test_a_bound_that_cannot_be_computed_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
