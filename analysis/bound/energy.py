@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dess.scenario import Scenario
+from dess.scenario import Scenario, ScenarioSpace
 
 _WIDTH = 8  # flying slots whose first charges share a phase
 
@@ -38,9 +38,24 @@ class Phases(NamedTuple):
     slots: int
 
 
+def most_flying(scenario: Scenario | ScenarioSpace) -> int:
+    """The most slots that a UAV flies before the sea is empty or the mission ends."""
+    return min(-(-scenario.quota // scenario.communication_slots), scenario.max_slots)
+
+
+def early_charges(slots: int, start: int, low: int, full: int) -> np.ndarray:
+    """The first flying slots of the phases of charges that do not suffice for the rest.
+
+    Args:
+        slots: The most flying slots.
+        start, low, full: Battery at the start, and at which charging may begin and ends [%].
+    """
+    return np.arange(max(start - low, 0), max(slots - full, 0), min(full - low, _WIDTH))
+
+
 def phases_of(scenario: Scenario) -> Phases:
     """The phases of the UAVs of one mission."""
-    slots = min(-(-scenario.quota // scenario.communication_slots), scenario.max_slots)
+    slots = most_flying(scenario)
     flying = np.arange(slots)
     if scenario.flight_cost == 0:
         return _without_battery(scenario, flying)
@@ -49,7 +64,7 @@ def phases_of(scenario: Scenario) -> Phases:
     # Charges before flying slot ``late`` do not suffice for the rest of the mission.
     first, late = max(start - low, 0), min(max(slots - full, 0), slots)
     width = min(full - low, _WIDTH)
-    early = np.arange(first, late, width)
+    early = early_charges(slots, start, low, full)
     last = np.minimum(early + width, late) - 1
     free = 1 + len(early)
     after = np.full(slots, free)

@@ -8,13 +8,14 @@ for low ones, and the lowest bound found is kept.
     bound.ratio  # no policy has a higher expected collection ratio in this mission
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from analysis.bound.bundle import next_prices
-from analysis.bound.energy import Phases, phases_of
+from analysis.bound.energy import Phases, early_charges, most_flying, phases_of
 from analysis.bound.paths import blocks_of, bound_paths
 from analysis.bound.service import POINTS, rates_of, spread, step_values
 from analysis.bound.slopes import add_slopes
@@ -26,6 +27,7 @@ from dess.scenario import ScenarioSpace
 from dess.state import constants_of, empty_state, ranges_of, sample_scenario, types_of
 
 ITERATIONS = 20
+MOST_MEMORY = 4 * 2**30  # of the table of a mission [bytes]
 _FIRST_DECREASE = 0.1  # of the bound, that the first step aims at
 _HOPE = 4  # the search ends if a quarter of the iterations has found no bound below 1
 
@@ -105,10 +107,31 @@ def check_scenario(scenario: ScenarioSpace) -> None:
     """Refuse a scenario whose missions have no bound.
 
     Raises:
-        InputError: If it has a section beyond the paper.
+        InputError: If it has a section beyond the paper, or a bound takes too much memory.
     """
     if scenario.is_extended:
         raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
+    memory = ceilings_memory(scenario, Detail())
+    if memory > MOST_MEMORY:
+        raise InputError(
+            f"bound: a mission takes {memory / 2**30:,.1f} GiB of memory; allowed: "
+            f"{MOST_MEMORY / 2**30:.0f} GiB at most, with fewer cells (grid) or slots (quota, "
+            "max_slots)"
+        )
+
+
+def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
+    """The memory [bytes] of ``Bounds.ceilings`` in the mission that takes the most."""
+    slots, near = most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
+    battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
+    phases = 2 + len(early_charges(slots, *battery)) if scenario.flight_cost else 1
+    return math.prod(_shape(slots, phases, scenario.grid, near, detail)) * np.dtype(float).itemsize
+
+
+def _shape(slots: int, phases: int, grid: int, near: int, detail: Detail) -> tuple[int, ...]:
+    """The shape of ``Bounds.ceilings``, with ``near`` blocks that can be remembered."""
+    memories = 1 + near * (len(detail.levels) - 1)
+    return slots + 1, phases, grid, grid, memories, len(detail.local)
 
 
 def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
@@ -160,8 +183,7 @@ class Bounds:
         times = np.arange(len(known.data))
         self.period = np.searchsorted(inner, times)
         self.values = np.empty((len(self.cuts), 5, grid, grid, len(self.parts)))
-        memories = 1 + self.blocks.near.shape[1] * (len(detail.levels) - 1)
-        self.ceilings = np.empty((slots + 1, phases, grid, grid, memories, len(self.parts)))
+        self.ceilings = np.empty(_shape(slots, phases, grid, self.blocks.near.shape[1], detail))
 
     def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
         """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""

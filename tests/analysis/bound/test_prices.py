@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import policies
 from analysis.bound import upper_bound
+from analysis.bound.prices import Bounds, Detail, ceilings_memory, known_of
 from dess import load_scenario, simulate_batch
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
@@ -83,3 +84,17 @@ def test_the_same_mission_has_the_same_bound() -> None:
 def test_sections_beyond_the_paper_are_refused() -> None:
     with pytest.raises(InputError, match="bound: the scenario has sections"):
         upper_bound(tiny(**{"wind.strength": 0.5}), 0, 0)
+
+
+def test_a_mission_that_takes_too_much_memory_is_refused() -> None:
+    with pytest.raises(InputError, match=r"takes 5\.\d GiB of memory; allowed: 4 GiB"):
+        upper_bound(load_scenario("paper", uavs=1, grid=128), 0, 0)
+
+
+@pytest.mark.parametrize("values", [{}, {"flight_cost": 0}, {"nodes": ((1, 1),)}])
+def test_no_mission_takes_more_memory_than_was_expected(values: dict) -> None:
+    battery = {"flying_time": (4, 20), "charge_start": (10, 12), "charge_complete": (14, 30)}
+    space = tiny(quota=160, **battery | values)
+    most = ceilings_memory(space, Detail())
+    used = [Bounds(known_of(space, 5, r), Detail()).ceilings.nbytes for r in range(20)]
+    assert max(used) <= most <= 3 * max(used)
