@@ -26,27 +26,28 @@ def small(**values: object) -> ScenarioSpace:
 
 def optimum(space: ScenarioSpace, seed: int) -> float:
     """The highest collection ratio of all action sequences, arrivals known."""
-    world, scratch = world_of(space), empty_scratch(1, len(space.nodes))
+    uavs = space.uavs[1]
+    world, scratch = world_of(space), empty_scratch(uavs, len(space.nodes))
     arrivals = np.empty(len(space.nodes), np.int64)
-    state = empty_state(1, 1, len(space.nodes))
+    state = empty_state(1, uavs, len(space.nodes))
     state.missions[:] = constants_of(space)
     state.missions["seed"] = seed
     rules.launch(state.missions[0], ranges_of(space), types_of(space), *(a[0] for a in state[1:]))
 
     def best(before: State) -> float:
         ratios = []
-        for action in range(5):
+        for actions in product(range(5), repeat=uavs):
             after = State(*(array.copy() for array in before))
-            mission, uav = after.missions[0], after.uavs[0, 0]
-            uav["action"] = action
+            mission = after.missions[0]
+            after.uavs[0]["action"] = actions
             arrays = (array[0] for array in after)
             rules.advance(*arrays, arrivals, *world, *scratch)
             if mission["active"]:
                 ratios.append(best(after))
             else:
                 ratios.append(mission["collected"] / (mission["initial"] + mission["arrived"]))
-            if before.uavs[0, 0]["charging"]:
-                break  # whatever its action, it hovers
+            if before.uavs["charging"].all():
+                break  # whatever their actions, they hover
         return max(ratios)
 
     return best(state)
@@ -96,12 +97,10 @@ def shadowed(**values: object) -> ScenarioSpace:
     return load_scenario("paper", **space | battery | quota | values)
 
 
-@pytest.mark.parametrize("slots", [1, 2])
-def test_both_ways_to_the_optimum_agree_without_shadowing(slots: int) -> None:
-    space = shadowed(
-        nodes=THREE, communication_slots=slots, quota=3 * slots, edge_snr=-14.0,
-        shadowing_variance=0.0, initial_data=8.0, arrival_rate=0.5,
-    )  # fmt: skip
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_ways_to_the_optimum_agree_without_shadowing(kind: str) -> None:
+    values = {"shadowing_variance": 0.0, "initial_data": 8.0, "arrival_rate": 0.5}
+    space = shadowed(edge_snr=-14.0, **values, **KINDS[kind])
     assert TinySea(space, 2, contraction(1)).optimum == pytest.approx(optimum(space, 2), 1e-12)
 
 
