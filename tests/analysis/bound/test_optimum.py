@@ -87,6 +87,7 @@ KINDS = {
     "two communication slots per slot": {"nodes": TWO, "communication_slots": 2, "quota": 6},
     "two UAVs": {"nodes": THREE, "max_slots": 2, "uavs": 2, "zone": (1, 1, 2, 1)},
 }
+HOVER = {"a lone UAV over its node": {"nodes": ((1, 1),), "max_slots": 4}}
 
 
 def shadowed(**values: object) -> ScenarioSpace:
@@ -136,3 +137,10 @@ def test_the_bound_is_above_the_optimum_with_shadowing(kind: str) -> None:
     print(f"{kind}: {np.mean(gaps):.3f} above the optimum on average, {max(gaps):.3f} at most")
     assert min(gaps) >= -1e-12
     assert np.mean(gaps) <= 0.2
+
+
+@pytest.mark.parametrize("values", (KINDS | HOVER).values(), ids=KINDS | HOVER)
+def test_the_bound_is_above_the_optimum_where_most_data_arrive_later(values: dict) -> None:
+    for edge_snr in (-20.0, -12.0):
+        space = shadowed(edge_snr=edge_snr, initial_data=1.0, arrival_rate=3.0, **values)
+        assert TinySea(space, 1, contraction(3)).optimum <= upper_bound(space, 1, 0).ratio
