@@ -78,6 +78,12 @@ def test_a_uav_that_only_hovers_over_its_node_is_bounded_exactly() -> None:
     assert optimum(space, 0) == pytest.approx(upper_bound(space, 0, 0, iterations=10).ratio, 1e-5)
 
 
+def test_the_bound_is_above_the_optimum_where_data_arrive_during_a_charge() -> None:
+    battery = {"charge_complete": 14, "charge_rate": 2, "max_slots": 12}
+    space = small(nodes=((1, 1),), initial_data=1.0, arrival_rate=3.0, **battery)
+    assert optimum(space, 0) <= upper_bound(space, 0, 0).ratio
+
+
 # --- with shadowing: backward induction ---
 
 TWO, THREE = ((0, 1), (2, 2)), ((0, 1), (2, 2), (2, 0))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.bound.paths import blocks_of
+from analysis.bound.paths import blocks_of, bound_paths
 from analysis.bound.prices import Bounds, Detail, improve, known_of
 from dess import load_scenario
 from dess.scenario import ScenarioSpace
@@ -46,6 +46,23 @@ def test_every_refinement_lowers_the_bound_at_the_same_prices() -> None:
     finest = finer._replace(levels=(0, 1, 2))
     found = [Bounds(known, detail).at(prices)[0] for detail in (coarse, finer, finest)]
     assert found[0] > found[1] > found[2]
+
+
+def test_a_uav_can_take_all_that_its_node_has_had() -> None:
+    """Arrivals in a visit and during a charge, too; ending early has no advantage here."""
+    known = known_of(paper_like(nodes=((3, 3),), initial_data=1.0, arrival_rate=2.0), 4, 0)
+    bounds = Bounds(known, Detail(cuts=()))
+    bounds.at(np.zeros((1, 1)))  # sets the worth of the steps
+    local = bounds.parts[None]
+    bound_paths(
+        known.record, known.phases, known.data, bounds.period, bounds.blocks, local,
+        bounds.values, np.zeros(len(known.data)), bounds.ceilings,
+    )  # fmt: skip
+    x, y = known.starts[0]
+    most = (bounds.ceilings[0, 0, x, y, 0] + local[0] * known.data[0]).min()
+    last = known.phases.clock[:, -1].max()
+    assert last > known.phases.clock[0, -1]  # there is a charge
+    assert most == pytest.approx(known.data[last, 0])
 
 
 def test_a_cut_without_a_price_changes_nothing() -> None:
