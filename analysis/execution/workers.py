@@ -116,7 +116,7 @@ def _results(parallel: Any, tasks: Iterator[Any]) -> Iterator[Iterator[Any]]:
     """
     results: Generator[Any, None, None] = (_ for _ in [])
     try:
-        with _blocked():
+        with _blocked(), _quiet():
             results = parallel(tasks)
         yield results
     finally:
@@ -136,6 +136,23 @@ def _blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """A process of joblib that starts here does not warn of what a killed run left and it removed.
+
+    The warnings would follow the last line of a command, and a user need not do anything.
+    """
+    before = os.environ.get("PYTHONWARNINGS")
+    ignored = "ignore:resource_tracker:UserWarning"
+    os.environ["PYTHONWARNINGS"] = f"{before},{ignored}" if before else ignored
+    try:
+        yield
+    finally:
+        del os.environ["PYTHONWARNINGS"]
+        if before is not None:
+            os.environ["PYTHONWARNINGS"] = before
 
 
 def _in_turn(job: Job, progress: Progress | None) -> Any:

@@ -50,7 +50,9 @@ def test_every_refinement_lowers_the_bound_at_the_same_prices() -> None:
 
 def test_a_uav_can_take_all_that_its_node_has_had() -> None:
     """Arrivals in a visit and during a charge, too; ending early has no advantage here."""
-    known = known_of(paper_like(nodes=((3, 3),), initial_data=1.0, arrival_rate=2.0), 4, 0)
+    space = paper_like(nodes=((3, 3),), initial_data=1.0, arrival_rate=20.0, edge_snr=45.0)
+    known = known_of(space, 4, 0)
+    assert np.diff(known.data, axis=0).min() > 0
     bounds = Bounds(known, Detail(cuts=()))
     bounds.at(np.zeros((1, 1)))  # sets the worth of the steps
     local = bounds.parts[None]

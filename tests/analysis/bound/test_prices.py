@@ -46,6 +46,17 @@ def test_no_policy_collects_more_without_shadowing(
     assert ratio - 1e-12 <= upper_bound(space, seed, 0, iterations=3).ratio
 
 
+def test_a_uav_that_comes_back_to_a_node_collects_no_more() -> None:
+    """It must charge every few slots, in the block of another node."""
+    space = load_scenario(
+        "paper", grid=8, nodes=((1, 4), (3, 4)), zone=(1, 4, 1, 1), uavs=1, quota=60,
+        communication_slots=1, flying_time=12, charge_start=11, charge_complete=14, edge_snr=-25.0,
+        initial_data=(1.0, 1000.0), arrival_rate=0.0, shadowing_variance=0.0,
+    )  # fmt: skip
+    ratio = simulate_batch(space, policies.load("planner"), 5).missions["collection_ratio"][0]
+    assert ratio <= upper_bound(space, 5, 0).ratio < 1
+
+
 def check_means(space: ScenarioSpace, names: Sequence[str], missions: int) -> None:
     """The mean of no policy exceeds the mean of the bounds by more than chance explains."""
     bounds = np.array([upper_bound(space, 11, r).ratio for r in range(missions)])
