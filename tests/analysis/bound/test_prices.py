@@ -31,7 +31,7 @@ def tiny(**values: object) -> ScenarioSpace:
     initial=st.sampled_from([0.0, 3.0, (5.0, 20.0)]),
     edge_snr=st.sampled_from([-25.0, 0.0, 10.0]),
     flight_cost=st.integers(0, 1),
-    policy=st.sampled_from(["greedy", "nearest", "tour", "random"]),
+    policy=st.sampled_from(["greedy", "nearest", "tour", "random", "planner"]),
     seed=st.integers(0, 2**32),
 )
 def test_no_policy_collects_more_without_shadowing(

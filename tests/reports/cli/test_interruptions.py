@@ -92,7 +92,7 @@ def test_studies_that_are_killed_equal_an_undisturbed_one(number, workers, tmp_p
 def test_studies_that_are_killed_in_their_bounds_equal_an_undisturbed_one(
     number, workers, tmp_path
 ):
-    check_studies(tmp_path, workers, number, KILLS // 3, 60, bounds)
+    check_studies(tmp_path, workers, number, KILLS // 6, 60, bounds)
 
 
 # --- trainings ---
