@@ -94,18 +94,7 @@ class Learner:
             DivergenceError: If one of them is not finite; the weights are then as before.
         """
         settings = self.settings
-        allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
-        reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
-        discount = torch.from_numpy(batch.discount).to(self.device)
-        action = torch.from_numpy(batch.action).to(self.device)
-        with torch.no_grad():
-            later = self._observe(batch.state, batch.later, batch.uav)
-            q_target = double_dqn_target(
-                reward, discount, self.online(*later), self.target(*later), allowed
-            )
-        values = self.values(self.online, batch.state, batch.rows, batch.uav)
-        chosen = values.gather(1, action[:, None]).squeeze(1)
-        loss = _LOSSES[settings.loss](chosen, q_target)
+        loss, chosen = self.loss(batch)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
@@ -123,6 +112,22 @@ class Learner:
         if self.average is not None:
             soft_update(self.average, self.online, settings.average_rate)
         return done
+
+    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+        """The loss of the TD error on a minibatch, and the (B,) values of the actions in it."""
+        settings = self.settings
+        allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
+        reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
+        discount = torch.from_numpy(batch.discount).to(self.device)
+        action = torch.from_numpy(batch.action).to(self.device)
+        with torch.no_grad():
+            later = self._observe(batch.state, batch.later, batch.uav)
+            q_target = double_dqn_target(
+                reward, discount, self.online(*later), self.target(*later), allowed
+            )
+        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        chosen = values.gather(1, action[:, None]).squeeze(1)
+        return _LOSSES[settings.loss](chosen, q_target), chosen
 
     def _observe(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray

@@ -1,0 +1,199 @@
+"""Does the learner gain from the planner's decisions? Trainings with and without, equal budgets.
+
+    python -m benchmarks.imitation --out runs/imitation
+    python -m benchmarks.imitation --out runs/imitation --start ddqn --ticks 6000
+
+The planner flies missions once, and its actions are kept in the folder. In a training, a share of
+the environments flies these missions again, so their transitions are in the replay memory. With the
+large-margin loss (T. Hester et al., Deep Q-learning from demonstrations, AAAI 2018) the network is
+also to give the planner's action a higher value there than any other allowed action.
+
+Prints a row per training, whose policy is kept in the folder: means over missions that no training
+has used, the paired difference to the training of the same seed without the planner, and the
+agreement with the planner in missions that it was not shown. With ``--start``, trainings continue
+that of a shipped policy, whose row is the last.
+"""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+import policies
+from analysis.names import PRODUCT
+from analysis.stats.intervals import mean_interval
+from benchmarks.recorded import Recorded, Recorder
+from dess import load_scenario, simulate_batch
+from dess.observations.guard import guard
+from dess.observations.states import CompactStates, masks
+from dess.view import View
+from policies.ddqn.config import MISSION_SEED, TrainingConfig, load_config
+from policies.ddqn.learner import Learner
+from policies.ddqn.replay import Batch
+from policies.ddqn.trained import save_policy
+from policies.ddqn.training import Training
+
+RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of the evaluation
+HELD_OUT = 50  # of the planner's missions, which no training sees
+ENVIRONMENTS = 64  # of the training's 256, in which the planner's missions are flown
+MARGIN = 0.1  # in scaled values: the median gap between the best two actions is 0.06
+# Variant -> environments with the planner's missions, whether the margin loss is added.
+VARIANTS = {
+    "without": (0, False),
+    "imitation": (ENVIRONMENTS, True),
+    "no-margin": (ENVIRONMENTS, False),
+}
+
+
+class ImitatingLearner(Learner):
+    """A learner with the margin loss on the transitions of the first environments."""
+
+    environments, flown, weight = 1, 0, 0.0
+
+    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+        """The loss of the TD error and of the margin, and the (B,) values of the actions."""
+        loss, chosen = super().loss(batch)
+        rows = np.nonzero(batch.rows % self.environments < self.flown)[0]
+        if not self.weight or not len(rows):
+            return loss, chosen
+        states, uavs = batch.rows[rows], batch.uav[rows]
+        values = self.values(self.online, batch.state, states, uavs)
+        planned = torch.from_numpy(batch.action[rows])[:, None]
+        margins = torch.full_like(values, MARGIN).scatter_(1, planned, 0.0)
+        allowed = torch.from_numpy(masks(batch.state, states, uavs))
+        highest = (values + margins).masked_fill(~allowed, -torch.inf).amax(1)
+        excess = highest - values.gather(1, planned).squeeze(1)
+        return loss + self.weight * excess.sum() / len(chosen), chosen
+
+
+class ImitatingTraining(Training):
+    """A training whose first environments fly the planner's missions again and again."""
+
+    def __init__(self, config: TrainingConfig, planned: np.ndarray, flown: int, weight: float):
+        self.planned, self.flown, self.following = planned, flown, 0
+        device = torch.device("cpu")
+        super().__init__(config, device)
+        self.learner = ImitatingLearner(self.learner.online, self.observation, config, device)
+        self.learner.environments, self.learner.flown = config.num_envs, flown
+        self.learner.weight = weight
+
+    def begin_with(self, weights: dict[str, torch.Tensor]) -> None:
+        """Begin with these weights in all networks."""
+        for network in (self.learner.online, self.learner.target, self.learner.average):
+            network.load_state_dict(weights)
+
+    def _collect(self, epsilon: float) -> None:
+        # The memory of a trained network is not to begin with random actions.
+        super()._collect(min(epsilon, self.phase.epsilon[0]))
+
+    def _launch(self, environments: np.ndarray) -> None:
+        super()._launch(environments[environments >= self.flown])
+        again = environments[environments < self.flown]
+        if not len(again):
+            return
+        own = self.stepper.replication
+        if self.following + len(again) > len(self.planned) - HELD_OUT:
+            self.following = 0
+        self.stepper.start_at(RECORDED, self.following)
+        self.stepper.launch(again)
+        self.following += len(again)
+        self.early[again] = False
+        self.stepper.start_at(MISSION_SEED + self.config.seed, own)
+
+    def _explore(
+        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray, epsilon: float
+    ) -> np.ndarray:
+        actions = super()._explore(states, missions, uavs, epsilon)
+        again = missions < self.flown
+        now = self.stepper.state.missions[missions[again]]
+        actions[again] = self.planned[now["replication"], now["slot"], uavs[again]]
+        return actions
+
+
+class Compared(Recorded):
+    """The recorded actions as a policy, compared with the decisions of another policy."""
+
+    def __init__(self, planned: np.ndarray, policy: Any):
+        super().__init__(planned)
+        self.policy, self.equal = policy, []
+
+    def act(self, view: View) -> np.ndarray:
+        """The recorded actions."""
+        actions = super().act(view)
+        is_choice = guard(view).sum(1) > 1
+        self.equal.extend((self.policy.act(view) == actions)[is_choice])
+        return actions
+
+
+def recorded(out: Path, missions: int) -> np.ndarray:
+    """The (missions, slots, I) actions of the planner, which a file in the folder keeps."""
+    file, space = out / f"planner-{missions}.npy", load_scenario("paper")
+    if not file.exists():
+        planner = policies.load("planner")
+        recorder = Recorder(planner, missions, space.max_slots, space.uavs[1])
+        simulate_batch(space, recorder, RECORDED, missions)
+        out.mkdir(parents=True, exist_ok=True)
+        np.save(file, recorder.actions)
+    return np.load(file)
+
+
+def config_for(start: str | None, seed: int, ticks: int) -> TrainingConfig:
+    """The last phase of ``quick``, or a continuation of the training of a shipped policy."""
+    changes = {"ticks": ticks}
+    if start:
+        changes |= {"epsilon": (0.02, 0.02), "learning_rate": (1e-4, 1e-5)}
+    config = load_config("ddqn" if start else "quick", seed=seed, precision="float32")
+    phase = config.phases[-1].model_copy(update=changes)
+    return config.model_copy(update={"phases": (phase,), "evaluate_every": 1000})
+
+
+def main() -> None:
+    """Train, evaluate and print."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--out", type=Path, required=True, help="folder of the planner's actions")
+    parser.add_argument("--start", choices=policies.registry.trained_names())
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--ticks", type=int, default=12_000)
+    parser.add_argument("--variants", nargs="+", default=[*VARIANTS], choices=VARIANTS)
+    parser.add_argument("--weight", type=float, default=0.3, help="of the margin loss")
+    parser.add_argument("--planned", type=int, default=400, help="missions of the planner")
+    parser.add_argument("--missions", type=int, default=2000, help="missions of an evaluation")
+    given = parser.parse_args()
+    variants = given.variants + ([given.start] if given.start else [])
+    planned = recorded(given.out, given.planned)
+    shown = range(given.planned - HELD_OUT, given.planned)
+    print("| policy | success [%] | product [%] | difference | agreement [%] |")
+    print("| --- | --- | --- | --- | --- |")
+    for seed in given.seeds:
+        config, first = config_for(given.start, seed, given.ticks), None
+        for variant in variants:
+            if variant == given.start:
+                folder, policy = given.start, policies.load(given.start)
+            else:
+                flown, has_margin = VARIANTS[variant]
+                weight = given.weight if has_margin else 0.0
+                training = ImitatingTraining(config, planned, flown, weight)
+                if given.start:
+                    training.begin_with(policies.load(given.start).network.state_dict())
+                training.run(given.ticks)
+                folder = given.out / f"{config.name}-{seed}-{variant}"
+                save_policy(folder, training.best, config, training.space)
+                policy = policies.load(folder)
+            records = simulate_batch(config.space, policy, EVALUATED, given.missions).missions
+            products = 100 * records[PRODUCT]
+            first = products if first is None else first
+            gain = mean_interval(products - first)
+            compared = Compared(planned, policy)
+            simulate_batch(config.space, compared, RECORDED, shown)
+            print(
+                f"| {folder} | {100 * records['success'].mean():.1f} | {products.mean():.1f} "
+                f"| {gain.mean:+.2f} [{gain.low:.2f}, {gain.high:.2f}] "
+                f"| {100 * np.mean(compared.equal):.0f} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
