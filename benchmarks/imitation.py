@@ -8,10 +8,10 @@ the environments flies these missions again, so their transitions are in the rep
 large-margin loss (T. Hester et al., Deep Q-learning from demonstrations, AAAI 2018) the network is
 also to give the planner's action a higher value there than any other allowed action.
 
-Prints a row per training, whose policy is kept in the folder: means over missions that no training
-has used, the paired difference to the training of the same seed without the planner, and the
-agreement with the planner in missions that it was not shown. With ``--start``, trainings continue
-that of a shipped policy, whose row is the last.
+Every training leaves its policy in the folder, and is not run again. Prints a row per policy: means
+over missions that no training has used, the paired difference to the training of the same seed
+without the planner, and the agreement with the planner in missions that it was not shown. With
+``--start``, trainings continue that of a shipped policy, whose row is the last.
 """
 
 import argparse
@@ -39,45 +39,58 @@ RECORDED, EVALUATED = 777_002, 777_001  # seeds of the planner's missions and of
 HELD_OUT = 50  # of the planner's missions, which no training sees
 ENVIRONMENTS = 64  # of the training's 256, in which the planner's missions are flown
 MARGIN = 0.1  # in scaled values: the median gap between the best two actions is 0.06
-# Variant -> environments with the planner's missions, whether the margin loss is added.
+# Variant -> environments with the planner's missions; whether the TD loss, and whether the margin
+# loss, is computed there.
 VARIANTS = {
-    "without": (0, False),
-    "imitation": (ENVIRONMENTS, True),
-    "no-margin": (ENVIRONMENTS, False),
+    "without": (0, True, False),
+    "imitation": (ENVIRONMENTS, True, True),
+    "no-margin": (ENVIRONMENTS, True, False),
+    "margin-only": (ENVIRONMENTS, False, True),
 }
 
 
 class ImitatingLearner(Learner):
-    """A learner with the margin loss on the transitions of the first environments."""
+    """A learner with other losses on the transitions of the first environments."""
 
-    environments, flown, weight = 1, 0, 0.0
+    environments, flown, has_td, weight = 1, 0, True, 0.0
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
-        """The loss of the TD error and of the margin, and the (B,) values of the actions."""
-        loss, chosen = super().loss(batch)
-        rows = np.nonzero(batch.rows % self.environments < self.flown)[0]
-        if not self.weight or not len(rows):
-            return loss, chosen
-        states, uavs = batch.rows[rows], batch.uav[rows]
-        values = self.values(self.online, batch.state, states, uavs)
-        planned = torch.from_numpy(batch.action[rows])[:, None]
+        """The loss of the TD error and of the margin, and the values of the actions."""
+        is_shown = batch.rows % self.environments < self.flown
+        loss, chosen = super().loss(batch if self.has_td else _part_of(batch, ~is_shown))
+        if self.weight and is_shown.any():
+            excess = self._excess(_part_of(batch, is_shown))
+            loss = loss + self.weight * excess.sum() / len(batch.rows)
+        return loss, chosen
+
+    def _excess(self, batch: Batch) -> torch.Tensor:
+        """By how much the planner's actions are not the highest by the margin; (B,) values."""
+        values = self.values(self.online, batch.state, batch.rows, batch.uav)
+        planned = torch.from_numpy(batch.action)[:, None]
         margins = torch.full_like(values, MARGIN).scatter_(1, planned, 0.0)
-        allowed = torch.from_numpy(masks(batch.state, states, uavs))
+        allowed = torch.from_numpy(masks(batch.state, batch.rows, batch.uav))
         highest = (values + margins).masked_fill(~allowed, -torch.inf).amax(1)
-        excess = highest - values.gather(1, planned).squeeze(1)
-        return loss + self.weight * excess.sum() / len(chosen), chosen
+        return highest - values.gather(1, planned).squeeze(1)
+
+
+def _part_of(batch: Batch, which: np.ndarray) -> Batch:
+    """The transitions of a minibatch for which ``which`` is true."""
+    return Batch(batch.state, *(part[which] for part in batch[1:]))
 
 
 class ImitatingTraining(Training):
     """A training whose first environments fly the planner's missions again and again."""
 
-    def __init__(self, config: TrainingConfig, planned: np.ndarray, flown: int, weight: float):
+    def __init__(
+        self, config: TrainingConfig, planned: np.ndarray,
+        flown: int, has_td: bool, has_margin: bool, weight: float,
+    ):  # fmt: skip
         self.planned, self.flown, self.following = planned, flown, 0
         device = torch.device("cpu")
         super().__init__(config, device)
         self.learner = ImitatingLearner(self.learner.online, self.observation, config, device)
         self.learner.environments, self.learner.flown = config.num_envs, flown
-        self.learner.weight = weight
+        self.learner.has_td, self.learner.weight = has_td, weight * has_margin
 
     def begin_with(self, weights: dict[str, torch.Tensor]) -> None:
         """Begin with these weights in all networks."""
@@ -156,31 +169,26 @@ def main() -> None:
     parser.add_argument("--start", choices=policies.registry.trained_names())
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--ticks", type=int, default=12_000)
-    parser.add_argument("--variants", nargs="+", default=[*VARIANTS], choices=VARIANTS)
     parser.add_argument("--weight", type=float, default=0.3, help="of the margin loss")
     parser.add_argument("--planned", type=int, default=400, help="missions of the planner")
     parser.add_argument("--missions", type=int, default=2000, help="missions of an evaluation")
     given = parser.parse_args()
-    variants = given.variants + ([given.start] if given.start else [])
     planned = recorded(given.out, given.planned)
     shown = range(given.planned - HELD_OUT, given.planned)
     print("| policy | success [%] | product [%] | difference | agreement [%] |")
     print("| --- | --- | --- | --- | --- |")
     for seed in given.seeds:
         config, first = config_for(given.start, seed, given.ticks), None
-        for variant in variants:
-            if variant == given.start:
-                folder, policy = given.start, policies.load(given.start)
-            else:
-                flown, has_margin = VARIANTS[variant]
-                weight = given.weight if has_margin else 0.0
-                training = ImitatingTraining(config, planned, flown, weight)
+        folders = [given.out / f"{config.name}-{seed}-{variant}" for variant in VARIANTS]
+        for variant, folder in zip(VARIANTS, folders, strict=True):
+            if not folder.exists():
+                training = ImitatingTraining(config, planned, *VARIANTS[variant], given.weight)
                 if given.start:
                     training.begin_with(policies.load(given.start).network.state_dict())
                 training.run(given.ticks)
-                folder = given.out / f"{config.name}-{seed}-{variant}"
                 save_policy(folder, training.best, config, training.space)
-                policy = policies.load(folder)
+        for name in [*folders, given.start] if given.start else folders:
+            policy = policies.load(name)
             records = simulate_batch(config.space, policy, EVALUATED, given.missions).missions
             products = 100 * records[PRODUCT]
             first = products if first is None else first
@@ -188,7 +196,7 @@ def main() -> None:
             compared = Compared(planned, policy)
             simulate_batch(config.space, compared, RECORDED, shown)
             print(
-                f"| {folder} | {100 * records['success'].mean():.1f} | {products.mean():.1f} "
+                f"| {name} | {100 * records['success'].mean():.1f} | {products.mean():.1f} "
                 f"| {gain.mean:+.2f} [{gain.low:.2f}, {gain.high:.2f}] "
                 f"| {100 * np.mean(compared.equal):.0f} |",
                 flush=True,
