@@ -68,9 +68,9 @@ class Kernels:
             future.cancel()
         while any(not future.done() for future in futures):
             for client in self._clients:
-                provisioner: Any = client.km.provisioner
+                kernel: Any = client.km
                 # A kernel that ends meanwhile takes its process away: look at it once only.
-                if process := getattr(provisioner, "process", None):
+                if process := getattr(kernel.provisioner, "process", None):
                     process.kill()
             wait(futures, timeout=0.2)
 
