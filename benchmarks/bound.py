@@ -22,6 +22,8 @@ VARIANTS = {
     "no allowance: prices alone": Detail(local=(0.0,), levels=(0,)),
     "four local prices": Detail(local=(0.0, 0.33, 0.66, 1.0), levels=(0, 2, 3)),
     "fifteen local prices": Detail(local=FINE, levels=(0, 7, 14)),
+    "eleven local prices": Detail(local=tuple(np.linspace(0, 1, 11)), levels=(0, 5, 10)),
+    "fifteen local prices, four for the block before": Detail(local=FINE, levels=(0, 5, 10, 14)),
     "no cut before the end": Detail(cuts=()),
     "three cuts before the end": Detail(cuts=(0.25, 0.5, 0.75)),
 }
