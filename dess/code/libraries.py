@@ -19,7 +19,7 @@ EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
         *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
-        *("ipywidgets", "jinja2", "jupyter_client", "jupytext", "markupsafe"),
+        *("jinja2", "jupyter_client", "jupytext", "markupsafe"),
         *("nbclient", "nbconvert", "nbformat", "packaging", "pygments", "rocrate"),
     ),
     "distributed": ("distributed",),

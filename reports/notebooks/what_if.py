@@ -182,14 +182,3 @@ html.say("{command}\n\n{study}", command=command, study=study)
 
 # %%
 html.provenance([asked.results])
-
-# %% [markdown] tags=["jupyter"]
-# ## Sliders
-#
-# Move the sliders, choose policies, and press *Simulate*. A field whose slider you do not move
-# keeps the value of the scenario. If that is a range, every mission draws its own value from it.
-
-# %% tags=["jupyter"]
-from reports.widgets import what_if_panel
-
-what_if_panel(scenario, policies, settings, baseline, results, missions, seed)

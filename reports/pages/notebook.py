@@ -2,8 +2,7 @@
 
 A notebook is a Python file in jupytext's percent format. Its heading and first paragraph are the
 title and the description of the page. Its metadata name the studies that it reads, and tell whether
-its page has scripts. One of its cells is tagged ``parameters``. Cells tagged ``jupyter`` are only
-for the notebook that opens in Jupyter; they are neither run for the page nor shown on it:
+its page has scripts. One of its cells is tagged ``parameters``:
 
     report = read("what-if")
     report.set({"missions": 500})
@@ -42,8 +41,7 @@ NAMES = (  # in the order of the index
     "verification",
     SCORECARD,
 )
-# Tags of cells: the parameters, and cells that are only for Jupyter.
-PARAMETERS, IN_JUPYTER = "parameters", "jupyter"
+PARAMETERS = "parameters"  # the tag of the cell with the parameters
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}
 
@@ -147,7 +145,6 @@ def report_of(name: str, original: NotebookNode) -> Report:
     title, description = original.cells[0].source.removeprefix("# ").split("\n\n", 1)
     notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
-    drop(notebook, IN_JUPYTER)
     about = original.metadata["dess"]
     studies, scripts = about["studies"], about.get("scripts", False)
     description = " ".join(description.split())
@@ -168,11 +165,6 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
                 f"parameter: {name!r} is unknown to {', '.join(r.name for r in reports)}"
                 f"{one_of(name, sorted(known))}"
             )
-
-
-def drop(notebook: NotebookNode, tag: str) -> None:
-    """Remove the cells of a notebook that have a tag."""
-    notebook.cells = [cell for cell in notebook.cells if tag not in tags_of(cell)]
 
 
 def _file(folder: Path, name: str) -> Path:

@@ -413,14 +413,6 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
     assert str(tmp_path) not in page and "sea.toml" in page
 
 
-def test_cells_for_jupyter_are_in_the_notebook_only(results: Path, tmp_path: Path) -> None:
-    source = MISSION + '\n# %% tags=["jupyter"]\n"a cell for Jupyter"\n'
-    folder = write_notebooks(tmp_path / "notebooks", mission=source)
-    render(["mission"], results, tmp_path, notebooks=folder)
-    assert "a cell for Jupyter" in (tmp_path / "mission.ipynb").read_text("utf-8")
-    assert "a cell for Jupyter" not in (tmp_path / "mission.html").read_text("utf-8")
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_shipped_notebooks_have_a_heading_and_a_description(name: str) -> None:
     report = read(name)

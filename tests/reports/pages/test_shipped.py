@@ -17,7 +17,7 @@ from analysis import load_results
 from analysis.questions.missions import FOLDER
 from policies.registry import trained_names
 from reports.pages.html import STUDY, embedded
-from reports.pages.notebook import IN_JUPYTER, NAMES, drop, read
+from reports.pages.notebook import NAMES, read
 from reports.pages.render import html_of, render
 from reports.player import library
 from tests.reports.browser import Visit
@@ -160,7 +160,6 @@ def test_notebooks_run_in_jupyter_and_show_what_the_pages_show(
     notebook = nbformat.read(folder / f"{name}.ipynb", as_version=4)
     nbformat.validate(notebook)
     assert notebook.cells.pop(0).source.startswith("# ")
-    drop(notebook, IN_JUPYTER)
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
     assert html_of(notebook) in (folder / f"{name}.html").read_text("utf-8")
