@@ -5,9 +5,35 @@ team = policies.load_team("ddqn,tour")
 actions = policy.act(view)
 """
 
-from policies.registry import load, load_team, names
+from pathlib import Path
+
+from policies import registry
+from policies.base import Policy
+from policies.registry import TypedByUser, names
 
 __all__ = ["load", "load_team", "names"]
+
+
+def load(name: str | Path) -> Policy:
+    """Load a policy by its name, from the folder of a trained policy, or from a Python file.
+
+    Args:
+        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``,
+            which is run.
+
+    Raises:
+        InputError: If the policy does not exist or cannot be loaded.
+    """
+    return registry.load(TypedByUser(name))
+
+
+def load_team(text: str) -> list[Policy]:
+    """Load the policies of ``"P"`` or ``"P,P,..."``: UAV i gets number ``i % len(team)``.
+
+    Raises:
+        InputError: If one of them does not exist or cannot be loaded.
+    """
+    return registry.load_team(TypedByUser(text))
 
 
 def __dir__() -> list[str]:

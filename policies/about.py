@@ -9,7 +9,7 @@ from dess.files import read_text
 from dess.scenario import SAMPLED, load_scenario, scenario_names
 from policies.base import Policy
 from policies.ddqn.description import read_description
-from policies.registry import FILE, SHIPPED, folder_of, load, package_of, trained_names
+from policies.registry import FILE, SHIPPED, TypedByUser, folder_of, load, package_of, trained_names
 
 CARD = "README.md"  # beside the weights of a trained policy
 CARD_LIMIT = 2**20  # bytes
@@ -38,12 +38,12 @@ class About(NamedTuple):
 
 
 def about(name: str) -> About:
-    """What there is to know about a policy.
+    """What there is to know about a policy that a user asks for.
 
     Raises:
         InputError: If it does not exist or cannot be loaded.
     """
-    policy, folder = load(name), folder_of(name)
+    policy, folder = load(TypedByUser(name)), folder_of(name)
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described else {}
     scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}

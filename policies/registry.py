@@ -11,7 +11,7 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -53,6 +53,14 @@ _OTHERS = (
 )
 
 
+class TypedByUser(str):
+    """A policy or a team that a user has typed, in a command or in Python.
+
+    It may name classes of Python files, which are code that runs. Names that were read from data,
+    such as results, studies and pages, are plain ``str``, and ``load`` runs no file for them.
+    """
+
+
 def names() -> list[str]:
     """All policies by name, the shipped ones first."""
     shipped = [*SHIPPED, *trained_names()]
@@ -78,18 +86,17 @@ def descriptions() -> dict[str, str]:
 def load(name: str | Path) -> Policy:
     """Load a policy by its name, from the folder of a trained policy, or from a Python file.
 
-    A name that was read from data, such as results or a study, is checked before
-    (``check_no_files``), because the policy of a Python file is code that runs.
-
     Args:
-        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``.
-            The folder of such a file is added to ``sys.path``, so the file can import those beside
-            it. A file that was changed is loaded again only by a new process.
+        name: One of ``names()``; a folder that ``dess train`` has written; or ``FILE.py:CLASS``,
+            which must be ``TypedByUser``. The folder of such a file is added to ``sys.path``, so
+            the file can import those beside it. A file that was changed is loaded again only by a
+            new process.
 
     Raises:
-        InputError: If the policy does not exist or cannot be loaded.
+        InputError: If the policy does not exist, cannot be loaded, or is a class of a Python file
+            that no user has typed.
     """
-    name = str(name)
+    is_typed, name = isinstance(name, TypedByUser), str(name)
     if name in SHIPPED:
         return _made(name, SHIPPED[name][0], lambda: _class_of(*SHIPPED[name][0].split(":")))
     if folder := folder_of(name):
@@ -101,6 +108,8 @@ def load(name: str | Path) -> Policy:
             policy.name = name
         return policy
     if file := FILE.fullmatch(name):
+        if not is_typed:
+            raise _unnamed("data", name)
         path, kind = Path(file["path"]), file["kind"]
         if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
@@ -191,7 +200,8 @@ def load_team(text: str, uavs: int | None = None) -> list[Policy]:
     Raises:
         InputError: If one of them is unknown.
     """
-    return [load(name.strip()) for name in text.split(",")[:uavs]]
+    kind = type(text)
+    return [load(kind(name.strip())) for name in text.split(",")[:uavs]]
 
 
 def files_of(team: str) -> list[str]:
@@ -203,25 +213,39 @@ def files_of(team: str) -> list[str]:
     return [name for name in names if FILE.fullmatch(name) and not folder_of(name)]
 
 
-def check_no_files(teams: Iterable[str], where: object, named: Collection[str] = ()) -> None:
-    """Refuse teams with policies of Python files, if it was not the user who named them.
+def typed(teams: Iterable[Any]) -> list[Any]:
+    """The teams that a user has typed; what is no text is left as it is, to be refused later."""
+    return [TypedByUser(team) if isinstance(team, str) else team for team in teams]
 
-    Results, pages and studies may come from anybody, and must not decide which code is run.
+
+def is_path(name: str) -> bool:
+    """Whether a name is a path, so that what it names depends on the working folder."""
+    return name not in names() and bool(FILE.fullmatch(name) or folder_of(name))
+
+
+def permitted(team: str, typed: Iterable[str], where: object) -> TypedByUser:
+    """A team that data name, if the user has typed all Python files in it, too.
 
     Args:
-        teams: Teams that data name.
+        team: The team.
+        typed: The teams that the user has typed.
         where: The file, page or folder with the data, for the message.
-        named: Teams that the user has named.
 
     Raises:
-        InputError: If there is such a policy.
+        InputError: If there is another Python file in it.
     """
-    known = {file for team in named for file in files_of(team)}
-    for file in (file for team in teams for file in files_of(team) if file not in known):
-        raise InputError(
-            f"{where}: names policy {shown(file)}, a Python file, which is run only if you name "
-            "it; allowed: --policy FILE.py:CLASS, if you trust the file"
-        )
+    known = {file for text in typed for file in files_of(text)}
+    for file in files_of(team):
+        if file not in known:
+            raise _unnamed(where, file)
+    return TypedByUser(team)
+
+
+def _unnamed(where: object, file: str) -> InputError:
+    return InputError(
+        f"{where}: policy {shown(file)} is a Python file, which is run only if you name it; "
+        "allowed: --policy FILE.py:CLASS, if you trust the file"
+    )
 
 
 def _outside_description(point: EntryPoint) -> str:

@@ -47,6 +47,16 @@ LIGHT = {
 }
 
 
+# Where a user's own words arrive, so that a policy in them may be a Python file, which is code.
+MAY_RUN_FILES = {
+    *("policies", "policies.registry", "policies.about"),
+    *("analysis.study.study", "analysis.sweeps.question", "analysis.questions.what_if.question"),
+    *("analysis.execution.evaluation", "analysis.results.provenance"),
+    *("reports.cli.evaluate", "reports.cli.simulate", "reports.cli.report", "reports.pages.verify"),
+}
+PERMITS = {"TypedByUser", "typed", "permitted"}
+
+
 def module_name(path: Path) -> str:
     """The dotted name of a source file."""
     parts = path.relative_to(ROOT).with_suffix("").parts
@@ -147,6 +157,27 @@ def test_no_modules_import_each_other() -> None:
 def users_of(libraries: set[str]) -> set[str]:
     """The modules that import one of some libraries."""
     return {n for n in SOURCES if libraries & {module.split(".")[0] for module in imports_of(n)}}
+
+
+def test_only_words_of_the_user_can_name_a_python_file() -> None:
+    """All other modules load policies by plain names, for which no file is run.
+
+    They import the loader from ``policies.registry``; that of ``policies`` is for users. The cells
+    of notebooks are the user's own words.
+    """
+    names = {
+        module: {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+                 for alias in node.names if node.module in ("policies", "policies.registry")}
+        for module, tree in LIBRARY.items()
+    }  # fmt: skip
+    permitting = {module for module, imported in names.items() if imported & PERMITS}
+    assert permitting | {"policies.registry"} == MAY_RUN_FILES
+    for module, tree in LIBRARY.items():
+        direct = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
+        of_users = {a.name for n in direct if n.module == "policies" for a in n.names}
+        assert not of_users & {"load", "load_team"}, module
+        used = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
+        assert module in MAY_RUN_FILES or not used & PERMITS, module
 
 
 def test_only_the_learner_imports_torch() -> None:

@@ -43,7 +43,7 @@ from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.view import View
-from policies import load_team
+from policies.registry import load_team
 
 FILE = "timing.json"
 SCHEMA_VERSION = 1

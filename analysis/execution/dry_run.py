@@ -28,7 +28,7 @@ from analysis.study.design import MAX_SIZE
 from analysis.study.study import MANY_POINTS, Study
 from dess import InputError
 from dess.scenario import ScenarioSpace
-from policies import load_team
+from policies.registry import load_team
 
 # The memory [bytes] of a design point and of a mission, measured on studies of many of either.
 POINT_MEMORY, MISSION_MEMORY = 12_000, 1_200

@@ -27,7 +27,7 @@ from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.streams import MAX_REPLICATION
 from dess.view import check_team
-from policies import load_team
+from policies.registry import TypedByUser, load_team
 
 METRICS = (*SHARES, *MEANS)
 
@@ -103,6 +103,7 @@ def evaluate(
         InputError: If a policy is unknown, a number is out of range, or the team has more policies
             than the largest fleet has UAVs.
     """
+    team = TypedByUser(team)
     _check(scenario, team, missions, seed, workers)
     pieces = [range(missions)]
     (all_of_it,) = _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock)

@@ -16,7 +16,7 @@ from analysis.results.store import Store
 from dess import InputError, simulate
 from dess.record import Records
 from dess.scenario import ScenarioSpace
-from policies import load_team
+from policies.registry import load_team
 
 Progress = Callable[[int], object]
 

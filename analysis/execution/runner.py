@@ -30,7 +30,7 @@ from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
-from policies import load_team
+from policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
 BOUNDS_CHUNK = 5

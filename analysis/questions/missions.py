@@ -24,7 +24,6 @@ from analysis.stats.intervals import summary
 from dess import InputError
 from dess.scenario import SAMPLED, Scenario
 from dess.sections.fleet import types_of
-from policies.registry import check_no_files
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
@@ -139,7 +138,6 @@ def kept_missions(
 
 def _keep_log(results: Results, policy: str, replication: int, folder: str | Path) -> None:
     try:
-        check_no_files([policy], results.store.folder)
         events = resimulate(results, policy, 0, replication).events
     except InputError:  # the record is another one, or the policy is a Python file
         return

@@ -35,9 +35,8 @@ from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import InputError, validation_line
 from dess.scenario import ScenarioSpace, fields_of, merged
-from policies import load_team
 from policies.base import Policy
-from policies.registry import files_of
+from policies.registry import TypedByUser, files_of, load_team
 
 ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("analysis.bound",)
@@ -158,20 +157,21 @@ class Origin(Document):
             InputError: If a policy cannot be loaded.
         """
         known = {file for team in named for file in files_of(team)}
-        closed = [t for t in self.policies if not known.issuperset(files_of(t.policy))]
-        teams = [team for team in self.policies if team not in closed]
-        here = code_behind((team.policy for team in teams), self.study["bounds"])
+        closed = [t.policy for t in self.policies if not known.issuperset(files_of(t.policy))]
+        teams = {TypedByUser(t.policy): t for t in self.policies if t.policy not in closed}
+        here = code_behind(teams, self.study["bounds"])
         changes = []
         code = {name: code for name, code in self.code.items() if name in here or not closed}
         if self.version != dess.__version__:
             changes.append(f"made by dess {self.version}, not {dess.__version__}")
         elif modules := differing(code, here):
             changes.append(f"made by other code of {', '.join(modules)}")
-        if weights := [t.policy for t in teams if t.weights != team_of(t.policy).weights]:
+        if weights := [name for name in teams if teams[name].weights != team_of(name).weights]:
             changes.append(f"made by other weights of {', '.join(weights)}")
         if closed:
-            files = ", ".join(team.policy for team in closed)
-            changes.append(f"made by a Python file that was not read, of policy {files}")
+            changes.append(
+                f"made by a Python file that was not read, of policy {', '.join(closed)}"
+            )
         versions = library_versions()
         made = self.libraries  # torch may be absent, here or where the results were made
         if others := [n for n in versions if n in made and made[n] != versions[n]]:

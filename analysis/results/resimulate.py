@@ -17,7 +17,8 @@ from dess import InputError, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import END_NAMES, sample_scenario
-from policies import load_team
+from policies.base import Policy
+from policies.registry import load_team
 
 
 class Resimulated(NamedTuple):
@@ -35,14 +36,14 @@ class Resimulated(NamedTuple):
 
 
 def mission_of(
-    space: ScenarioSpace, policy: str, seed: int = 0, replication: int = 0
+    space: ScenarioSpace, team: Sequence[Policy], seed: int = 0, replication: int = 0
 ) -> Resimulated:
     """Simulate a mission of any scenario, with its event log.
 
     Raises:
-        InputError: If there is no such policy, or it cannot act in the scenario.
+        InputError: If a policy cannot act in the scenario.
     """
-    record = simulate(space, load_team(policy, space.uavs[1]), seed, replication, events=True)
+    record = simulate(space, team, seed, replication, events=True)
     assert record.events is not None
     events = pd.DataFrame(record.events.columns())
     return Resimulated(sample_scenario(space, seed, replication), record, events)
@@ -56,7 +57,7 @@ def resimulate(results: Results, policy: str, point: int, replication: int) -> R
             one.
     """
     space, seed = results.scenario(point), results.store.manifest.seed
-    mission = mission_of(space, policy, seed, replication)
+    mission = mission_of(space, load_team(policy, space.uavs[1]), seed, replication)
     if changed := difference(mission.record, recorded(results, policy, point, replication)):
         raise InputError(
             f"{results.store.folder}: {policy}, point {point}, replication {replication}: "

@@ -12,6 +12,8 @@ from pydantic import (
     Field,
     PrivateAttr,
     ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
     field_validator,
     model_validator,
 )
@@ -26,8 +28,7 @@ from dess.errors import InputError, one_of, validation_line
 from dess.files import Shipped
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.streams import MAX_SEED
-from policies import load_team
-from policies.registry import check_no_files
+from policies.registry import TypedByUser, load_team, typed
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
 
@@ -54,6 +55,13 @@ def _by_field(values: Any) -> Any:
     return dotted(values) if isinstance(values, dict) else values
 
 
+def _still_typed(team: Any, validated: ValidatorFunctionWrapHandler) -> str:
+    return type(team)(validated(team)) if isinstance(team, TypedByUser) else validated(team)
+
+
+_Team = Annotated[Text, WrapValidator(_still_typed)]
+
+
 class StudyData(StrictTable):
     """The fields of a study and their limits, as study files and results have them.
 
@@ -76,7 +84,7 @@ class StudyData(StrictTable):
     design: Design | None = Field(
         None, description="the design points; without one, the scenario is the only point"
     )
-    policies: Annotated[tuple[Text, ...], BeforeValidator(as_tuples)] = Field(
+    policies: Annotated[tuple[_Team, ...], BeforeValidator(as_tuples)] = Field(
         min_length=1, description='teams: "P" or "P,P,..."'
     )
     missions: Integer = Field(
@@ -137,7 +145,9 @@ class Study(StudyData):
     @field_validator("policies")
     @classmethod
     def _are_known(cls, teams: tuple[str, ...]) -> tuple[str, ...]:
-        teams = tuple(",".join(name.strip() for name in team.split(",")) for team in teams)
+        teams = tuple(
+            type(team)(",".join(name.strip() for name in team.split(","))) for team in teams
+        )
         for team in teams:
             load_team(team)
             if teams.count(team) > 1:
@@ -298,8 +308,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     scenario = values.get("scenario")
     if isinstance(scenario, str) and scenario not in scenario_names():
         values["scenario"] = str(Path(text).parent / scenario)
-    if isinstance(teams := values.get("policies"), list) and "policies" not in overrides:
-        check_no_files([team for team in teams if isinstance(team, str)], where)
+    if isinstance(teams := overrides.get("policies"), list | tuple):
+        overrides["policies"] = typed(teams)
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         raise InputError(

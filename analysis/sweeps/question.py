@@ -36,6 +36,7 @@ from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files import replacing, writable
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names
+from policies.registry import typed
 
 LONGEST = 60  # largest number of characters for the fields in a name
 
@@ -86,7 +87,7 @@ def question(
         "scenario": str(scenario),
         "set": fixed,
         "design": {"kind": "grid", "values": swept},
-        "policies": [policies] if isinstance(policies, str) else [*policies],
+        "policies": typed([policies] if isinstance(policies, str) else policies),
         "seed": seed,
         **({"costs": dict(prices)} if prices else {}),
         **({} if requirements else {"missions": missions}),

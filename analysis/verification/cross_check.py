@@ -9,7 +9,7 @@ simulates nothing::
     records.engine_check(results, missions)
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from dess import InputError, simulate
 from dess.files import replacing, writable
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.state import END_NAMES
-from policies import load_team
+from policies.registry import files_of, load_team
 
 STUDY = "verification"
 FILE = Path(FOLDER, "missions.json")  # in the folder of all results
@@ -61,17 +61,25 @@ class CrossCheck(BaseModel):
 def simulate_missions(
     results: Results, count: int = MISSIONS, progress: Progress | None = None
 ) -> CrossCheck:
-    """Simulate the missions.
+    """Simulate the missions; those of policies that are classes of Python files are left out.
 
     Args:
         results: The results of the study.
         count: Missions of every policy to simulate again, all of them if there are fewer; and
             batches of each queue, at least 2.
         progress: Called after every mission.
+
+    Raises:
+        InputError: If there is no other policy.
     """
     space, seed = results.scenario(), results.store.manifest.seed
-    teams = {policy: load_team(policy) for policy in results.policies}
-    missions, uavs, chosen = [], [], [*_chosen(results, count)]
+    teams = {name: load_team(name) for name in results.policies if not files_of(name)}
+    if not teams:
+        raise InputError(
+            f"{results.store.folder}: has only policies of Python files, which are not simulated "
+            "again; allowed: a study with another policy"
+        )
+    missions, uavs, chosen = [], [], [*_chosen(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)
         fields = {name: record.metrics[name].item() for name in MISSION_RECORD.names or ()}
@@ -89,10 +97,10 @@ def simulate_missions(
     )
 
 
-def _chosen(results: Results, count: int) -> Iterator[tuple[str, int]]:
+def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[tuple[str, int]]:
     """The policies and replications of the missions to simulate again, at the first point."""
     missions = results.missions[results.missions["point"] == 0]
-    for policy in results.policies:
+    for policy in policies:
         replications = missions.loc[missions["policy"] == policy, "replication"].to_numpy()
         rows = np.unique(np.linspace(0, len(replications) - 1, count).astype(int))
         yield from ((policy, int(replication)) for replication in replications[rows])

@@ -49,8 +49,9 @@ def evaluate(
     """Simulate many missions and print the means of their metrics with 95 % intervals."""
     from analysis.execution.evaluation import check_evaluation, means
     from analysis.study.engine import engine_of
+    from policies.registry import typed
 
-    space = load_space(scenario, settings)
+    space, policy = load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)
     with console.compile_notice():
         check_evaluation(space, policy, missions, seed, engine, workers, yes)

@@ -167,9 +167,10 @@ def timing(
     """Measure how long a policy takes to decide; measurements of this machine and code are kept."""
     from analysis.execution.decision_time import is_current, measure, read, writing
     from analysis.study.study import load_study
+    from policies.registry import typed
 
     shown = (name for study in ("comparison", "gap") for name in load_study(study).policies)
-    teams = policy or [*dict.fromkeys(shown)]
+    teams = typed(policy or dict.fromkeys(shown))
     if not is_current(out, teams, missions):
         with (
             writing(out) as path,

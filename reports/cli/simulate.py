@@ -93,7 +93,7 @@ def simulate(
     from dess import simulate
     from dess.files import writable
     from dess.state import check_seed, sample_scenario
-    from policies import load_team
+    from policies.registry import TypedByUser, load_team
 
     if of:
         _refuse_given(context, "scenario", "settings", "seed")
@@ -102,7 +102,7 @@ def simulate(
         raise InputError("--point: belongs to a study; allowed: with --of DIR")
     else:
         space = load_space(scenario, settings)
-        asked = _Asked(space, policy or "greedy", seed, replication or 0, scenario)
+        asked = _Asked(space, TypedByUser(policy or "greedy"), seed, replication or 0, scenario)
     team = load_team(asked.policy, asked.space.uavs[1] if of else None)
     check_seed(asked.seed, asked.replication)
     _check_suffix("--figure", figure, FIGURES, "a picture")
@@ -166,12 +166,11 @@ def _of_study(
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
     from analysis.results.files import MANIFEST
     from analysis.results.manifest import Manifest
-    from policies.registry import check_no_files
+    from policies.registry import permitted
 
     manifest = Manifest.read(folder / MANIFEST)
     policies, named = [team.policy for team in manifest.policies], [policy] if policy else []
-    policy = _chosen("policy", policy, policies, ", ".join(policies))
-    check_no_files([policy], folder, named)
+    policy = permitted(_chosen("policy", policy, policies, ", ".join(policies)), named, folder)
     points = range(len(manifest.points))
     point = _chosen("point", point, points, f"0..{len(points) - 1}")
     if changes := manifest.changes_here(named):

@@ -34,6 +34,7 @@ from analysis.figures.missions import mission_figure, sea_figure
 from analysis.names import METRICS
 from analysis.results.resimulate import mission_of
 from dess import load_scenario
+from policies import load_team
 from reports.pages import html
 
 # %% [markdown]
@@ -74,7 +75,7 @@ html.figure(sea_figure(sea), "Map of the sea", caption)
 # A single mission (n = 1) helps to check that the sea is described as intended.
 
 # %%
-mission = mission_of(load_scenario(scenario, **example), policies[0], seed)
+mission = mission_of(load_scenario(scenario, **example), load_team(policies[0]), seed)
 caption = f"A mission of {policies[0]}, replication 0 (n = 1)."
 drawing = mission_figure(mission.events, mission.scenario)
 html.figure(drawing, "Map of the mission; battery, residual data and charging", caption)

@@ -9,6 +9,8 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from policies.registry import is_path
+
 
 def values_of(source: str) -> dict[str, Any]:
     """The parameters that a cell assigns, with their values."""
@@ -35,15 +37,16 @@ def with_values(source: str, values: Mapping[str, Any]) -> str:
 def with_paths(value: Any, write: Callable[[str], str]) -> Any:
     """The value of a parameter with its paths replaced, such as relative by absolute ones.
 
-    A path is a word with a path separator, or one that ends with ``.toml``. It may be a part of a
-    team: with ``os.path.abspath``, ``greedy,./mine`` becomes ``greedy,/home/me/mine``.
+    A path is a word with a path separator, one that ends with ``.toml``, or a policy of a folder or
+    a Python file. It may be a part of a team: with ``os.path.abspath``, ``greedy,mine`` becomes
+    ``greedy,/home/me/mine``.
     """
     if isinstance(value, list):
         return [with_paths(item, write) for item in value]
     if not isinstance(value, str):
         return value
     return ",".join(
-        write(word) if os.sep in word or word.endswith(".toml") else word
+        write(word) if os.sep in word or word.endswith(".toml") or is_path(word) else word
         for word in value.split(",")
     )
 

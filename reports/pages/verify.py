@@ -31,8 +31,7 @@ from dess.code.memory import check_memory
 from dess.files import read_text
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
-from policies import load_team
-from policies.registry import check_no_files
+from policies.registry import load_team, permitted
 from reports.pages.html import FILES, STUDY, embedded
 
 LIMIT = 64 * 2**20  # bytes of the largest page
@@ -224,7 +223,8 @@ def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
 def _drawn(evidence: Evidence, sampling: _Sampling) -> list[tuple[Mission, ScenarioSpace]]:
     """The missions of a study that are simulated again, with their scenarios."""
     study = f"study {evidence.study['name']}"
-    check_no_files((team.policy for team in evidence.policies), study, sampling.named)
+    for team in evidence.policies:
+        permitted(team.policy, sampling.named, study)
     sample = [evidence.sample[number] for number in sampling.drawn(len(evidence.sample))]
     spaces = [evidence.space(mission.values) for mission in sample]
     sampling.admit(study, spaces)
@@ -240,7 +240,8 @@ def _compared(
     lines = []
     for mission, space in drawn:
         policy, values, replication = mission.policy, mission.values, mission.replication
-        record = simulate(space, load_team(policy, space.uavs[1]), evidence.seed, replication)
+        team = load_team(permitted(policy, named, evidence.study["name"]), space.uavs[1])
+        record = simulate(space, team, evidence.seed, replication)
         if changed := difference(record, mission.record):
             command = commands.of_fields(evidence, policy, values, replication)
             lines.append(f"{changed}; command: {command}")
@@ -256,7 +257,8 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
     sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
         space = manifest.scenarios[cell.point]
-        team = load_team(manifest.policies[cell.team].policy, space.uavs[1])
+        policy = permitted(manifest.policies[cell.team].policy, sampling.named, what)
+        team = load_team(policy, space.uavs[1])
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)
         assert log is not None and stored is not None

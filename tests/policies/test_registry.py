@@ -21,7 +21,7 @@ from policies.base import Policy
 from policies.ddqn.config import config_of
 from policies.ddqn.trained import save_policy
 from policies.ddqn.training import build
-from policies.registry import SHIPPED, trained_names
+from policies.registry import SHIPPED, TypedByUser, trained_names
 
 ROOT = Path(__file__).parents[2]
 
@@ -226,7 +226,8 @@ def test_files_without_such_a_policy_are_named(file: Path, name: str, complaint:
 
 
 def test_an_edited_file_has_another_fingerprint(file: Path) -> None:
-    script = f"from analysis.results.provenance import team_of; t = team_of('{file}:Eager')"
+    script = "from analysis.results.provenance import team_of; from policies.registry import "
+    script += f"TypedByUser; t = team_of(TypedByUser('{file}:Eager'))"
     script += "; m = t.members[0]; print(m.name, m.class_, m.code)"
 
     def identity() -> str:
@@ -282,9 +283,11 @@ def test_which_policies_are_python_files_is_known_without_running_them(
     _trained(tmp_path / "data.py:Trap")  # a folder, whatever its name: it holds only data
     for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X"):
         assert registry.files_of(team) == [team.rpartition(" ")[2]]
-        with pytest.raises(InputError, match=r"page: names policy .* allowed: --policy"):
-            registry.check_no_files([team], "page", ["another.py:X", "greedy"])
-        registry.check_no_files([team], "page", [f"greedy, {team}"])
+        with pytest.raises(InputError, match=r"page: policy .* is a Python file.*: --policy"):
+            registry.permitted(team, ["another.py:X", "greedy"], "page")
+        assert isinstance(registry.permitted(team, [f"greedy, {team}"], "page"), TypedByUser)
+        with pytest.raises(InputError, match=r"policy .* is a Python file, which is run only if"):
+            registry.load_team(team)
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.files_of(team) == []
     assert "trap" not in sys.modules

@@ -21,8 +21,8 @@ from analysis.stats.front import on_front
 from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
-from policies import load
 from policies.planner import Course, Planner, first_plan
+from policies.registry import load
 
 
 def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:

@@ -31,7 +31,7 @@ from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
-from policies import load_team
+from policies.registry import load_team, typed
 
 NAME = "what-if"
 BASELINE, VARIATION = 0, 1  # the design points
@@ -85,7 +85,7 @@ def question(
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
-        "policies": policies,
+        "policies": typed(policies),
         "missions": missions,
         "seed": seed,
     }

@@ -7,9 +7,14 @@ from pathlib import Path
 import pytest
 
 from analysis import run_study
+from analysis.execution.jobs import MissionsJob
 from analysis.questions.diff import at_hand
+from analysis.results.chunks import parts_of, split
 from analysis.results.evidence import Evidence
-from analysis.results.tables import load_results
+from analysis.results.resimulate import resimulate
+from analysis.results.tables import Results, load_results
+from analysis.verification.cross_check import simulate_missions
+from dess import InputError
 from reports.cli import main
 from reports.pages import html
 from reports.pages.verify import sealed
@@ -95,6 +100,27 @@ def test_results_of_a_python_file_are_shown_without_running_it(
         load_results("results")
     )
     assert not Path("trace").exists()
+
+
+@pytest.mark.usefixtures("stranger")
+def test_no_mission_of_a_python_file_that_only_results_name_is_simulated() -> None:
+    results = load_results("results")
+    for simulated in (
+        lambda: simulate_missions(results, 2),  # what dess report verification does
+        lambda: resimulate(results, results.policies[0], 0, 0),
+        lambda: MissionsJob(*_first_chunk(results)).run(),
+    ):
+        with pytest.raises(InputError, match=r"Python file"):
+            simulated()
+    assert not Path("trace").exists()
+
+
+def _first_chunk(results: Results) -> tuple:
+    """The first missions of results, as the arguments of a job."""
+    manifest = results.store.manifest
+    chunk = next(split(parts_of(manifest, 0), 1))
+    spaces = (manifest.scenarios[0],)
+    return chunk, spaces, manifest.policies[0].policy, manifest.seed, "batch"
 
 
 def test_a_python_file_is_run_once_the_user_names_it(
