@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dess.errors import InputError, shown
-from dess.files import parse_json, read_text
+from dess.files.parsing import parse_json
+from dess.files.reading import read_text
 
 Cell = tuple[int, int]
 

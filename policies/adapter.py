@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from dess.env.stepper import checked_actions
+from dess.files import read_bytes
 from dess.observations.observer import Observer
 from dess.scenario import ScenarioSpace
 from dess.view import View
 
+LIMIT = 2**32  # bytes of the largest file of weights
 _ZONE = ("zone_x", "zone_y", "zone_width", "zone_height")
 
 
@@ -53,11 +55,12 @@ class Adapter:
             weights: The file with the weights of ``act``, so that a study notices if they change.
 
         Raises:
-            OSError: If the file of weights cannot be read.
+            FileNotFoundError, NotADirectoryError: If there is no file of weights.
+            InputError: If it cannot be read.
         """
         self.name, self.observation, self.guarded = name, observation, guarded
         self._choose = act
-        self.weights = sha256(Path(weights).read_bytes()).hexdigest() if weights else ""
+        self.weights = sha256(read_bytes(Path(weights), LIMIT)).hexdigest() if weights else ""
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view.

@@ -7,7 +7,6 @@ Other packages register theirs under the entry point ``dess.policies``.
 """
 
 import inspect
-import json
 import os
 import re
 import sys
@@ -20,6 +19,7 @@ from typing import Any
 
 from dess.code.libraries import needs
 from dess.errors import InputError, one_of, shown
+from dess.files import paths_in
 from policies.base import Policy
 
 GROUP = "dess.policies"
@@ -69,7 +69,7 @@ def names() -> list[str]:
 
 def trained_names() -> list[str]:
     """The names of the trained policies that are shipped."""
-    return sorted(path.parent.name for path in TRAINED.glob(f"*/{CONFIG}"))
+    return [path.parent.name for path in paths_in(TRAINED, f"*/{CONFIG}")]
 
 
 def descriptions() -> dict[str, str]:
@@ -264,7 +264,9 @@ def _outside() -> dict[str, EntryPoint]:
 
 def _description(folder: Path) -> str:
     """The description in the config of a trained policy, or the policy that it repeats."""
-    training = json.loads((folder / CONFIG).read_text("utf-8"))["training"]
-    if training.get("name", folder.name) == folder.name:
-        return training["description"]
-    return f"{training['name']} trained once more, with seed {training['seed']}"
+    from policies.ddqn.description import read_description  # imports pydantic
+
+    training = read_description(folder).training
+    if training.name == folder.name:
+        return training.description
+    return f"{training.name} trained once more, with seed {training.seed}"

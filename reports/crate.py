@@ -7,15 +7,14 @@ https://www.researchobject.org/ro-crate/specification/1.1/). In the unpacked fol
 ``dess study run study.toml --out results`` finds that all missions are present.
 """
 
-import shutil
-from collections.abc import Mapping
+import json
+from collections.abc import Iterator, Mapping
 from datetime import date
 from importlib import metadata
-from io import StringIO
+from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+from urllib.parse import unquote
 
 import tomli_w
 from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
@@ -28,15 +27,17 @@ from analysis.results.files import BOUNDS, MANIFEST, partition
 from analysis.results.parquet import files_in
 from analysis.results.tables import Results
 from dess import InputError
+from dess.files import documents, read_bytes, tables
+from dess.files.archives import write_zip
 from reports.pages.html import STUDY as EVIDENCE
 from reports.pages.html import embedded
+from reports.pages.index import LARGEST
 from reports.pages.verify import is_sealed, page_text
 
 RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
 _SPDX = "https://spdx.org/licenses/"
 _PARQUET = "application/vnd.apache.parquet"
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip file can store
 _TABLES = {
     "missions": "The records of the missions, a row per mission.",
     "uavs": "The records of the UAVs, a row per UAV of every mission.",
@@ -51,7 +52,7 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     Args:
         results: The results of the study.
         page: The page of the results.
-        path: The zip file to write.
+        path: The zip file to write, a temporary one.
         published: The date of the publication.
         licence: The licence of the results, an SPDX identifier (https://spdx.org/licenses).
 
@@ -67,16 +68,14 @@ def write_crate(results: Results, page: Path, path: Path, published: date, licen
     root["name"], root["description"] = f"Study {study['name']}", _description(results)
     root["datePublished"] = published.isoformat()
     root["license"] = _licence(crate, licence_of(licence))
-    tables, documents = _tables(crate, results), _documents(crate, results)
-    html = _file(crate, page, page.name, "The page of the study, for a browser.", "text/html")
+    made, asked = _results(crate, results), _documents(crate, results)
+    content = read_bytes(page, LARGEST)
+    html = _file(crate, content, page.name, "The page of the study, for a browser.", "text/html")
     root["mentions"] = [
-        _action(crate, "run", RUN, software, documents, tables),
-        _action(crate, "report", REPORT, software, tables, html),
+        _action(crate, "run", RUN, software, asked, made),
+        _action(crate, "report", REPORT, software, made, html),
     ]
-    with TemporaryDirectory() as folder:
-        crate.write(folder)
-        _copy_tables(results, Path(folder, RESULTS))
-        _zip(Path(folder), path)
+    write_zip(path, _entries(crate, results))
 
 
 def check_page(page: Path, results: Results) -> None:
@@ -193,43 +192,50 @@ def _homepage(library: str) -> str:
     return urls.get("homepage") or about["Home-page"] or next(iter(urls.values()), "")
 
 
-def _tables(crate: ROCrate, results: Results) -> Dataset:
-    """Add the results folder; its tables are copied when the crate is written."""
+def _results(crate: ROCrate, results: Results) -> Dataset:
+    """Add the results folder; its tables are read when the crate is written."""
     folder = results.store.folder
     about = {"name": "Results", "description": "A results folder, as dess study show reads it."}
-    tables = crate.add_dataset(dest_path=f"{RESULTS}/", properties=about)
+    whole = crate.add_dataset(dest_path=f"{RESULTS}/", properties=about)
     manifest = "The manifest: the study, and what the results were made with."
-    parts = [_file(crate, folder / MANIFEST, f"{RESULTS}/{MANIFEST}", manifest, "application/json")]
+    content = read_bytes(folder / MANIFEST, documents.LIMIT)
+    parts = [_file(crate, content, f"{RESULTS}/{MANIFEST}", manifest, "application/json")]
     for name, description in _TABLES.items():
         about = {"name": name, "description": description, "encodingFormat": _PARQUET}
         parts.append(crate.add_dataset(dest_path=f"{RESULTS}/{name}/", properties=about))
-    tables["hasPart"] = parts
-    return tables
+    whole["hasPart"] = parts
+    return whole
 
 
-def _copy_tables(results: Results, into: Path) -> None:
-    """Copy the files of results, and nothing else, such as what links in their folder lead to."""
+def _entries(crate: ROCrate, results: Results) -> Iterator[tuple[str, bytes]]:
+    """The names and contents of a crate: of the results their files, and nothing else in them."""
+    about = json.dumps(crate.metadata.generate(), indent=4, sort_keys=True, ensure_ascii=False)
+    yield crate.metadata.id, about.encode()
+    for entity in crate.data_entities:
+        is_file = isinstance(entity, File)
+        yield unquote(entity.id), entity.source.getvalue() if is_file else b""
     places = [Path(name, partition(policy)) for name in _TABLES for policy in results.policies]
     for place in (*places, Path(BOUNDS)):
         for path in files_in(results.store.folder / place):
-            (into / place).mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(path, into / place / path.name)
+            name = Path(RESULTS, place, path.name).as_posix()
+            yield name, read_bytes(path, tables.LIMIT)
 
 
 def _documents(crate: ROCrate, results: Results) -> list[File]:
     """The study and its scenario as TOML files, and the licence of dess."""
-    study, scenario = map(tomli_w.dumps, study_files(results.manifest))
+    study, scenario = (tomli_w.dumps(data).encode() for data in study_files(results.manifest))
     licence = metadata.distribution("dess").read_text("licenses/LICENSE") or ""
-    _file(crate, StringIO(licence), "LICENSE", "The licence of dess.", "text/plain")
+    _file(crate, licence.encode(), "LICENSE", "The licence of dess.", "text/plain")
     return [
-        _file(crate, StringIO(study), STUDY, "The study.", "application/toml"),
-        _file(crate, StringIO(scenario), SCENARIO, "Its scenario.", "application/toml"),
+        _file(crate, study, STUDY, "The study.", "application/toml"),
+        _file(crate, scenario, SCENARIO, "Its scenario.", "application/toml"),
     ]
 
 
-def _file(crate: ROCrate, source: Path | StringIO, path: str, description: str, kind: str) -> File:
+def _file(crate: ROCrate, content: bytes, path: str, description: str, kind: str) -> File:
     about = {"name": Path(path).name, "description": description, "encodingFormat": kind}
-    return crate.add_file(source, path, properties=about, record_size=True)
+    size = {"contentSize": str(len(content))}
+    return crate.add_file(BytesIO(content), path, properties=about | size)
 
 
 def _action(
@@ -243,14 +249,3 @@ def _action(
     """Add a command that makes a part of the crate, to be run in the unpacked folder."""
     about = {"name": command, "description": f"In the unpacked folder: {command}"}
     return crate.add_action(software, f"#{name}", used, made, about)
-
-
-def _zip(folder: Path, path: Path) -> None:
-    """Zip a folder; the bytes depend only on its files."""
-    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
-        for part in sorted(folder.rglob("*")):
-            name = part.relative_to(folder).as_posix()
-            entry = ZipInfo(f"{name}/" if part.is_dir() else name, _EPOCH)
-            entry.compress_type = ZIP_DEFLATED
-            entry.external_attr = (0o40755 if part.is_dir() else 0o100644) << 16  # permissions
-            archive.writestr(entry, b"" if part.is_dir() else part.read_bytes())

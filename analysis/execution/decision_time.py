@@ -7,7 +7,6 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path, PurePath
 from time import perf_counter
 from typing import Annotated, Any, Self
@@ -21,12 +20,12 @@ import dess
 from analysis.results.documents import (
     Commit,
     Count,
-    Document,
     Finite,
     Hash,
     Library,
     Seed,
     Version,
+    check_versions,
 )
 from analysis.results.manifest import Manifest
 from analysis.results.provenance import (
@@ -39,7 +38,8 @@ from analysis.results.provenance import (
 )
 from analysis.study.stopping import Text
 from dess import InputError, load_scenario, simulate, simulate_batch
-from dess.files import replacing, writable
+from dess.files import read_text, write_file
+from dess.files.documents import Document
 from dess.scenario import ScenarioSpace
 from dess.state import check_seed
 from dess.view import View
@@ -125,11 +125,6 @@ class Timing(Document):
         return self
 
     @property
-    def text(self) -> str:
-        """The timing as JSON."""
-        return json.dumps(self.model_dump(mode="json", by_alias=True), indent=1) + "\n"
-
-    @property
     def space(self) -> ScenarioSpace:
         """The scenario of the missions."""
         return scenario_of(self.constants)
@@ -191,18 +186,13 @@ def measure(
     )
 
 
-@contextmanager
-def writing(folder: str | Path) -> Iterator[Path]:
-    """Yield a temporary path for a timing, which becomes the file in the folder at the end.
+def write(timing: Timing, folder: str | Path) -> None:
+    """Write a timing into a folder, in place of an earlier one.
 
     Raises:
-        InputError: Before the block is run, if no file can be written there.
+        InputError: If it cannot be written.
     """
-    path = Path(folder) / FILE
-    with writable(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        yield temporary
+    write_file(Path(folder) / FILE, json.dumps(timing.data, indent=1) + "\n")
 
 
 def read(folder: str | Path) -> Timing:
@@ -213,7 +203,11 @@ def read(folder: str | Path) -> Timing:
     """
     path = Path(folder) / FILE
     allowed = f"allowed: what is made by: dess timing --out {os.path.abspath(folder)}"
-    return Timing.load(path, SCHEMA_VERSION, allowed, allowed)
+
+    def check(data: dict) -> None:
+        check_versions(data, path, SCHEMA_VERSION, allowed)
+
+    return Timing.load(path, allowed, first=check)
 
 
 def is_current(folder: str | Path, policies: Sequence[str], missions: int) -> bool:
@@ -305,8 +299,8 @@ def _steps(
 def _processor() -> str:
     """The model of the processor."""
     try:
-        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
-    except OSError:
+        lines = read_text(Path("/proc/cpuinfo")).splitlines()
+    except (OSError, InputError):
         lines = []
     models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return models[0] if models else platform.processor() or platform.machine() or "unknown"

@@ -22,6 +22,7 @@ from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary
 from dess import InputError
+from dess.files import paths_in
 from dess.scenario import SAMPLED, Scenario
 from dess.sections.fleet import types_of
 
@@ -149,7 +150,7 @@ def _keep_log(results: Results, policy: str, replication: int, folder: str | Pat
 def _kept_log(
     results: Results, policy: str, replication: int, folder: str | Path
 ) -> pd.DataFrame | None:
-    files = sorted(Path(folder, FOLDER).glob(f"{_name(results, policy, replication)}-*.parquet"))
+    files = paths_in(Path(folder, FOLDER), f"{_name(results, policy, replication)}-*.parquet")
     tables = (parquet.read(path) for path in files)
     return next((table.to_pandas() for table in tables if table is not None), None)
 

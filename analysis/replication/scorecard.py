@@ -23,6 +23,7 @@ from analysis.replication.verdict_rules import MARGIN, NO_RESULTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import INCONCLUSIVE, position
 from dess import InputError
+from policies.ddqn.config import TrainingConfig
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
@@ -114,23 +115,19 @@ def margin(studies: Mapping[str, Results]) -> float:
     return (rule or {}).get("indifference") or MARGIN
 
 
-def departures(training: Mapping[str, Any]) -> list[str]:
-    """In what a training departs from the paper, in words.
-
-    Args:
-        training: The settings of the training, as in ``config.json`` of the policy.
-    """
-    n_step, num_envs = training["n_step"], training["num_envs"]
-    greedy = all(phase["temperature"] == 0 for phase in training["phases"])
+def departures(training: TrainingConfig) -> list[str]:
+    """In what a training departs from the paper, in words."""
+    n_step, num_envs = training.n_step, training.num_envs
+    greedy = all(phase.temperature == 0 for phase in training.phases)
     differs = {
-        "the return guard, which masks actions that would be too late to return": training["guard"],
-        "missions that start with little battery": training["low_battery_starts"],
-        "early returns": training["early_returns"],
+        "the return guard, which masks actions that would be too late to return": training.guard,
+        "missions that start with little battery": training.low_battery_starts,
+        "early returns": training.early_returns,
         f"{n_step}-step returns": n_step > 1,
-        "the Huber loss": training["loss"] == "huber",
+        "the Huber loss": training.loss == "huber",
         "epsilon-greedy exploration without softmax": greedy,
         f"{num_envs:,} missions side by side": num_envs > 1,
-        "a slow copy of the weights, which is the one evaluated": training["average_rate"] < 1,
+        "a slow copy of the weights, which is the one evaluated": training.average_rate < 1,
     }
     return [words for words, applies in differs.items() if applies]
 

@@ -1,16 +1,13 @@
-"""JSON documents as frozen models; a document of another version is refused in one line."""
+"""The types of the fields of JSON documents, and the versions that these are made by."""
 
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
 import dess
-from dess.errors import InputError, cut, printable, validation_line
-from dess.files import parse_json, read_text
+from dess.errors import InputError, cut, printable
 from dess.streams import MAX_REPLICATION, MAX_SEED
-
-LIMIT = 256 * 2**20  # bytes of the largest document; a design point takes about 150
 
 _VERSIONS = ("version", "schema_version")
 
@@ -30,61 +27,22 @@ Count = Annotated[int, Field(ge=0, le=2**53)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class Document(BaseModel):
-    """A JSON document, or a part of one: frozen, and without unknown fields."""
+def check_versions(data: dict, path: Path, schema: int, allowed: str) -> None:
+    """Refuse a document that another version of dess, or of its schema, has made.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    Args:
+        data: The document as plain data; one without versions is not refused.
+        path: Its file.
+        schema: The schema version that it must have.
+        allowed: The end of the message.
 
-    @property
-    def data(self) -> dict[str, Any]:
-        """The document as plain data."""
-        return self.model_dump(mode="json", by_alias=True)
-
-    @classmethod
-    def parse(cls, text: str, where: str, allowed: str) -> Self:
-        """Read a document from its JSON text.
-
-        Args:
-            text: The text.
-            where: The file or page that contains the text, for messages.
-            allowed: What the message says is allowed.
-
-        Raises:
-            InputError: If the text is not a valid document.
-        """
-        parse_json(text, where)  # first, since this also refuses integers that cannot be printed
-        try:
-            return cls.model_validate_json(text, strict=True)
-        except ValidationError as error:
-            problem = validation_line(error, where, cls).partition("; allowed:")[0]
-            raise InputError(f"{problem}; {allowed}") from None
-
-    @classmethod
-    def load(cls, path: Path, schema: int, absent: str, allowed: str) -> Self:
-        """Read a document from a file, which has a ``version`` of dess and a ``schema_version``.
-
-        Args:
-            path: The file.
-            schema: The schema version that the document must have.
-            absent: What the message says is allowed if the file does not exist.
-            allowed: What all other messages say is allowed.
-
-        Raises:
-            InputError: If the file does not exist, has another version, or is not valid.
-        """
-        try:
-            text = read_text(path, LIMIT)
-            data = parse_json(text, str(path))
-        except (FileNotFoundError, NotADirectoryError):
-            raise InputError(f"{path}: no such file; {absent}") from None
-        except InputError as error:
-            problem = str(error).partition("; allowed:")[0]
-            raise InputError(f"{problem}; {allowed}") from None
-        made_by = [data.get(key) for key in _VERSIONS] if isinstance(data, dict) else [None]
-        if None not in made_by and made_by != [dess.__version__, schema]:
-            version, other = (cut(printable(str(value)), 60) for value in made_by)
-            raise InputError(
-                f"{path}: made by dess {version} (schema {other}), "
-                f"not {dess.__version__} (schema {schema}); {allowed}"
-            )
-        return cls.parse(text, str(path), allowed)
+    Raises:
+        InputError: If it has another version.
+    """
+    made_by = [data.get(key) for key in _VERSIONS]
+    if None not in made_by and made_by != [dess.__version__, schema]:
+        version, other = (cut(printable(str(value)), 60) for value in made_by)
+        raise InputError(
+            f"{path}: made by dess {version} (schema {other}), "
+            f"not {dess.__version__} (schema {schema}); {allowed}"
+        )

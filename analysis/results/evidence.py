@@ -14,11 +14,14 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.results.documents import Count, Document, Finite, Key, Replication
+from analysis.results.documents import Count, Finite, Key, Replication
 from analysis.results.provenance import Origin
 from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
+from dess.files import paths_in, read_bytes
+from dess.files.documents import Document
+from dess.files.tables import LIMIT
 from dess.record import MISSION_RECORD
 from policies.registry import TRAINED
 
@@ -94,8 +97,9 @@ class Evidence(Origin):
 def learned_files(folder: Path = TRAINED) -> dict[str, str]:
     """The files of learned policies and their curves, with the hashes of their bytes."""
     kinds = (".safetensors", ".json", ".parquet")
-    paths = sorted(path for path in folder.rglob("*") if path.suffix in kinds)
-    return {p.relative_to(folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in paths}
+    paths = [path for path in paths_in(folder, "**/*") if path.suffix in kinds]
+    hashes = (sha256(read_bytes(path, LIMIT)).hexdigest() for path in paths)
+    return {p.relative_to(folder).as_posix(): h for p, h in zip(paths, hashes, strict=True)}
 
 
 def chosen(count: int, most: int, seed: int) -> Sequence[int]:

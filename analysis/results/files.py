@@ -1,4 +1,4 @@
-"""The files of a results folder: their names, and how they are written and deleted.
+"""The files of a results folder: their names and places.
 
 A run writes and deletes only inside of its folder, also in one that somebody else has made.
 """
@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from analysis.results.chunks import short_hash
 from dess import InputError
-from dess.files import replacing, writable
+from dess.files import paths_in
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 LONG = 150  # largest number of characters of a policy's name in the name of a folder
@@ -30,26 +30,11 @@ def check_places(folder: Path) -> None:
     Raises:
         InputError: If there are links, or files and folders in each other's place.
     """
-    places = [folder / LOCK, *(folder / name for name in FOLDERS), *folder.glob("*/policy=*")]
-    for path in places:
-        is_sound = path.is_file() if path.name == LOCK else path.is_dir()
-        if path.is_symlink() or (path.exists() and not is_sound):
+    for path in (*(folder / name for name in FOLDERS), *paths_in(folder, "*/policy=*")):
+        if path.is_symlink() or (path.exists() and not path.is_dir()):
             raise InputError(
                 f"{path}: is a link, or not what a run would write there; allowed: another --out"
             )
-
-
-def delete(path: Path) -> None:
-    """Delete a file of a run; a folder of its name, which no run has made, stays."""
-    if not path.is_dir():
-        with writable(path):
-            path.unlink(missing_ok=True)
-
-
-def write(path: Path, text: str) -> None:
-    """Write a file completely or not at all."""
-    with replacing(path) as temporary, writable(path):
-        temporary.write_text(text, "utf-8")
 
 
 def is_ours(path: Path) -> bool:

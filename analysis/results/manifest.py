@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 import dess
-from analysis.results.documents import Hash
+from analysis.results.documents import Hash, check_versions
 from analysis.results.provenance import (
     Acceptance,
     Origin,
@@ -149,7 +149,11 @@ class Manifest(Origin):
             InputError: If the file does not exist, is damaged, or has another version.
         """
         absent = "allowed: a results folder, made by dess study run"
-        return cls.load(path, SCHEMA_VERSION, absent, _ALLOWED)
+
+        def check(data: dict) -> None:
+            check_versions(data, path, SCHEMA_VERSION, _ALLOWED)
+
+        return cls.load(path, _ALLOWED, absent, check)
 
     def extended_to(self, new: "Manifest", path: Path, accepting: int | None) -> "Manifest":
         """The manifest of a folder with these results, after a new run has added to them.

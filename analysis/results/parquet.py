@@ -21,15 +21,14 @@ from pydantic import Field, TypeAdapter
 from analysis.results.chunks import Chunk, name_of, short_hash
 from analysis.results.documents import Key, Replication
 from dess import InputError
-from dess.code.memory import check_memory
-from dess.files import read_bytes, replacing, writable
+from dess.files import paths_in, read_bytes, write_file
+from dess.files.tables import LIMIT, check_size, parquet_of
 from dess.record import EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.scenario import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.state import END_NAMES
 from dess.streams import MAX_REPLICATION
 
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
-LIMIT = 2**30  # bytes of the largest file
 PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
 KEY = pa.dictionary(pa.int32(), pa.string())
 Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
@@ -207,14 +206,9 @@ def write(folder: Path, name: str, table: pa.Table) -> Path:
     Raises:
         InputError: If it cannot be written.
     """
-    sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd")
-    content = sink.getvalue().to_pybytes()
+    content = parquet_of(table)
     path = folder / f"{name}-{short_hash(content)}.parquet"
-    with writable(path):
-        path.parent.mkdir(exist_ok=True)
-    with replacing(path) as temporary, writable(path):
-        temporary.write_bytes(content)
+    write_file(path, content)
     return path
 
 
@@ -246,7 +240,7 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
             schema = FORMER_EVENTS
         if file.schema_arrow.names != schema.names:
             return None
-        _check_size(path, file.metadata)
+        check_size(path, file.metadata)
         table = file.read(use_threads=False)
         for name in words:
             table = table.set_column(*_spelled(table, name))
@@ -257,15 +251,6 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     if not table.schema.equals(schema):
         return None
     return table if schema not in (EVENTS, FORMER_EVENTS) or _is_log(table) else None
-
-
-def _check_size(path: Path, metadata: pq.FileMetaData) -> None:
-    """Refuse a file whose content is larger than the memory, although the file is small."""
-    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
-    columns = [group.column(n) for group in groups for n in range(metadata.num_columns)]
-    size = sum(group.total_byte_size for group in groups)
-    size += 8 * sum(column.num_values for column in columns)
-    check_memory(f"{path}: {metadata.num_rows:,} rows", 3 * size, "a file of dess study run")
 
 
 def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
@@ -300,8 +285,8 @@ def _is_log(table: pa.Table) -> bool:
 
 def files_in(folder: Path) -> list[Path]:
     """The files in a folder that a run may have written."""
-    paths = (path for path in folder.glob("*.parquet") if NAME.fullmatch(path.name))
-    return sorted(path for path in paths if path.is_file() and not path.is_symlink())
+    paths = (path for path in paths_in(folder, "*.parquet") if NAME.fullmatch(path.name))
+    return [path for path in paths if path.is_file() and not path.is_symlink()]
 
 
 def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], list[Path]]:
@@ -342,5 +327,5 @@ def _name_in(table: pa.Table) -> str:
 
 def missions_in(folder: Path) -> int:
     """The number of missions in a results folder, without those in damaged files."""
-    files = (path for part in folder.glob("missions/policy=*") for path in files_in(part))
+    files = (path for part in paths_in(folder, "missions/policy=*") for path in files_in(part))
     return sum(len(table) for path in files if (table := read(path, MISSIONS)) is not None)

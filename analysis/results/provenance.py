@@ -23,7 +23,6 @@ from analysis.results.documents import (
     Class,
     Commit,
     Count,
-    Document,
     Hash,
     Library,
     Module,
@@ -34,6 +33,7 @@ from analysis.study.stopping import Text
 from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import InputError, validation_line
+from dess.files.documents import Document
 from dess.scenario import ScenarioSpace, fields_of, merged
 from policies.base import Policy
 from policies.registry import TypedByUser, files_of, load_team

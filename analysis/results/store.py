@@ -12,6 +12,7 @@ or by how many workers it was computed.
 import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Self
@@ -19,7 +20,6 @@ from typing import Self
 import numpy as np
 import pandas as pd
 import pyarrow as pa
-from filelock import FileLock, Timeout
 
 from analysis.results import files, parquet
 from analysis.results.bounds.kept import BoundFiles
@@ -28,8 +28,10 @@ from analysis.results.files import FOLDERS, LOCK, MANIFEST
 from analysis.results.manifest import Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
-from dess.files import check_folder, writable
+from dess.files import check_folder, delete, locked, make_folder, paths_in, write_file
 from dess.record import Records
+
+_BUSY = "in use by another run; allowed: another --out, or wait for its end"
 
 
 class Store:
@@ -44,7 +46,7 @@ class Store:
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
-        self._lock = FileLock(folder / LOCK)
+        self._lock = ExitStack()  # what holds it
         self._tables: dict[tuple[int, str], parquet.Tables] = {}  # by team and name of the chunk
         self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
         self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
@@ -68,21 +70,13 @@ class Store:
         folder = Path(out)
         manifest = Manifest.of(study)
         store = cls(folder, _extended(folder, manifest, accept_code))
-        with writable(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-            files.check_places(folder)
-            try:
-                store._lock.acquire(timeout=0)
-            except Timeout:
-                allowed = "allowed: another --out, or wait for its end"
-                raise InputError(f"{folder}: in use by another run; {allowed}") from None
-        try:
+        files.check_places(folder)
+        with ExitStack() as lock:
+            lock.enter_context(locked(folder / LOCK, _BUSY))
             # Read again under the lock, because another run may have ended in the meantime.
             store.manifest = _extended(folder, manifest, accept_code)
             store._prepare()
-        except BaseException:
-            store._lock.release()
-            raise
+            store._lock = lock.pop_all()
         return store
 
     @classmethod
@@ -103,7 +97,6 @@ class Store:
         Raises:
             InputError: If the folder holds something else, or cannot be written.
         """
-        check_folder(Path(out))
         store = cls(Path(out), _extended(Path(out), Manifest.of(study), accept_code))
         store._scan()
         return store
@@ -112,21 +105,20 @@ class Store:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._lock.release()
+        self._lock.close()
 
     def _prepare(self) -> None:
         """Write the manifest, remove temporary files of a killed run, and scan the folder."""
-        files.write(self.folder / MANIFEST, self.manifest.text)
-        for name in FOLDERS:
-            with writable(self.folder / name):
-                (self.folder / name).mkdir(exist_ok=True)
+        write_file(self.folder / MANIFEST, self.manifest.text)
         places = [self.folder / name for name in FOLDERS]
-        places += [path for place in places for path in place.glob("policy=*")]
-        for path in (path for place in (self.folder, *places) for path in place.glob(".*.tmp")):
-            files.delete(path)
+        for place in places:
+            make_folder(place)
+        places += [self.folder, *paths_in(self.folder, "*/policy=*")]
+        for path in (path for place in places for path in paths_in(place, ".*.tmp")):
+            delete(path)
         self._scan()
         while self.damaged:
-            files.delete(self.damaged.pop())
+            delete(self.damaged.pop())
 
     def _scan(self) -> None:
         """Find out which missions are present, and which files are damaged."""
@@ -163,6 +155,12 @@ class Store:
 
     def _partition(self, kind: str, team: int) -> Path:
         return self.folder / kind / files.partition(self.manifest.policies[team].policy)
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of records, event logs and bounds, the damaged ones included."""
+        folders = [*paths_in(self.folder, "*/policy=*"), self.bounds.folder]
+        return [path for folder in folders for path in parquet.files_in(folder)]
 
     def missing(self, chunk: Chunk) -> Chunk | None:
         """The part of a chunk that is missing; None if all of it is present."""
@@ -232,7 +230,7 @@ class Store:
         parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)
         parquet.write(self._partition("missions", chunk.team), chunk.name, tables.missions)
         self._enter(chunk.team, chunk.name, tables)
-        files.delete(self._failure(chunk))
+        delete(self._failure(chunk))
 
     def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
         """Store the event log of a replication of a cell."""
@@ -243,19 +241,22 @@ class Store:
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
         path = self._failure(chunk)
-        files.write(path, json.dumps(asdict(failure), indent=2) + "\n")
+        write_file(path, json.dumps(asdict(failure), indent=2) + "\n")
         return path
 
     def _failure(self, chunk: Chunk) -> Path:
         return self.folder / "failures" / f"{chunk.name}.json"
 
+    def _failures(self) -> list[Path]:
+        return paths_in(self.folder / "failures", "*.json")
+
     def finish(self, missions: Sequence[Sequence[int]], selected: Sequence[Selected]) -> None:
         """Write into the manifest that all missions are present, and how many there are."""
         update = {"missions": missions, "selected": selected, "complete": True}
         self.manifest = self.manifest.model_copy(update=update)
-        files.write(self.folder / MANIFEST, self.manifest.text)
-        for path in (self.folder / "failures").glob("*.json"):
-            files.delete(path)
+        write_file(self.folder / MANIFEST, self.manifest.text)
+        for path in self._failures():
+            delete(path)
 
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
         """The missions of some parts of one team, with their ``point``, in the order of the parts.
@@ -307,7 +308,7 @@ class Store:
         line += f"{self.manifest.policies[team].policy}{where}"
         if self.damaged:
             line += f" (damaged: {self.damaged[0]})"
-        if failed := sorted((self.folder / "failures").glob("*.json")):
+        if failed := self._failures():
             line += f" ({len(failed)} chunks failed, see {failed[0]})"
         return f"{line}; allowed: run the study again to complete it"
 
@@ -331,16 +332,13 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
         InputError: If the folder contains something else.
     """
     path = folder / MANIFEST
-    with writable(folder):
-        if not path.exists():
-            others = (
-                [e for e in folder.iterdir() if not files.is_ours(e)] if folder.is_dir() else []
+    check_folder(folder)
+    if not path.exists():
+        if any(not files.is_ours(other) for other in paths_in(folder)):
+            raise InputError(
+                f"{folder}: holds other files and no {MANIFEST}; "
+                "allowed: a results folder, or a new or empty one (another --out)"
             )
-            if others:
-                raise InputError(
-                    f"{folder}: holds other files and no {MANIFEST}; "
-                    "allowed: a results folder, or a new or empty one (another --out)"
-                )
-            return manifest
+        return manifest
     held = Manifest.read(path)
     return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)

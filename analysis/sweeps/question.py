@@ -34,7 +34,7 @@ from analysis.study.costs import Costs
 from analysis.study.design import Grid
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
-from dess.files import replacing, writable
+from dess.files import paths_in, write_file
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 from policies.registry import typed
 
@@ -158,12 +158,12 @@ def ask(
         ChunkError: As for ``run_study``.
     """
     out = folder_of(study, folder)
-    others = [path.parent for path in out.parent.glob(f"*/{MANIFEST}") if path.parent != out]
+    others = [path.parent for path in paths_in(out.parent, f"*/{MANIFEST}") if path.parent != out]
     _check_name(study, out)
-    if check_effort(study, out, workers, reuse=sorted(others), yes=yes):
+    if check_effort(study, out, workers, reuse=others, yes=yes):
         check_policies(study)
     write(study, folder)
-    return run_study(study, out, workers, None, progress, announce, reuse=sorted(others))
+    return run_study(study, out, workers, None, progress, announce, reuse=others)
 
 
 def write(study: Study, folder: str | Path) -> Path:
@@ -172,10 +172,7 @@ def write(study: Study, folder: str | Path) -> Path:
     data = study.model_dump(mode="json", exclude_unset=True)
     if study.scenario not in scenario_names():
         data["scenario"] = Path(os.path.relpath(study.scenario, path.parent)).as_posix()
-    with writable(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary, writable(path):
-        temporary.write_text(tomli_w.dumps(data), "utf-8")
+    write_file(path, tomli_w.dumps(data))
     return path
 
 

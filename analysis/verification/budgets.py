@@ -11,6 +11,7 @@ from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, Check
 from analysis.verification.logs import Log
 from dess import InputError
+from dess.files import paths_in
 from dess.scenario import Scenario
 from dess.sections.fleet import type_of
 from dess.sections.wind import surcharges
@@ -29,7 +30,7 @@ def studies_in(folder: Path, *, but: str = "") -> tuple[dict[str, Results], list
         but: A study to leave out.
     """
     loaded, damaged = {}, []
-    for path in sorted(folder.glob(f"*/{MANIFEST}")):
+    for path in paths_in(folder, f"*/{MANIFEST}"):
         name = path.parent.name
         if name != but:
             try:

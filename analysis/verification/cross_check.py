@@ -11,18 +11,20 @@ simulates nothing::
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import Field, create_model
 
 from analysis.questions.missions import FOLDER
+from analysis.results.documents import Key
 from analysis.results.tables import Results
+from analysis.study.stopping import Text
 from analysis.verification import lone_uav
-from analysis.verification.queues.suite import Measured
-from analysis.verification.queues.suite import simulate as simulate_queues
+from analysis.verification.queues import suite as queues
 from dess import InputError, simulate
-from dess.files import replacing, writable
+from dess.files import check_target, write_file
+from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.state import END_NAMES
 from policies.registry import files_of, load_team
@@ -33,10 +35,33 @@ MISSIONS = 50  # missions of every policy to simulate again, spread over its rep
 
 # Called with the number of steps done and of all steps.
 Progress = Callable[[int, int], None]
-Fields = dict[str, Any]
+
+_ALLOWED = "allowed: what is made by: dess report verification"
 
 
-class CrossCheck(BaseModel):
+def _fields(record: np.dtype) -> dict[str, Any]:
+    """The fields of a record, as those of a model."""
+    assert record.fields is not None
+    kinds = {name: kind for name, (kind, *_) in record.fields.items()}
+    return {name: (float if kind.kind == "f" else Whole, ...) for name, kind in kinds.items()}
+
+
+Whole = Annotated[int, Field(ge=-(2**63), lt=2**64)]
+Data = Annotated[float, Field(ge=0, le=1e9)]
+Mission: Any = create_model(
+    "Mission", __base__=Document, policy=(Text, ...), **_fields(MISSION_RECORD)
+)
+_OF_UAV = {"policy": (Text, ...), "replication": (Whole, ...), "uav": (Whole, ...)}
+Uav: Any = create_model(
+    "Uav", __base__=Document, **_OF_UAV | _fields(UAV_RECORD) | {"end": (Text, ...)}
+)
+
+
+class Outdated(InputError):  # noqa: N818 - the missions are made again
+    """There are no missions of these results."""
+
+
+class CrossCheck(Document):
     """Missions simulated in addition to those of a study.
 
     Attributes:
@@ -48,14 +73,12 @@ class CrossCheck(BaseModel):
         queues: The result of ``queues.suite.simulate``.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    study: str
-    missions: list[Fields]
-    uavs: list[Fields]
-    rates: list[float]
-    slots: list[float]
-    queues: Measured
+    study: Key
+    missions: list[Mission] = Field(min_length=1)
+    uavs: list[Uav] = Field(min_length=1)
+    rates: list[Data]
+    slots: list[Data] = Field(min_length=2)
+    queues: queues.Measured
 
 
 def simulate_missions(
@@ -93,7 +116,7 @@ def simulate_missions(
         uavs=uavs,
         rates=lone_uav.simulate_rates(space, seed),
         slots=lone_uav.simulate_slots(space, seed),
-        queues=simulate_queues(space, seed, max(count, 2)),
+        queues=queues.simulate(space, seed, max(count, 2)),
     )
 
 
@@ -106,14 +129,14 @@ def _chosen(results: Results, policies: Iterable[str], count: int) -> Iterator[t
         yield from ((policy, int(replication)) for replication in replications[rows])
 
 
-def _uavs(record: MissionRecord) -> Iterator[Fields]:
+def _uavs(record: MissionRecord) -> Iterator[dict[str, Any]]:
     for number, uav in enumerate(record.uavs):
         fields = {name: uav[name].item() for name in UAV_RECORD.names or ()}
         yield {"uav": number, **fields, "end": END_NAMES[uav["end"]]}
 
 
 def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
-    """Simulate the missions and write them, unless they are already in the folder.
+    """Simulate the missions and write them, unless the folder has those of these results.
 
     Args:
         folder: A folder that contains a results folder per study.
@@ -121,11 +144,12 @@ def make(folder: str | Path, results: Results, progress: Progress | None = None)
         progress: Called after every mission.
 
     Raises:
-        InputError: If they cannot be written.
+        InputError: If those of the folder are damaged, or new ones cannot be written.
     """
     try:
         read(folder, results)
-    except InputError:
+    except Outdated:
+        check_target(Path(folder) / FILE)
         write(simulate_missions(results, progress=progress), folder)
 
 
@@ -140,10 +164,7 @@ def write(missions: CrossCheck, folder: str | Path) -> Path:
         InputError: If it cannot be written.
     """
     path = Path(folder) / FILE
-    with writable(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
-        temporary.write_text(missions.model_dump_json(indent=1), "utf-8")
+    write_file(path, missions.model_dump_json(indent=1))
     return path
 
 
@@ -155,14 +176,19 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
         results: The results of the study to which the missions must belong.
 
     Raises:
-        InputError: If there are none, or they are damaged or belong to other results.
+        Outdated: If there are none, or they belong to other results.
+        InputError: If they are damaged.
     """
-    path = Path(folder) / FILE
-    allowed = "allowed: what is made by: dess report verification"
-    try:
-        missions = CrossCheck.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError):
-        raise InputError(f"{path}: missing or damaged; {allowed}") from None
-    if missions.study != results.store.manifest.key:
-        raise InputError(f"{path}: belongs to other results than those of the study; {allowed}")
+    path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
+
+    def check(data: dict) -> None:
+        if data.get("study", key) != key:
+            raise Outdated(f"{path}: belongs to other results than those of the study")
+
+    if not path.exists():
+        raise Outdated(f"{path}: no such file; {_ALLOWED}")
+    missions = CrossCheck.load(path, _ALLOWED, first=check)
+    if len(missions.rates) != len(lone_uav.offsets(space)):
+        raise InputError(f"{path}: rates are not those of the study; {_ALLOWED}")
+    queues.check_measured(missions.queues, space, str(path), _ALLOWED)
     return missions

@@ -10,6 +10,7 @@ from analysis.results.tables import Results
 from analysis.verification.checks import ENGINES, REALISATIONS, RECORDS, Check
 from analysis.verification.cross_check import CrossCheck
 from analysis.verification.logs import Log, longest
+from dess.files.documents import Document
 from dess.scenario import SAMPLED
 
 
@@ -91,13 +92,17 @@ def engine_check(results: Results, again: CrossCheck) -> Check:
         again: The same missions, simulated with the SimPy engine.
     """
     differing = {
-        *_differing(results.missions, pd.DataFrame(again.missions), []),
-        *_differing(results.uavs, pd.DataFrame(again.uavs), ["uav"]),
+        *_differing(results.missions, _table(again.missions), []),
+        *_differing(results.uavs, _table(again.uavs), ["uav"]),
     }
     n = len(again.missions)
     seen = f"{n - len(differing):,} of {n:,} missions"
     test = f"Record of the {results.manifest['study']['engine']} engine, simulated again with SimPy"
     return Check.exact(ENGINES, test, "equal, bit for bit", seen, n, len(differing))
+
+
+def _table(records: Sequence[Document]) -> pd.DataFrame:
+    return pd.DataFrame(record.data for record in records)
 
 
 def _differing(kept: pd.DataFrame, again: pd.DataFrame, keys: list[str]) -> set[tuple[str, int]]:

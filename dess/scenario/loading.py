@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from dess.files import Shipped
+from dess.files.shipped import Shipped
 from dess.scenario.fields import merged
 from dess.scenario.space import ScenarioSpace, validated
 from dess.sea import nodes_in

@@ -20,7 +20,7 @@ from pydantic import Field, model_validator
 from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError, shown
-from dess.files import read_text
+from dess.files.reading import read_text
 from dess.sections.section import Integer, Section
 
 Rate = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]

@@ -15,10 +15,11 @@ from pydantic import Field, create_model
 
 from dess.errors import InputError
 from dess.files import parse_json
+from dess.files.documents import Document
 from dess.record import MISSION_RECORD
 from policies.ddqn import tensors
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
-from policies.ddqn.description import Name, Number, Sha256, Stored, stored
+from policies.ddqn.description import Name, Number, Sha256, check_format
 from policies.ddqn.ranges import check_finite, check_replay, check_state
 from policies.ddqn.tensors import Tensors, array_of, bytes_of, part
 from policies.ddqn.trained import require_version
@@ -33,7 +34,7 @@ Word = Annotated[int, Field(ge=0, lt=2**32)]
 Words = Annotated[int, Field(ge=0, lt=2**128)]
 
 
-class Progress(Stored):
+class Progress(Document):
     """What ``Training.progress`` returns."""
 
     tick: Number
@@ -46,14 +47,14 @@ class Progress(Stored):
     best_score: float | None
 
 
-class Pcg64(Stored):
+class Pcg64(Document):
     """The 128-bit integers of the state of numpy's generator."""
 
     state: Words
     inc: Words
 
 
-class Generator(Stored):
+class Generator(Document):
     """The state of numpy's generator."""
 
     bit_generator: Literal["PCG64"]
@@ -62,7 +63,7 @@ class Generator(Stored):
     uinteger: Word
 
 
-class _Row(Stored):
+class _Row(Document):
     tick: Number
     phase: Name
     uav_slots: Number
@@ -86,7 +87,7 @@ Row: Any = create_model(
 )  # type: ignore[call-overload]
 
 
-class Header(Stored):
+class Header(Document):
     """The header of a checkpoint, without its checksum."""
 
     format: Literal[2] = Field(description="version of the file")
@@ -150,8 +151,10 @@ def load_training(
     values, metadata = tensors.read(path, HEADER_LIMIT + (2**36 if limit is None else limit))
     if "dess" not in metadata:
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
+    header = Header.parse(
+        metadata["dess"], str(path), first=lambda data: check_format(data, path, FORMAT)
+    )
     raw = parse_json(metadata["dess"], str(path))
-    header = stored(raw, Header, FORMAT, str(path))
     training = Training(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}
     held = header.config.model_dump(mode="json") | {"scenario": header.scenario}

@@ -5,12 +5,12 @@ description.training.seed, description.layout.nodes, description.model_sha256
 """
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from dess.errors import InputError, shown, validation_line
-from dess.files import parse_json, read_text
+from dess.errors import InputError, shown
+from dess.files.documents import Document
 from policies.ddqn.config import Name, TrainingConfig
 
 FORMAT: Literal[1] = 1
@@ -21,16 +21,7 @@ Number = Annotated[int, Field(ge=0, lt=2**63)]
 Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
-class Stored(BaseModel):
-    """A table of a file that a training writes: exactly these keys, with values of these types."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
-
-
-Table = TypeVar("Table", bound=Stored)
-
-
-class LayoutTable(Stored):
+class LayoutTable(Document):
     """The grid, zone and nodes of the training, as in a scenario."""
 
     grid: Number
@@ -41,7 +32,7 @@ class LayoutTable(Stored):
     ]
 
 
-class Run(Stored):
+class Run(Document):
     """The training so far, for readers; a policy that was only saved has none of it."""
 
     dess: str = Field("", max_length=100)
@@ -55,7 +46,7 @@ class Run(Stored):
     selection_score: float | None = None
 
 
-class Description(Stored):
+class Description(Document):
     """The content of ``config.json``."""
 
     format: Literal[1] = Field(description="version of the file")
@@ -79,23 +70,25 @@ def read_description(folder: Path) -> Description:
         InputError: If there is none, or it is damaged or of another version.
     """
     path = folder / CONFIG
-    try:
-        content = parse_json(read_text(path, LIMIT), str(path))
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file") from None
-    return stored(content, Description, FORMAT, str(path))
+
+    def check(data: dict) -> None:
+        check_format(data, path, FORMAT)
+
+    absent = "allowed: the folder of a trained policy"
+    return Description.load(path, absent=absent, first=check, limit=LIMIT)
 
 
-def stored(content: Any, model: type[Table], version: int, where: str) -> Table:
-    """Validate a table that was read from ``where``, and its version first.
+def check_format(data: dict, path: Path, version: int) -> None:
+    """Refuse a document of another version of its format.
+
+    Args:
+        data: The document as plain data; one without ``format`` is not refused.
+        path: Its file.
+        version: The version that it must have.
 
     Raises:
-        InputError: If it is of another version or has not the form of the model.
+        InputError: If it has another version.
     """
-    held = content.get("format", version) if isinstance(content, dict) else version
+    held = data.get("format", version)
     if type(held) is not int or held != version:
-        raise InputError(f"{where}: format {shown(held)} is unknown; allowed: {version}")
-    try:
-        return model.model_validate(content)
-    except ValidationError as error:
-        raise InputError(validation_line(error, where, model)) from None
+        raise InputError(f"{path}: format {shown(held)} is unknown; allowed: {version}")

@@ -13,15 +13,14 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 import torch
-from filelock import FileLock, Timeout
 
 import dess
 from dess.batch import BATCH_SIZE
 from dess.code.memory import check_memory
 from dess.errors import InputError, shown
-from dess.files import check_folder, replacing, writable
+from dess.files import check_folder, locked, paths_in, writable
+from dess.files.tables import write_table
 from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV
@@ -38,6 +37,8 @@ CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
+
+_BUSY = "in use by another training; allowed: another --out, or wait for its end"
 
 # Bytes of the losses of an update, as tensors.
 _LOSS = 2000
@@ -125,7 +126,7 @@ def train(
     if not accept_size:
         allowed = "a smaller network, replay memory or batch, fewer environments, or --yes"
         check_memory(f"training {config.name}", size_of(config), allowed)
-    with _locked(out):
+    with locked(out / LOCK, _BUSY):
         _check_folder(out, resume)  # again, as another training may have ended in the meantime
         if announce:
             announce(memory_of(config))
@@ -174,8 +175,7 @@ def _check_folder(out: Path, resume: bool) -> None:
         InputError: If it cannot be the folder of the training, or cannot be written.
     """
     check_folder(out)
-    with writable(out):
-        names = {path.name for path in out.iterdir()} if out.exists() else set()
+    names = {path.name for path in paths_in(out)}
     if resume and CHECKPOINT not in names:
         raise InputError(f"{out / CHECKPOINT}: no such file; allowed: the folder of a training")
     if resume:
@@ -189,23 +189,6 @@ def _check_folder(out: Path, resume: bool) -> None:
         raise InputError(
             f"{out}: holds other files, such as {shown(others[0])}; allowed: a new or empty folder"
         )
-
-
-@contextmanager
-def _locked(out: Path) -> Iterator[None]:
-    """Keep all other trainings out of a folder; it is made if there is none."""
-    with writable(out):
-        out.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(out / LOCK)
-        try:
-            lock.acquire(timeout=0)
-        except Timeout:
-            line = "in use by another training; allowed: another --out, or wait for its end"
-            raise InputError(f"{out}: {line}") from None
-    try:
-        yield
-    finally:
-        lock.release()
 
 
 def _save_results(out: Path, training: Training) -> None:
@@ -226,9 +209,8 @@ def _save_results(out: Path, training: Training) -> None:
     if not training.curve:
         return
     names = dict.fromkeys(name for row in training.curve for name in row)
-    table = pa.table({name: [row.get(name) for row in training.curve] for name in names})
-    with replacing(out / CURVE) as temporary:
-        pq.write_table(table, temporary)
+    columns = {name: [row.get(name) for row in training.curve] for name in names}
+    write_table(out / CURVE, pa.table(columns))
 
 
 @contextmanager

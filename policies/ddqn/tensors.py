@@ -12,7 +12,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from dess.errors import InputError, shown
-from dess.files import check_file, replacing
+from dess.files import checked, replacing
 
 Tensors = dict[str, torch.Tensor]
 
@@ -43,8 +43,7 @@ def read(path: Path, limit: int) -> tuple[Tensors, dict[str, str]]:
         InputError: If it does not exist, is too large or is no such file.
     """
     try:
-        check_file(path, limit)
-        with safe_open(path, "pt") as file:
+        with safe_open(checked(path, limit), "pt") as file:
             names = file.keys()
             return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
     except (FileNotFoundError, NotADirectoryError):

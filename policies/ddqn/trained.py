@@ -17,7 +17,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 
 from dess.errors import InputError
-from dess.files import read_bytes, replacing
+from dess.files import read_bytes, write_file
 from dess.observations.observer import ENCODERS
 from dess.observations.states import layout_of
 from dess.scenario import ScenarioSpace
@@ -61,7 +61,6 @@ def save_policy(
     Raises:
         InputError: If a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     layout = layout_of(space)
     description = Description(
         format=FORMAT,
@@ -78,9 +77,9 @@ def save_policy(
     sums = [_sha256(content)]
     held = _held(folder / MODEL)
     if held is not None and _sha256(held) not in sums:
-        _write(folder / CONFIG, _text(description, [*sums, _sha256(held)]))
-    _write(folder / MODEL, content)
-    _write(folder / CONFIG, _text(description, sums))
+        write_file(folder / CONFIG, _text(description, [*sums, _sha256(held)]))
+    write_file(folder / MODEL, content)
+    write_file(folder / CONFIG, _text(description, sums))
 
 
 def add_checksum(folder: Path) -> None:
@@ -90,9 +89,8 @@ def add_checksum(folder: Path) -> None:
         InputError: If there is no such policy, or it is damaged.
     """
     load_policy(folder)
-    content = json.loads((folder / CONFIG).read_text("utf-8"))
-    content["model_sha256"] = [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))]
-    _write(folder / CONFIG, json.dumps(content, indent=2) + "\n")
+    sums = [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))]
+    write_file(folder / CONFIG, _text(read_description(folder), sums))
 
 
 def load_policy(folder: Path) -> DDQN:
@@ -175,12 +173,6 @@ def _text(description: Description, sums: list[str]) -> str:
 
 def _sha256(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _write(path: Path, content: bytes | str) -> None:
-    data = content if isinstance(content, bytes) else content.encode()
-    with replacing(path) as temporary:
-        temporary.write_bytes(data)
 
 
 @lru_cache

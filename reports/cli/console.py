@@ -12,8 +12,9 @@ from tempfile import TemporaryDirectory
 from typing import Any, TextIO
 
 from dess.errors import InputError, cut, printable
-from dess.files import replacing_all
+from dess.files import read_bytes, replacing_all
 
+LARGEST = 2**32  # bytes of a file for standard output
 MESSAGE = 300  # the longest line that says why a command fails
 _STREAMS = {"stdout": "standard output", "stderr": "standard error"}
 INTERRUPTED = 130  # the exit code after Ctrl-C, as shells and typer have it: 128 + SIGINT
@@ -109,7 +110,7 @@ def outputs(paths: Sequence[Path]) -> Iterator[list[Path]]:
         with TemporaryDirectory() as folder:
             buffer, rest = Path(folder, "stdout"), iter(temporaries)
             yield [buffer if is_stdout(path) else next(rest) for path in paths]
-            sys.stdout.buffer.write(buffer.read_bytes())
+            sys.stdout.buffer.write(read_bytes(buffer, LARGEST))
             sys.stdout.flush()
 
 

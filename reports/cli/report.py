@@ -165,20 +165,17 @@ def timing(
     missions: Annotated[int, typer.Option(min=1, max=1_000, help="Missions per policy.")] = 30,
 ) -> None:
     """Measure how long a policy takes to decide; measurements of this machine and code are kept."""
-    from analysis.execution.decision_time import is_current, measure, read, writing
+    from analysis.execution.decision_time import FILE, is_current, measure, read, write
     from analysis.study.study import load_study
+    from dess.files import check_target
     from policies.registry import typed
 
     shown = (name for study in ("comparison", "gap") for name in load_study(study).policies)
     teams = typed(policy or dict.fromkeys(shown))
     if not is_current(out, teams, missions):
-        with (
-            writing(out) as path,
-            console.compile_notice(),
-            console.counted_bar("step") as progress,
-        ):
-            measured = measure(teams, missions=missions, progress=progress)
-            path.write_text(measured.text, "utf-8")
+        check_target(out / FILE)
+        with console.compile_notice(), console.counted_bar("step") as progress:
+            write(measure(teams, missions=missions, progress=progress), out)
     rows = [
         [cost.policy, *(f"{1e6 * t:,.1f} µs" for t in (cost.median, cost.slow, cost.batch))]
         for cost in read(out).costs

@@ -235,9 +235,11 @@ class _Mission:
 
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
-    pq.write_table(pa.table(mission.log), path)
+    from dess.files import fill
+    from dess.files.tables import parquet_of
+
+    fill(path, parquet_of(pa.table(mission.log)))
 
 
 def _draw(mission: _Mission, path: Path, kind: str) -> None:
@@ -247,12 +249,13 @@ def _draw(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
+    from dess.files import fill
     from reports.pages.mission import mission_page
     from reports.player.animation import write_animation
 
     if kind == "html":
         page = mission_page(mission.log, mission.scenario, mission.title, mission.outcome)
-        path.write_text(page, "utf-8")
+        fill(path, page)
     else:
         write_animation(mission.log, mission.scenario, path, kind, mission.title)
 

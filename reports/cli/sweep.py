@@ -9,7 +9,6 @@ import typer
 
 from dess.code.libraries import missing
 from dess.errors import InputError, one_of
-from dess.files import check_folder
 from reports.cli import completion, console
 from reports.cli.ranges import all_settings, all_values
 from reports.cli.report import rendering
@@ -22,6 +21,7 @@ from reports.cli.settings import (
     SeedOption,
     WorkersOption,
 )
+from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
     from analysis.sweeps.sweep import Sweep
@@ -118,7 +118,7 @@ def sweep(
         all_settings(require or [], "--require", SHARE),
         name,
     )
-    check_folder(out)
+    check_pages(out, f"{PREFIX}{study.name}")
     folder, file = question.folder_of(study, results), question.file_of(study, results)
     found = complete(
         study.name,

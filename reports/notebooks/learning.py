@@ -20,7 +20,6 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 # %%
 from pathlib import Path
 
-import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis import numbers
@@ -29,13 +28,14 @@ from analysis.names import PRODUCT
 from analysis.questions.learning import ablation
 from analysis.questions.learning import curves as learning
 from analysis.questions.learning import trained as policies
+from analysis.questions.learning.files import read_curves
 from analysis.replication import paper, verdict_rules
 from policies.registry import TRAINED
 from reports.pages import html
 
 # %%
 folder = Path(trained or TRAINED)
-trainings = pd.read_parquet(folder / "curves.parquet")
+trainings = read_curves(folder / "curves.parquet")
 last, final = ablation.finals(trainings), f"final_{PRODUCT}"
 baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
 

@@ -19,16 +19,17 @@ results = "../../results"  # folder with the results of table4, fig4, fig5, swee
 trained = None  # folder with the learning curves; None for the shipped ones
 
 # %%
-import json
 from importlib.resources import files
 from pathlib import Path
 
-import pandas as pd
 from IPython.display import display
 
 from analysis import load_results
+from analysis.questions.learning.files import read_curves
 from analysis.questions.optimality import gap
 from analysis.replication.scorecard import PAPERS_NETWORK, departures, scorecard
+from dess.files import paths_in
+from policies.ddqn.description import read_description
 from reports.pages import html
 from reports.pages.scorecard import as_html
 
@@ -36,10 +37,9 @@ from reports.pages.scorecard import as_html
 folder = Path(trained or str(files("policies") / "trained"))
 names = ("table4", "fig4", "fig5", "sweet-spot")
 studies = {name: load_results(Path(results) / name) for name in names}
-rows = scorecard(studies, pd.read_parquet(folder / "curves.parquet"))
-config = folder / PAPERS_NETWORK / "config.json"
-training = json.loads(config.read_text("utf-8"))["training"] if config.exists() else {}
-as_html(rows, departures=departures(training) if training else [])
+rows = scorecard(studies, read_curves(folder / "curves.parquet"))
+papers = [read_description(c.parent) for c in paths_in(folder, f"{PAPERS_NETWORK}/config.json")]
+as_html(rows, departures=[words for one in papers for words in departures(one.training)])
 
 # %% [markdown]
 # ## How far the policies are from the best possible

@@ -14,16 +14,15 @@ from markupsafe import Markup
 
 from analysis.results.evidence import Evidence
 from dess import InputError
-from dess.files import read_bytes
+from dess.files import paths_in, read_text
+from reports.folders import INDEX, PREFIX
 from reports.pages import html
 from reports.pages.notebook import NAMES, SCORECARD, Report
-from reports.pages.study.sections import PREFIX
 from reports.pages.template import fill
 from reports.pages.verify import is_sealed
 
 log = logging.getLogger(__name__)
 
-INDEX = "index.html"
 LARGEST = 512 * 2**20  # bytes of a page
 _IMAGE = re.compile(
     """<img alt=("[^"<>]*"|'[^'<>]*')( class="tall")? """
@@ -90,17 +89,17 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
         but: File names that are left out without a warning.
     """
     pages = {}
-    studies = sorted(path.name for path in out.glob("*.html") if _OF_STUDY.fullmatch(path.name))
+    studies = [path.name for path in paths_in(out, "*.html") if _OF_STUDY.fullmatch(path.name)]
     names = (*(f"{name}.html" for name in NAMES), *studies)
     for path in (out / name for name in names if name not in but):
         try:
-            content = read_bytes(path, LARGEST).decode()
+            content = read_text(path, LARGEST)
             if not is_sealed(content) or not _is_plain("".join(_SCORECARD.findall(content))):
                 raise InputError("altered")
             _evidence([content])
         except FileNotFoundError:
             continue
-        except (OSError, UnicodeDecodeError, InputError):
+        except (OSError, InputError):
             log.warning("%s: altered, or of another version; the index leaves it out", path)
         else:
             pages[path.name] = content

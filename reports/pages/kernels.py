@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from tempfile import gettempdir
+from tempfile import TemporaryFile, gettempdir
 from threading import Lock
 from typing import Any
 
@@ -25,7 +25,7 @@ from nbconvert.filters import strip_ansi
 from nbformat import NotebookNode
 
 from dess import InputError
-from reports.folders import temporary_folder
+from dess.files import temporary_folder
 from reports.pages.notebook import Report
 
 # Called after every cell, with the number of cells run so far and of all cells, and the report.
@@ -127,20 +127,20 @@ def _cell(report: Report) -> str:
 
 
 def _run(client: NotebookClient, home: Path) -> None:
-    """Run a notebook; what the kernel itself reports goes to a file, not to the user's terminal.
+    """Run a notebook; what the kernel itself reports does not go to the user's terminal.
 
     Raises:
         RuntimeError: If the kernel does not start or dies, with the last line that it reported.
     """
-    log = home / "kernel.log"
-    try:
-        with open(log, "wb") as stream:
-            client.execute(env=_environment(home), cleanup_kc=True, stdout=stream, stderr=stream)
-    except RuntimeError as error:
-        reported = log.read_text("utf-8", "replace").strip().splitlines()
-        raise RuntimeError(": ".join([str(error), *reported[-1:]])) from error
-    finally:  # nbclient leaves its exit handler behind when a kernel dies at its start
-        atexit.unregister(client._cleanup_kernel)
+    with TemporaryFile() as log:
+        try:
+            client.execute(env=_environment(home), cleanup_kc=True, stdout=log, stderr=log)
+        except RuntimeError as error:
+            log.seek(0)
+            reported = log.read().decode("utf-8", "replace").strip().splitlines()
+            raise RuntimeError(": ".join([str(error), *reported[-1:]])) from error
+        finally:  # nbclient leaves its exit handler behind when a kernel dies at its start
+            atexit.unregister(client._cleanup_kernel)
 
 
 def _manager(home: Path) -> AsyncKernelManager:

@@ -20,6 +20,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from dess.errors import InputError, one_of
+from dess.files import paths_in, read_text
 from reports.pages.parameters import values_of, with_paths, with_values
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
@@ -134,7 +135,7 @@ def read(name: str, folder: Path = SHIPPED) -> Report:
 
 def parsed(name: str, folder: Path = SHIPPED) -> NotebookNode:
     """The notebook of a report, all of it."""
-    notebook = jupytext.reads(_file(folder, name).read_text("utf-8"), fmt="py:percent")
+    notebook = jupytext.reads(read_text(_file(folder, name)), fmt="py:percent")
     for number, cell in enumerate(notebook.cells):
         cell.id = f"cell-{number}"
     return notebook
@@ -170,7 +171,7 @@ def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:
 def _file(folder: Path, name: str) -> Path:
     """The file of a notebook, in the folder or in one of its folders."""
     file = f"{name.replace('-', '_')}.py"
-    return next(iter(sorted(folder.glob(f"*/{file}"))), folder / file)
+    return next(iter(paths_in(folder, f"*/{file}")), folder / file)
 
 
 def tags_of(cell: NotebookNode) -> list[str]:

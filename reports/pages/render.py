@@ -6,8 +6,7 @@ The same results give the same bytes, since a page contains no time and no path 
 import logging
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -24,10 +23,10 @@ from analysis.execution import decision_time
 from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
-from dess.files import replacing_all, writable
-from reports.folders import locked
+from dess.files import delete, locked, making, write_files
+from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import missions
-from reports.pages.index import INDEX, index_of, pages_in
+from reports.pages.index import index_of, pages_in
 from reports.pages.kernels import Kernels, Progress
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read
 from reports.pages.parameters import with_paths
@@ -36,6 +35,8 @@ from reports.pages.template import fill
 
 log = logging.getLogger(__name__)
 
+PATIENCE = 60.0  # for which the page of another process is waited for [s]
+_BUSY = "another process writes there; allowed: wait"
 _WIDGET = "application/vnd.jupyter.widget-view+json"  # type of an output, such as a progress bar
 
 # ``C_S`` in the text of a page, or a piece of the page that is not text.
@@ -137,41 +138,22 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     needed = [out] + [results for report in reports if "results" in report.parameters]
-    with _folders(needed):
+    check_pages(out, *(report.name for report in reports))
+    with making(needed):
         missions.make([report.name for report in reports], results, values, progress)
         Kernels(progress).run(reports)
         files = {report.page: _page(report) for report in reports}
         complete = [report for report in reports if not report.failure]
         files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
         shown = [read(name, notebooks) for name in names_in(notebooks)]
-        with locked(out, "index"), writable(out):  # the index shows the pages of other processes
+        with locked(out / LOCK, _BUSY, PATIENCE):
             files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
-            with replacing_all([out / name for name in files]) as temporaries:
-                for temporary, text in zip(temporaries, files.values(), strict=True):
-                    temporary.write_bytes(text.encode())
+            write_files({out / name: text for name, text in files.items()})
             for report in complete:
-                (out / f"{report.name}.partial.html").unlink(missing_ok=True)
+                delete(out / f"{report.name}.partial.html")
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
-
-
-@contextmanager
-def _folders(folders: Iterable[Path]) -> Iterator[None]:
-    """Make folders; if the body of the ``with`` block fails, remove those that are still empty."""
-    made: list[Path] = []
-    try:
-        for folder in folders:
-            new = [path for path in (folder, *folder.parents) if not path.exists()]
-            with writable(folder):
-                folder.mkdir(parents=True, exist_ok=True)
-            made += new
-        yield
-    except BaseException:
-        for path in made:
-            with suppress(OSError):  # not empty
-                path.rmdir()
-        raise
 
 
 def _lacking(report: Report, results: Path) -> dict[str, InputError]:

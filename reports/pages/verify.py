@@ -28,7 +28,7 @@ from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
 from dess.code.memory import check_memory
-from dess.files import read_text
+from dess.files import paths_in, read_text
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
 from policies.registry import load_team, permitted
@@ -49,7 +49,7 @@ class Check:
 
     Attributes:
         what: What was checked: the name of a study, or another part of a page.
-        compared: The number of missions or files that were compared.
+        compared: The number of missions or files that were compared, those that differ included.
         differing: A line for every mission or file that differs.
         notes: How the code and libraries differ from those that made the results.
     """
@@ -173,7 +173,7 @@ def verify_results(
     Raises:
         InputError: If there are no results, they are incomplete, or a policy cannot be loaded.
     """
-    folders = sorted(path.parent for path in folder.rglob(MANIFEST))
+    folders = [path.parent for path in paths_in(folder, f"**/{MANIFEST}")]
     if not folders:
         raise InputError(f"{folder}: contains no results and is not a page; {_ALLOWED}")
     sampling = _Sampling(missions, seed, named, yes)
@@ -187,14 +187,14 @@ def verify_results(
             else:
                 checks.append(Check(str(path), 0, notes=["incomplete, so not checked"]))
         except InputError as error:
-            checks.append(Check(str(path), 0, [str(error)]))
+            checks.append(Check(str(path), 1, [str(error)]))
     return checks
 
 
 def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     if store.damaged:
         lines = [f"{path}: has been changed since it was written" for path in store.damaged]
-        return [Check(store.manifest.study["name"], 0, lines)]
+        return [Check(f"{store.manifest.study['name']}, files", len(store.files), lines)]
     results = results_of(store)
     evidence = Evidence.of(results, sampling.missions, sampling.seed)
     checks = [_compared(evidence, _drawn(evidence, sampling), sampling.named)]

@@ -17,10 +17,13 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow as pa
 
 from analysis.names import METRICS, PRODUCT
+from analysis.questions.learning.files import read_curves
 from dess import simulate_batch
-from dess.files import replacing
+from dess.files import paths_in
+from dess.files.tables import read_table, write_table
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of
 from policies.ddqn.training import Training
@@ -95,15 +98,14 @@ def main() -> None:
     parser.add_argument("--table", type=Path, help="only print what the curves of a file say")
     arguments = parser.parse_args()
     if arguments.table:
-        print(table(pd.read_parquet(arguments.table)))
+        print(table(read_curves(arguments.table)))
         return
     if not arguments.out:
         parser.error("--out is needed")
     if arguments.gather:
-        files = sorted(arguments.out.glob("*.parquet"))
-        pd.concat(map(pd.read_parquet, files)).to_parquet(arguments.gather, index=False)
+        curves = [read_table(path) for path in paths_in(arguments.out, "*.parquet")]
+        write_table(arguments.gather, pa.concat_tables(curves, promote_options="permissive"))
         return
-    arguments.out.mkdir(parents=True, exist_ok=True)
     for seed in arguments.seeds:
         for variant in arguments.variants:
             path = arguments.out / f"{variant.replace(',', '').replace(' ', '-')}-{seed}.parquet"
@@ -113,8 +115,8 @@ def main() -> None:
             curve, final = run(config, arguments.missions)
             curve.insert(0, "variant", variant)
             curve.insert(1, "seed", seed)
-            with replacing(path) as new:
-                curve.assign(**final).to_parquet(new, index=False)
+            curve = curve.assign(**final)
+            write_table(path, pa.Table.from_pandas(curve, preserve_index=False))
             print(variant, seed, final, f"{curve['seconds'].iloc[-1]:.0f} s", flush=True)
 
 

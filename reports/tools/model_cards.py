@@ -6,21 +6,23 @@ The tool replaces the text between two marks in the file, and keeps the text aro
 """
 
 import argparse
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 import policies
 from analysis import load_study, numbers
 from analysis.names import METRICS, PRODUCT
+from analysis.questions.learning.files import read_curve
 from analysis.replication import paper
 from analysis.stats.intervals import interval_of, mean_interval
 from dess import load_scenario, simulate_batch
-from policies.ddqn.config import MISSION_SEED, config_of, load_config
+from dess.files import read_text, write_file
+from policies.about import CARD
+from policies.ddqn.config import MISSION_SEED, load_config
+from policies.ddqn.description import read_description
 from policies.registry import HEURISTICS
 
 BEGIN, END = (
@@ -44,33 +46,32 @@ HEAD = "| | success | collection ratio | product per mission |\n| --- | --- | --
 
 def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     """The computed part of a card, paragraph by paragraph."""
-    described = json.loads((folder / "config.json").read_text("utf-8"))
-    config, run = described["training"], described["run"]
-    curve = pd.read_parquet(folder / "training.parquet")
-    shipped = load_config(config["name"], seed=config["seed"]).model_dump(mode="json")
-    if shipped != config_of(config, str(folder)).model_dump(mode="json"):
+    described = read_description(folder)
+    config, run = described.training, described.run
+    curve = read_curve(folder / "training.parquet")
+    if load_config(config.name, seed=config.seed) != config:
         raise SystemExit(f"{folder}: was not trained by the config of its name")
-    space, policy = load_config(config["name"]).space, policies.load(folder)
+    space, policy = load_config(config.name).space, policies.load(folder)
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
 
     yield "## Training"
     phases = ", ".join(
-        f"{p['name']} ({p['ticks']} ticks{'' if p['battery'] else ', no battery decrease'})"
-        for p in config["phases"]
+        f"{p.name} ({p.ticks} ticks{'' if p.battery else ', no battery decrease'})"
+        for p in config.phases
     )
     entries = {
         "Command": f"`{command}`",
-        "Config": f"`policies/ddqn/configs/{config['name']}.toml`, whole in `config.json`",
-        "Observation and network": f"{config['observation']}, {_count(policy):,} weights",
+        "Config": f"`policies/ddqn/configs/{config.name}.toml`, whole in `config.json`",
+        "Observation and network": f"{config.observation}, {_count(policy):,} weights",
         "Phases": phases,
-        "Hardware": f"{run['device']}, {run['threads']} thread(s), torch {run['torch']}",
-        "Wall time": f"{run['seconds'] / 60:.0f} min",
-        "Updates": f"{run['updates']:,} of {config['batch']} transitions",
-        "Experience": f"{run['uav_slots']:,} UAV-slots",
-        "Seeds": f"training {config['seed']} (missions of seed {MISSION_SEED} + that); "
-        f"selection {config['evaluation_seed']}; evaluation below {EVALUATION_SEED}",
-        "Selection": f"moving average of {config['window']} evaluations of "
-        f"{config['evaluation_missions']} missions; best product {run['selection_score']:.4f}",
+        "Hardware": f"{run.device}, {run.threads} thread(s), torch {run.torch}",
+        "Wall time": f"{run.seconds / 60:.0f} min",
+        "Updates": f"{run.updates:,} of {config.batch} transitions",
+        "Experience": f"{run.uav_slots:,} UAV-slots",
+        "Seeds": f"training {config.seed} (missions of seed {MISSION_SEED} + that); "
+        f"selection {config.evaluation_seed}; evaluation below {EVALUATION_SEED}",
+        "Selection": f"moving average of {config.window} evaluations of "
+        f"{config.evaluation_missions} missions; best product {run.selection_score:.4f}",
     }
     yield "\n".join(f"- {name}: {text}" for name, text in entries.items())
     yield (
@@ -138,13 +139,13 @@ def main() -> None:
     parser.add_argument("--command", required=True, help="that trained it")
     parser.add_argument("--missions", type=int, default=1000)
     arguments = parser.parse_args()
-    path = arguments.folder / "README.md"
-    text = path.read_text("utf-8") if path.exists() else f"# {arguments.folder.name}\n\n"
+    path = arguments.folder / CARD
+    text = read_text(path) if path.exists() else f"# {arguments.folder.name}\n\n"
     before, _, rest = text.partition(BEGIN)
     after = rest.partition(END)[2]
     parts = card(arguments.folder, arguments.command, arguments.missions)
     computed = "\n\n".join([BEGIN, *parts, END])
-    path.write_text(before + computed + (after or "\n"), "utf-8")
+    write_file(path, before + computed + (after or "\n"))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
-from analysis.execution.decision_time import FILE, Timing, writing
+from analysis.execution.decision_time import FILE, Timing, write
 from analysis.questions.what_if import question as what_if
 from analysis.results.tables import Results
 from analysis.study.study import Study
@@ -78,6 +78,5 @@ def environment() -> dict[str, str]:
 
 def write_timing(timing: Timing, folder: Path) -> Path:
     """Write a timing into a folder; its file."""
-    with writing(folder) as path:
-        path.write_text(timing.text, "utf-8")
+    write(timing, folder)
     return folder / FILE

@@ -11,14 +11,18 @@ import pytest
 
 from dess.errors import InputError
 from dess.files import (
-    check_file,
     check_folder,
+    check_target,
+    checked,
     parse_json,
     parse_toml,
+    paths_in,
     read_bytes,
     read_text,
     replacing,
     replacing_all,
+    write_file,
+    write_files,
 )
 from tests.analysis.small import files_of
 
@@ -45,7 +49,7 @@ ODD = ["pipe", "link", "zero", "socket", "folder", "device", "null", "long"]
 
 
 @pytest.mark.parametrize("name", ODD)
-@pytest.mark.parametrize("read", [read_bytes, read_text, lambda path: check_file(path, 100)])
+@pytest.mark.parametrize("read", [read_bytes, read_text, lambda path: checked(path, 100)])
 def test_only_regular_files_are_read(odd, name, read):
     with pytest.raises(InputError, match="cannot be read: ") as error:
         read(odd[name])
@@ -61,7 +65,7 @@ def test_regular_files_are_read_up_to_a_limit(tmp_path):
     with pytest.raises(InputError, match="is too large; allowed: 5 bytes at most"):
         read_bytes(path, 5)
     with pytest.raises(InputError, match="is too large"):
-        check_file(path, 5)
+        checked(path, 5)
     path.write_bytes(b"\xff")
     with pytest.raises(InputError, match="it is not text"):
         read_text(path)
@@ -198,7 +202,35 @@ def test_the_next_process_deletes_what_a_killed_one_has_left(tmp_path):
     assert left == kept | {f".notes-{dead.pid}.tmp"}
 
 
-@pytest.mark.parametrize("name", ["a\0b", "x" * 256, "none/" + "x" * 256])
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path, name):
+@pytest.mark.parametrize("name", ["a\0b", "x" * 256, "none/" + "x" * 256, "loop", "loop/a", "gone"])
+@pytest.mark.parametrize("check", [check_folder, lambda path: check_target(path / "file")])
+def test_a_folder_that_cannot_be_made_is_refused(tmp_path, name, check):
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "gone").symlink_to("nowhere")
     with pytest.raises(InputError):
-        check_folder(tmp_path / name)
+        check(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["pipe", "zero", "socket", "folder", "device", "null", "long"])
+def test_what_could_not_be_written_is_refused_before(odd, name):
+    with pytest.raises(InputError, match="; allowed: "):
+        check_target(odd[name])
+    with pytest.raises(InputError, match="; allowed: "):
+        write_file(odd[name], "new")
+
+
+def test_what_is_listed_is_not_opened(odd, tmp_path):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "a" / "b" / "file").touch()
+    names = [path.relative_to(tmp_path).as_posix() for path in paths_in(tmp_path, "**/*")]
+    assert names == ["a", "a/b", "a/b/file", "link", "pipe", "socket", "zero"]
+    assert paths_in(tmp_path / "none") == paths_in(odd["pipe"]) == []
+
+
+def test_files_are_written_with_their_folders_all_or_none(tmp_path):
+    write_files({tmp_path / "a" / "one": "1", tmp_path / "b" / "two": b"2"})
+    assert files_of(tmp_path) == {"a/one": b"1", "b/two": b"2"}
+    (tmp_path / "b" / "three").mkdir()
+    with pytest.raises(InputError, match="three: is a folder"):
+        write_files({tmp_path / "a" / "one": "new", tmp_path / "b" / "three": "3"})
+    assert files_of(tmp_path) == {"a/one": b"1", "b/two": b"2"}

@@ -15,7 +15,8 @@ from reports.cli import main
 def write_config(folder: Path, description: str) -> None:
     """A folder that is taken for a trained policy, without weights."""
     folder.mkdir()
-    content = {"format": 1, "training": {"description": description}}
+    content = json.loads((registry.TRAINED / "ddqn" / "config.json").read_text("utf-8"))
+    content["training"] |= {"name": folder.name, "description": description}
     (folder / "config.json").write_text(json.dumps(content))
 
 

@@ -4,7 +4,6 @@ policies = trained_policies(Path("policies/trained"))
 several_trainings(policies)  # {"ddqn": ["ddqn", "ddqn-2", "ddqn-3"]}
 """
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,10 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.questions.learning.curves import PRODUCT, last_phase, settled, smoothed
-from policies.ddqn.config import TrainingConfig, config_of, learner_of
+from analysis.questions.learning.files import read_curve
+from dess.files import paths_in
+from policies.ddqn.config import TrainingConfig, learner_of
+from policies.ddqn.description import read_description
 
 
 class Trained(NamedTuple):
@@ -31,10 +33,14 @@ class Trained(NamedTuple):
 
 
 def trained_policies(folder: Path) -> list[Trained]:
-    """The trained policies in a folder that come with the curve of their training, by name."""
+    """The trained policies in a folder that come with the curve of their training, by name.
+
+    Raises:
+        InputError: If a policy or a curve is damaged.
+    """
     return [
-        Trained(path.parent.name, _config(path.parent), pd.read_parquet(path))
-        for path in sorted(folder.glob("*/training.parquet"))
+        Trained(path.parent.name, read_description(path.parent).training, read_curve(path))
+        for path in paths_in(folder, "*/training.parquet")
     ]
 
 
@@ -87,8 +93,3 @@ def commands(policies: Iterable[Trained]) -> list[str]:
         f"dess train {policy.config.name} --seed {policy.config.seed} --out runs/{policy.name}"
         for policy in policies
     ]
-
-
-def _config(folder: Path) -> TrainingConfig:
-    path = folder / "config.json"
-    return config_of(json.loads(path.read_text("utf-8"))["training"], str(path))

@@ -30,6 +30,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
+from dess.files import paths_in
 from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
 from policies.registry import load_team, typed
 
@@ -142,7 +143,7 @@ def ask(
             team = load_team(policy, point.scenario.uavs[1])
             simulate_missions(study.engine, [point.scenario], team, study.seed, [0])
     out = Path(folder) / NAME / key_of(study)
-    others = sorted(p.parent for p in out.parent.glob(f"*/{MANIFEST}") if p.parent != out)
+    others = [p.parent for p in paths_in(out.parent, f"*/{MANIFEST}") if p.parent != out]
     check_effort(study, out, workers, reuse=others, yes=yes)
     return run_study(study, out, workers, progress=progress, reuse=others)
 

@@ -9,6 +9,7 @@ their own, of so many customers that the first ones do not matter.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from analysis.verification.queues import theory
 from analysis.verification.queues.pads import Station
 from analysis.verification.queues.server import Server, ages_of, mission_above, visited
 from analysis.verification.queues.sources import arrivals_of, integrated
+from dess.errors import InputError, shown
 from dess.scenario import ScenarioSpace
 
 CUSTOMERS = 1000  # in a batch
@@ -36,6 +38,8 @@ END = 3000.0  # of the thinned process [slots]
 
 _VISITED = "Node visited at fixed gaps"
 _THINNED = "Thinned arrivals"
+
+AGES = 3  # of the visits at fixed gaps: mean, peak and 99th percentile
 
 Measured = dict[str, list[float]]
 
@@ -216,13 +220,34 @@ def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
     return measured
 
 
-def checks(measured: Measured, space: ScenarioSpace) -> list[Check]:
-    """Compare what ``simulate`` has measured with the closed forms."""
-    known = {
+def check_measured(measured: Measured, space: ScenarioSpace, where: str, allowed: str) -> None:
+    """Refuse values that were read from ``where``, and are not as many as ``simulate`` returns.
+
+    Raises:
+        InputError: If there are more or fewer; ``allowed`` is the end of the message.
+    """
+    least = dict.fromkeys(_known(space), 2) | {_VISITED: AGES, _THINNED: 2}
+    if names := sorted(measured.keys() ^ least.keys()):
+        raise InputError(f"{where}: queues: {shown(names[0])} is missing or unknown; {allowed}")
+    for name, values in measured.items():
+        if len(values) < least[name] or (name == _VISITED and len(values) > AGES):
+            raise InputError(f"{where}: queues: {name}: has {len(values)} values; {allowed}")
+    if not all(0 <= a < b < END for a, b in pairwise(measured[_THINNED])):
+        raise InputError(f"{where}: queues: {_THINNED}: are no growing times; {allowed}")
+
+
+def _known(space: ScenarioSpace) -> dict[str, float]:
+    """The closed forms by the name of their check."""
+    return {
         _test(system, what): value
         for system in systems(space, 0)
         for what, value in system.known.items()
     }
+
+
+def checks(measured: Measured, space: ScenarioSpace) -> list[Check]:
+    """Compare what ``simulate`` has measured with the closed forms."""
+    known = _known(space)
     of_batches = [_batch_check(test, known[test], measured[test]) for test in known]
     thinned = _thinning_checks(np.array(measured[_THINNED]))
     return [*of_batches, _visits_check(measured[_VISITED]), *thinned]

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess.code.libraries import needs
-from dess.files import check_folder
 from reports.cli import completion, console
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
 from reports.cli.settings import PAGES, RESULTS, WorkersOption
+from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
     from analysis.execution.dry_run import Plan
@@ -78,7 +78,7 @@ def run(
         return
     if page:
         needs("reports", "--report")
-        check_folder(PAGES)
+        check_pages(PAGES, f"{PREFIX}{study.name}")
     with console.compile_notice():
         if check_effort(study, out, workers, accept_code=accept_code, yes=yes):
             check_policies(study)

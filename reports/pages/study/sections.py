@@ -18,11 +18,12 @@ from analysis.questions.settings import varied
 from analysis.results.tables import Results, load_results
 from analysis.study.cheapest import Cheapest
 from analysis.study.selection import Selection
+from reports.folders import PREFIX
 from reports.pages import html, notebook
 from reports.pages.notebook import SHIPPED, Report, tags_of
 from reports.pages.study import words
 
-NOTEBOOK, PREFIX = "study", "study-"  # the notebook; names of pages
+NOTEBOOK = "study"
 
 
 def report_of(

@@ -1,6 +1,5 @@
 """The scorecard follows from the results, complete or not: claims, verdicts and figures."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
 from dess import InputError
+from policies.ddqn.description import read_description
 from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
@@ -420,11 +420,10 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
 
 
 def test_what_of_the_paper_s_network_is_ours() -> None:
-    config = json.loads((TRAINED / module.PAPERS_NETWORK / "config.json").read_text("utf-8"))
-    training = config["training"]
+    training = read_description(TRAINED / module.PAPERS_NETWORK).training
     words = ", ".join(departures(training))
-    assert "return guard" in words and f"{training['n_step']}-step returns" in words
-    assert f"{training['num_envs']} missions" in words and "early returns" not in words
+    assert "return guard" in words and f"{training.n_step}-step returns" in words
+    assert f"{training.num_envs} missions" in words and "early returns" not in words
     papers = {"guard": False, "n_step": 1, "num_envs": 1, "average_rate": 1.0, "loss": "mse"}
-    softmax = {"phases": [{"temperature": 0.1}]}
-    assert departures(training | papers | softmax) == []
+    softmax = tuple(p.model_copy(update={"temperature": 0.1}) for p in training.phases)
+    assert departures(training.model_copy(update=papers | {"phases": softmax})) == []

@@ -1,6 +1,10 @@
 """Missions beside a study are those of its replications, and are kept in a file to the last bit."""
 
+import json
+import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -10,24 +14,24 @@ from analysis.verification.cross_check import FILE, CrossCheck
 from dess import InputError, simulate
 from policies import load_team
 
+ANOTHER = "f" * 16  # the key of another study
+
 
 def test_missions_are_spread_over_the_replications_of_every_policy(
     results: Results, again: CrossCheck
 ) -> None:
-    simulated = [(mission["policy"], mission["replication"]) for mission in again.missions]
+    simulated = [(mission.policy, mission.replication) for mission in again.missions]
     last = int(results.missions["replication"].max())
     assert simulated == [(p, r) for p in results.policies for r in (0, last // 2, last)]
 
 
 def test_records_are_those_of_the_simpy_engine(results: Results, again: CrossCheck) -> None:
     mission = again.missions[-1]
-    seed, replication = results.store.manifest.seed, mission["replication"]
-    record = simulate(results.scenario(), load_team(mission["policy"]), seed, replication)
-    assert mission["reward"] == record.metrics["reward"]
-    uavs = [
-        u for u in again.uavs if (u["policy"], u["replication"]) == (mission["policy"], replication)
-    ]
-    assert [uav["collected"] for uav in uavs] == record.uavs["collected"].tolist()
+    seed, replication = results.store.manifest.seed, mission.replication
+    record = simulate(results.scenario(), load_team(mission.policy), seed, replication)
+    assert mission.reward == record.metrics["reward"]
+    uavs = [u for u in again.uavs if (u.policy, u.replication) == (mission.policy, replication)]
+    assert [uav.collected for uav in uavs] == record.uavs["collected"].tolist()
 
 
 def test_a_file_keeps_missions_to_the_last_bit(
@@ -40,13 +44,13 @@ def test_a_file_keeps_missions_to_the_last_bit(
 def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
     results: Results, again: CrossCheck, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match="missing or damaged.*dess report verification"):
+    with pytest.raises(InputError, match="no such file.*dess report verification"):
         cross_check.read(tmp_path, results)
     (tmp_path / FILE).parent.mkdir()
     (tmp_path / FILE).write_text("{")
-    with pytest.raises(InputError, match="missing or damaged"):
+    with pytest.raises(InputError, match="not valid JSON"):
         cross_check.read(tmp_path, results)
-    cross_check.write(again.model_copy(update={"study": "another"}), tmp_path)
+    cross_check.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
     with pytest.raises(InputError, match="other results"):
         cross_check.read(tmp_path, results)
 
@@ -57,7 +61,7 @@ def test_missions_are_simulated_only_if_they_are_missing_or_of_other_results(
     cross_check.write(again, tmp_path)
     cross_check.make(tmp_path, results)
     assert cross_check.read(tmp_path, results) == again
-    cross_check.write(again.model_copy(update={"study": "another"}), tmp_path)
+    cross_check.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
     monkeypatch.setattr(cross_check, "simulate_missions", lambda results, progress: again)
     cross_check.make(tmp_path, results)
     assert cross_check.read(tmp_path, results) == again
@@ -67,5 +71,58 @@ def test_a_folder_that_cannot_be_written_is_named(
     results: Results, again: CrossCheck, tmp_path: Path
 ) -> None:
     (tmp_path / FILE.parent).write_text("a file")
-    with pytest.raises(InputError, match="cross-check/.*: cannot be written: .*; allowed"):
+    with pytest.raises(InputError, match="cross-check: cannot be written: .*; allowed"):
         cross_check.write(again, tmp_path)
+
+
+def _without(key: str) -> Callable[[dict[str, Any]], object]:
+    return lambda document: document["missions"][0].pop(key)
+
+
+# What a forger changes in the document of the right study, and the key that the line names.
+FORGED: dict[str, Callable[[dict[str, Any]], object]] = {
+    "missions.0.seed": _without("seed"),
+    "missions.0.policy": _without("policy"),
+    "missions.0.reward": lambda d: d["missions"][0].update(reward="much"),
+    "missions.0.slots": lambda d: d["missions"][0].update(slots=1.5),
+    "missions": lambda d: d.update(missions=[]),
+    "uavs.0.uav": lambda d: d["uavs"][0].pop("uav"),
+    "uavs.0.odd": lambda d: d["uavs"][0].update(odd=1),
+    "rates": lambda d: d["rates"].pop(),
+    "slots": lambda d: d.update(slots=[]),
+    "queues: 'Node visited": lambda d: d["queues"].pop("Node visited at fixed gaps"),
+    "queues: Node visited": lambda d: d["queues"]["Node visited at fixed gaps"].pop(),
+    "queues: Thinned": lambda d: d["queues"]["Thinned arrivals"].reverse(),
+}
+
+
+@pytest.mark.parametrize("key", FORGED)
+def test_forged_missions_of_the_study_are_a_line_that_names_the_key(
+    key: str, results: Results, again: CrossCheck, tmp_path: Path
+) -> None:
+    document = json.loads(again.model_dump_json())
+    FORGED[key](document)
+    path = tmp_path / FILE
+    path.parent.mkdir()
+    path.write_text(json.dumps(document))
+    for use in (cross_check.read, cross_check.make):
+        with pytest.raises(InputError, match=f"^{path}: {key}.*; allowed: ") as error:
+            use(tmp_path, results)
+        assert "\n" not in str(error.value)
+    assert json.loads(path.read_text()) == document
+
+
+@pytest.mark.parametrize("kind", ["pipe", "zero", "loop", "folder"])
+def test_what_is_no_file_is_refused_before_any_mission(
+    kind: str, results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / FILE
+    path.parent.mkdir()
+    links = {"zero": Path("/dev/zero"), "loop": path}
+    if kind in links:
+        path.symlink_to(links[kind])
+    else:
+        os.mkfifo(path) if kind == "pipe" else path.mkdir()
+    monkeypatch.delattr(cross_check, "simulate_missions")
+    with pytest.raises(InputError, match=f"^{path}: .*; allowed: "):
+        cross_check.make(tmp_path, results)

@@ -1,5 +1,6 @@
 """``dess report`` and ``dess study run --report``: which pages are rendered, and from what."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,59 @@ def test_yes_is_for_the_notebooks_that_simulate(dess, monkeypatch):
     assert given == [{"yes": True}, {}]
     for name in ("what-if", "sweep", "own-sea"):
         assert notebook.read(name).parameters["yes"] is False
+
+
+def odd(path: Path, kind: str) -> None:
+    """Put something other than a file into the place of a file."""
+    path.parent.mkdir(exist_ok=True)
+    if kind in ("loop", "link"):
+        path.symlink_to(path if kind == "loop" else "somewhere")
+    else:
+        os.mkfifo(path) if kind == "pipe" else path.mkdir()
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        (".index.lock", "link"),
+        (".index.lock", "loop"),
+        (".index.lock", "pipe"),
+        ("index.html", "folder"),
+        ("index.html", "pipe"),
+        ("mission.html", "folder"),
+        ("mission.ipynb", "loop"),
+    ],
+)
+def test_a_folder_of_pages_is_checked_before_the_first_cell(
+    dess, monkeypatch, tmp_path, name, kind
+):
+    monkeypatch.delattr("reports.pages.kernels.Kernels.run")
+    monkeypatch.setattr("reports.pages.render._lacking", lambda *_: {})
+    odd(tmp_path / "pages" / name, kind)
+    code, out, err = dess("report", "mission", "--out", "pages")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"pages/{name}: " in err and "; allowed: " in err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("sweep", "--set", "uavs=1,2", "--scenario", "small.toml", "--missions", 2),
+        ("study", "run", "trial.toml", "--report"),
+    ],
+)
+@pytest.mark.parametrize(("name", "kind"), [(".index.lock", "link"), ("", "loop")])
+def test_a_folder_of_pages_is_checked_before_the_first_mission(
+    dess, monkeypatch, tmp_path, command, name, kind
+):
+    monkeypatch.setattr("reports.cli.study.run.PAGES", Path("pages"))
+    out = () if "run" in command else ("--out", "pages")
+    odd(tmp_path / "pages" / name, kind)
+    before = files_of(tmp_path)
+    code, _, err = dess(*command, *out)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "pages" in err and "; allowed: " in err
+    assert files_of(tmp_path) == before
 
 
 def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, monkeypatch, tmp_path):

@@ -270,6 +270,23 @@ def test_the_command_says_what_it_found(
         assert json.loads(captured.out)["checks"][0]["differing"]
 
 
+def test_of_damaged_tables_the_command_says_of_how_many(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    folder = shutil.copytree(results, tmp_path / "results")
+    files = sorted((folder / "table4").rglob("*.parquet"))
+    files[0].write_bytes(b"damaged")
+    assert main(["verify", str(folder / "table4"), "--seed", "5"]) == 1
+    assert capsys.readouterr().err.splitlines() == [
+        f"differs: {files[0]}: has been changed since it was written",
+        f"dess: error: {folder / 'table4'}: 1 of {len(files)} differ (--seed 5)",
+    ]
+    (folder / "table4" / "manifest.json").write_text("{}")
+    checks = verify_results(folder, 1, 0)
+    assert all(check.compared >= len(check.differing) for check in checks)
+    assert sum(len(check.differing) for check in checks) == 1
+
+
 def test_what_is_neither_a_page_nor_results_is_refused(
     results: Path, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

@@ -7,7 +7,11 @@ import pandas as pd
 import pytest
 
 from analysis.questions.learning import trained
+from analysis.questions.learning.files import CURVE
+from policies.registry import TRAINED
 from tests.policies.ddqn.tiny import tiny
+
+SHIPPED = json.loads((TRAINED / "ddqn" / "config.json").read_text("utf-8"))
 
 
 @pytest.fixture
@@ -20,8 +24,9 @@ def folder(tmp_path: Path) -> Path:
         "bare": {},
     }.items():
         (tmp_path / name).mkdir()
-        config = tiny(**settings).model_dump(mode="json")
-        (tmp_path / name / "config.json").write_text(json.dumps({"training": config}), "utf-8")
+        training = tiny(**settings).model_dump(mode="json")
+        description = json.dumps(SHIPPED | {"training": training})
+        (tmp_path / name / "config.json").write_text(description, "utf-8")
         if name == "bare":
             continue
         product = [0.0, 0.8, 0.5, 0.5]
@@ -30,8 +35,9 @@ def folder(tmp_path: Path) -> Path:
             "updates": [250, 500, 750, 1000],
             "seconds": [60, 120, 180, 240],
         }
-        curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], trained.PRODUCT: product}
-        pd.DataFrame(curve).to_parquet(tmp_path / name / "training.parquet")
+        curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], trained.PRODUCT: product, "is_best": True}
+        same = dict.fromkeys(CURVE.keys() - curve.keys(), 1)
+        pd.DataFrame(curve | same).to_parquet(tmp_path / name / "training.parquet")
     return tmp_path
 
 

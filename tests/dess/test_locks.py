@@ -1,13 +1,13 @@
 """Temporary folders: those of killed processes are removed, those of others are not."""
 
+import os
 from pathlib import Path
 
 import pytest
 from filelock import FileLock
 
 from dess import InputError
-from reports import folders
-from reports.folders import locked, temporary_folder
+from dess.files import locked, temporary_folder
 
 PREFIX = "dess-trial-"
 
@@ -44,14 +44,32 @@ def test_what_killed_processes_left_is_removed_and_nothing_else(tmp_path: Path) 
     assert (tmp_path / "elsewhere" / "file").exists()
 
 
-def test_processes_wait_for_each_other_but_not_for_ever(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with locked(tmp_path, "index"):
-        monkeypatch.setattr(folders, "PATIENCE", 0.05)
-        refused = pytest.raises(InputError, match="another process writes there")
-        with refused, locked(tmp_path, "index"):
-            raise AssertionError("two at a time")
-    with locked(tmp_path, "index"):
+def test_processes_wait_for_each_other_but_not_for_ever(tmp_path: Path) -> None:
+    folder = tmp_path / "new"
+    refused = pytest.raises(InputError, match="new: busy")
+    with locked(folder / ".lock", "busy"), refused, locked(folder / ".lock", "busy", 0.05):
+        raise AssertionError("two at a time")
+    with locked(folder / ".lock", "busy"):
         pass
-    assert list(tmp_path.iterdir()) == []
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["link", "loop", "dangling", "pipe", "folder"])
+def test_a_lock_is_a_file_of_its_own(kind: str, tmp_path: Path) -> None:
+    path, outside = tmp_path / ".lock", tmp_path / "outside"
+    outside.write_text("of somebody")
+    links = {"link": outside, "loop": path, "dangling": tmp_path / "none"}
+    if kind in links:
+        path.symlink_to(links[kind])
+    else:
+        os.mkfifo(path) if kind == "pipe" else path.mkdir()
+    with pytest.raises(InputError, match=r"\.lock: .*; allowed: "), locked(path, "busy"):
+        raise AssertionError("not locked")
+    assert os.path.lexists(path) and outside.read_text() == "of somebody"
+
+
+def test_a_lock_takes_nothing_of_its_folder_away(tmp_path: Path) -> None:
+    (tmp_path / ".index").mkdir()
+    with locked(tmp_path / ".index.lock", "busy"):
+        pass
+    assert (tmp_path / ".index").is_dir()

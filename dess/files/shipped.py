@@ -1,0 +1,62 @@
+"""TOML files that are shipped in a package, by name, and those of users, by path.
+
+where, values = Shipped("scenario", "dess", "scenarios").load("paper")
+"""
+
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from dess.errors import InputError, one_of, shown
+from dess.files.parsing import is_text, parse_toml
+from dess.files.reading import read_text
+
+# The largest TOML file that is read [bytes].
+TOML_LIMIT = 4 * 2**20
+
+
+class Shipped(NamedTuple):
+    """A folder of TOML files in a package, loaded by name.
+
+    Attributes:
+        kind: What messages call one of the files, such as ``scenario``.
+        package: The package that contains the folder.
+        folder: The folder.
+    """
+
+    kind: str
+    package: str
+    folder: str
+
+    def names(self) -> list[str]:
+        """The names, in alphabetical order."""
+        files = resources.files(self.package).joinpath(self.folder).iterdir()
+        return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
+
+    def folder_of(self, name_or_path: str | Path) -> Path:
+        """The folder from which ``load`` would read a file of this name or path."""
+        if str(name_or_path) in self.names():
+            return Path(str(resources.files(self.package).joinpath(self.folder)))
+        return Path(name_or_path).parent
+
+    def load(self, name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
+        """Read a shipped file by its name, or any TOML file by its path.
+
+        Returns:
+            The name or path, for messages, and the content.
+
+        Raises:
+            InputError: If the file does not exist, cannot be read or is not TOML.
+        """
+        text = str(name_or_path)
+        if not is_text(text):
+            raise InputError(f"{shown(text)}: is not a name in UTF-8; allowed: another name")
+        if text in self.names():
+            where = f"{self.kind} {text}"
+            file = resources.files(self.package).joinpath(f"{self.folder}/{text}.toml")
+            return where, parse_toml(file.read_text("utf-8"), where)
+        try:
+            return text, parse_toml(read_text(Path(text), TOML_LIMIT), text)
+        except (FileNotFoundError, NotADirectoryError):
+            allowed = one_of(text, self.names(), "a TOML file")
+            raise InputError(f"{text}: no such {self.kind}{allowed}") from None

@@ -1,0 +1,93 @@
+"""Learning curves that anybody may have sent: read as tables, or refused in one line."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from analysis.questions.learning.files import CURVE, CURVES, read_curve, read_curves
+from analysis.questions.learning.trained import trained_policies
+from dess.errors import InputError
+from policies.registry import TRAINED
+
+Change = Callable[[pd.DataFrame], Any]
+
+
+@pytest.mark.parametrize(
+    ("path", "read", "columns"),
+    [("curves.parquet", read_curves, CURVES), ("ddqn/training.parquet", read_curve, CURVE)],
+)
+def test_shipped_curves_are_read_as_they_are(path: str, read: Any, columns: dict) -> None:
+    assert read(TRAINED / path).equals(pd.read_parquet(TRAINED / path)[[*columns]])
+
+
+# What a forger makes of sound curves, and what the line names.
+FORGED: dict[str, Change] = {
+    "has no column variant": lambda curves: curves.drop(columns="variant"),
+    "has no column final_success": lambda curves: curves.drop(columns="final_success"),
+    "seed has other values": lambda curves: curves.assign(seed="one"),
+    "evaluation_reward has other values": lambda c: c.assign(evaluation_reward=float("inf")),
+    "uav_slots has other values": lambda c: c.assign(uav_slots=c["uav_slots"].where(c.index > 0)),
+    "phase has other values": lambda curves: curves[:0],
+    "updates do not grow": lambda curves: curves.assign(updates=1),
+    "seed has other updates": lambda c: c.drop(index=c.index[c["variant"] == "quick"][0]),
+    "variant has no pair of trainings": lambda curves: curves[curves["variant"] == "quick"],
+    "updates of quick and no transfer have nothing in common": lambda c: c.assign(
+        updates=c["updates"] + (c["variant"] == "quick")
+    ),
+}
+
+
+@pytest.mark.parametrize("problem", FORGED)
+def test_forged_curves_are_a_line(problem: str, tmp_path: Path) -> None:
+    path = tmp_path / "curves.parquet"
+    FORGED[problem](pd.read_parquet(TRAINED / "curves.parquet")).to_parquet(path)
+    with pytest.raises(InputError, match=f"^{path}: {problem}"):
+        read_curves(path)
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"x" * 100])
+def test_what_is_no_table_is_a_line(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "curves.parquet"
+    with pytest.raises(InputError, match=f"^{path}: no such file"):
+        read_curves(path)
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"^{path}: damaged"):
+        read_curves(path)
+
+
+def test_a_curve_without_selected_weights_is_a_line(tmp_path: Path) -> None:
+    path = tmp_path / "training.parquet"
+    curve = pd.read_parquet(TRAINED / "ddqn" / "training.parquet")
+    curve.assign(is_best=False).to_parquet(path)
+    with pytest.raises(InputError, match=f"^{path}: is_best is never true"):
+        read_curve(path)
+
+
+@pytest.mark.parametrize("name", ["training.parquet", "config.json"])
+@pytest.mark.parametrize("kind", ["pipe", "zero", "folder"])
+def test_a_trained_policy_without_files_is_a_line(kind: str, name: str, tmp_path: Path) -> None:
+    folder = shutil.copytree(TRAINED / "ddqn", tmp_path / "ddqn")
+    path = folder / name
+    path.unlink()
+    if kind == "zero":
+        path.symlink_to("/dev/zero")
+    else:
+        os.mkfifo(path) if kind == "pipe" else path.mkdir()
+    with pytest.raises(InputError, match=f"^{path}: "):
+        trained_policies(tmp_path)
+
+
+@pytest.mark.parametrize("key", ["training", "name", "layout", "observation_version"])
+def test_a_forged_description_is_a_line_that_names_the_key(key: str, tmp_path: Path) -> None:
+    folder = shutil.copytree(TRAINED / "ddqn", tmp_path / "ddqn")
+    description = json.loads((folder / "config.json").read_text())
+    del description[key]
+    (folder / "config.json").write_text(json.dumps(description))
+    with pytest.raises(InputError, match=rf"config\.json: {key}: is missing; allowed: "):
+        trained_policies(tmp_path)

@@ -1,0 +1,121 @@
+"""Doors: what all parts of the program must go through, seen in the syntax trees of sources."""
+
+import ast
+from collections.abc import Iterator
+
+import pytest
+
+from tests.test_architecture import SOURCES
+
+DOOR = "dess.files"
+# What opens, reads, writes or lists files, by the name that is called, or by its attribute.
+OPENING = {
+    *("open", "fdopen", "read_text", "read_bytes", "write_text", "write_bytes", "fromfile"),
+    *("tofile", "memmap", "mmap", "loadtxt", "genfromtxt", "savetxt", "savez", "load_file"),
+    *("glob", "rglob", "iglob", "iterdir", "listdir", "scandir", "walk", "fwalk"),
+    *("touch", "unlink", "mkdir", "makedirs", "rmdir", "removedirs", "rmtree", "symlink_to"),
+    *("hardlink_to", "copyfile", "copytree", "copy2", "truncate", "chmod", "chdir"),
+    *("read_parquet", "read_table", "read_csv", "read_json", "read_pickle", "read_excel"),
+    *("to_parquet", "to_pickle", "to_excel", "to_hdf", "write_table", "write_dataset"),
+    *("ParquetFile", "ParquetWriter", "ParquetDataset", "safe_open", "save_file", "savefig"),
+    *("ZipFile", "TarFile", "SummaryWriter", "FileLock", "SoftFileLock", "saving", "extractall"),
+}
+# Functions of modules whose names alone say little.
+OPENING_OF = {
+    "os": {"remove", "rename", "replace", "link", "symlink", "truncate", "mkfifo"},
+    "json": {"load", "dump"},
+    "tomllib": {"load"},
+    "torch": {"load", "save"},
+    "np": {"load", "save"},
+    "pickle": {"load", "loads", "dump"},
+    "shutil": {"copy", "move"},
+    "Image": {"open"},
+}
+# What is no way past the door, by the module.
+ALLOWED = {
+    # A results folder, whose files the door reads and writes.
+    "analysis.execution.runner": {"open"},
+    # Sources of our own code, and what numba keeps of it.
+    "dess.code.kernels": {"read_bytes"},
+    "dess.code.sources": {"read_bytes", "walk"},
+    # A library that opens a file which the door has checked, or a temporary one of the door.
+    "policies.ddqn.tensors": {"safe_open", "save_file"},
+    "policies.ddqn.session": {"SummaryWriter"},
+    "reports.cli.simulate": {"savefig"},
+    "reports.player.animation": {"saving"},
+    # The null device in the place of a closed stream; the licence of the package.
+    "reports.cli.console": {"open"},
+    "reports.crate": {"read_text"},
+}
+
+
+def called(tree: ast.Module) -> Iterator[tuple[str, ast.Call]]:
+    """The calls that open, read, write or list files, unless they are calls of the door."""
+    doors = {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith(DOOR)
+        for alias in node.names
+    }
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Name) and node.func.id in OPENING - doors:
+            yield node.func.id, node
+        elif isinstance(node.func, ast.Attribute):
+            owner = node.func.value.id if isinstance(node.func.value, ast.Name) else ""
+            if node.func.attr in OPENING | OPENING_OF.get(owner, set()) and owner not in doors:
+                yield node.func.attr, node
+
+
+def in_memory(call: ast.Call) -> bool:
+    """Whether a file format is read from, or written into, a buffer."""
+    places = {ast.unparse(argument) for argument in call.args}
+    return bool(places & {"buffer", "sink"}) or any("BufferReader(" in place for place in places)
+
+
+@pytest.mark.parametrize("name", [name for name in SOURCES if not name.startswith(DOOR)])
+def test_files_are_opened_read_written_and_listed_by_the_door_alone(name: str) -> None:
+    past = [
+        f"{name}:{call.lineno}: {what}"
+        for what, call in called(SOURCES[name])
+        if what not in ALLOWED.get(name, ()) and not in_memory(call)
+    ]
+    assert not past
+
+
+def test_what_is_allowed_is_done() -> None:
+    """An exception that nothing needs any more goes."""
+    done = {name: {what for what, _ in called(SOURCES[name])} for name in ALLOWED}
+    assert {name: ALLOWED[name] & done[name] for name in ALLOWED} == ALLOWED
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "open(path)",
+        "path.read_text()",
+        "Path(folder).glob('*')",
+        "os.replace(a, b)",
+        "pd.read_parquet(path)",
+        "pq.ParquetFile(path)",
+        "drawing.savefig(path)",
+        "json.load(file)",
+    ],
+)
+def test_a_way_past_the_door_is_seen(source: str) -> None:
+    calls = [call for _, call in called(ast.parse(source))]
+    assert len(calls) == 1 and not in_memory(calls[0])
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from dess.files import read_text\nread_text(path)",
+        "pq.ParquetFile(pa.BufferReader(content))",
+        "drawing.savefig(buffer, format='svg')",
+        "text.replace('a', 'b')",
+    ],
+)
+def test_the_door_and_memory_are_no_way_past_it(source: str) -> None:
+    assert all(in_memory(call) for _, call in called(ast.parse(source)))
