@@ -1,7 +1,7 @@
 """An installed ``dess``, without the repository: the wheel, the sdist, and their commands."""
 
+import shutil
 import subprocess
-import tarfile
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -38,8 +38,7 @@ def test_the_wheel_runs_without_the_repository(installed: Path, tmp_path: Path) 
 
 
 def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
-    with tarfile.open(built("sdist", tmp_path / "sdist")) as archive:
-        archive.extractall(tmp_path, filter="data")
+    shutil.unpack_archive(built("sdist", tmp_path / "sdist"), tmp_path)
     [source] = tmp_path.glob("dess-*")
     ours, theirs = (built("wheel", tmp_path / to, at) for to, at in (("a", ROOT), ("b", source)))
     assert ours.name == theirs.name
