@@ -1,6 +1,6 @@
 """The exception for all bad input, and the words of its messages."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from reprlib import Repr
 from types import NoneType, UnionType
@@ -10,14 +10,18 @@ if TYPE_CHECKING:  # the command line raises InputError long before anything nee
     from pydantic import BaseModel, ValidationError
     from pydantic.fields import FieldInfo
 
-# A list of allowed names that is longer is left out where a name is close to the unknown one.
-_FEW = 12
+# The longest list of allowed names, and of names that are close to an unknown one.
+_NAMES, _CLOSE = 180, 12
 
-# Pydantic's error types for values out of range, of another type, and for malformed lists.
-_OUT_OF_RANGE = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
-_OTHER_TYPE = ("int_type", "int_from_float", "float_type", "bool_type", "string_type")
-_WRONG_FORM = ("tuple_type", "missing", "too_long")
-
+# What is wrong with a value, by pydantic's name of the error, or its first word.
+_PROBLEMS = {
+    **dict.fromkeys(("greater", "less", "finite"), "is out of range"),
+    **dict.fromkeys(("dict", "model", "mapping"), "is not a table"),
+    "int": "is not an integer",
+    "float": "is not a number",
+    "bool": "is not a truth value",
+    "string_type": "is not text in quotes",
+}
 _WORDS = {int: "an integer", float: "a number", bool: "a truth value", str: "text in quotes"}
 
 # A longer value is cut where a message quotes it, and a longer name where others are compared.
@@ -63,6 +67,16 @@ def cut(text: str, length: int) -> str:
     return f"{text[: length - 5 - end]} ... {text[-end:]}"
 
 
+def listed(names: Iterable[str]) -> str:
+    """Names as a message lists them: of many only the first, and the number of the others."""
+    known, length = [*names], 0
+    for number, name in enumerate(known):
+        length += len(name) + 2
+        if length > _NAMES and number:
+            return f"{', '.join(known[:number])} and {len(known) - number} others"
+    return ", ".join(known)
+
+
 def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     """The end of a message about an unknown name: what may be meant, and what is allowed.
 
@@ -71,7 +85,7 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
 
     Args:
         name: The unknown name.
-        names: The known names. A long list of them is not printed if one of them is close.
+        names: The known names. Of many, only those that are close are printed, if there are some.
         also: What else is allowed, such as ``a TOML file``.
     """
     known = list(dict.fromkeys(names))
@@ -79,8 +93,8 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
     close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
     meant = f" (did you mean {' or '.join(close)}?)" if close else ""
-    allowed = ", ".join(known)
-    if close and len(known) > _FEW:
+    allowed = listed(known)
+    if close and len(known) > _CLOSE:
         allowed = f"{', '.join(close)} and {len(known) - len(close)} others"
     if also:
         allowed += f", or {also}" if known else also
@@ -99,36 +113,77 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     # A key that is spelled wrongly is also missing: tell the cause.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     kind, value, loc = first["type"], first["input"], first["loc"]
-    place = f"{where}: {'.'.join(map(str, loc))}" if loc else where
     fields, field, is_whole = _field_at(model, loc)
+    is_short = kind == "missing" and not is_whole  # an item of a list is missing
+    path = [cut(str(part), _QUOTED) for part in loc[: -1 if is_short else None] if part != "[key]"]
+    place = f"{where}: {'.'.join(path)}" if path else where
     if kind == "extra_forbidden":
         return f"{place}: unknown key{one_of(loc[-1], fields)}"
-    message = first["msg"].removeprefix("Value error, ")
-    if kind == "value_error" or field is None:
-        return f"{place}: {message}" + (f", not {shown(value)}" if kind != "value_error" else "")
-    if kind == "missing" and is_whole:
-        return f"{place}: is missing; allowed: {field.description}"
-    if kind == "literal_error" and is_whole:
-        return f"{place}: {shown(value)} is unknown{one_of(value, choices_of(field))}"
-    problems = {kind: "is out of range" for kind in _OUT_OF_RANGE if is_whole}
-    problems |= {kind: f"is not {kind_of(field)}" for kind in _OTHER_TYPE if is_whole}
-    problems |= {kind: "has the wrong form" for kind in _WRONG_FORM}
-    if kind in problems:
-        return f"{place}: {shown(value)} {problems[kind]}; allowed: {form_of(field)}"
-    return f"{place}: {message}, not {shown(value)}"
+    if kind == "literal_error":
+        known = choices_of(field) if field and is_whole else []
+        allowed = one_of(value, known) if known else f"; allowed: {first['ctx']['expected']}"
+        return f"{place}: {shown(value)} is unknown{allowed}"
+    allowed = form_of(field) if field else f"a table of {listed(fields)}"
+    if kind == "value_error":
+        line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
+        return line if "; allowed: " in line else f"{line}; allowed: {allowed}"
+    if kind == "missing" and field and is_whole:
+        return f"{place}: is missing; allowed: {form_of(field, described=True)}"
+    problem = "is too short" if is_short else _problem(kind)
+    return f"{place}: {shown(value)} {problem}; allowed: {allowed}"
 
 
-def form_of(field: "FieldInfo") -> str:
-    """What the value of a field of a model may be, in words, such as ``a number 0..100``."""
-    if choices := choices_of(field):
-        return ", ".join(choices)
-    kind = kind_of(field)
-    if kind == _WORDS[bool]:
+def _problem(kind: str) -> str:
+    """What is wrong with a value, by pydantic's name of the error."""
+    for end in ("too_short", "too_long"):
+        if kind.endswith(end):
+            return f"is {end.replace('_', ' ')}"
+    return _PROBLEMS.get(kind) or _PROBLEMS.get(kind.partition("_")[0], "has the wrong form")
+
+
+def form_of(field: "FieldInfo", described: bool = False) -> str:
+    """What the value of a field of a model may be, in words, such as ``a number 0..100``.
+
+    Lists and tables have their description as well; if it says the form after a colon, only that.
+
+    Args:
+        field: The field.
+        described: Whether a single value has its description, too.
+    """
+    description = field.description or ""
+    single = bool(kind_of(field) or choices_of(field))
+    if (form := description.partition(": ")[2]) and not single:
+        length = _length(field.metadata).strip()
+        return f"{form} ({length})" if length else form
+    text = _form(field.annotation, field.metadata)
+    return f"{text} ({description})" if description and (described or not single) else text
+
+
+def _form(annotation: Any, metadata: Sequence[Any]) -> str:
+    """What the values of a type may be, in words."""
+    origin, parts = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        limits = [m for part in parts[1:] for m in getattr(part, "metadata", [part])]
+        return _form(parts[0], [*limits, *metadata])
+    if origin in (Union, UnionType):
+        kinds = (_form(part, metadata) for part in parts if part is not NoneType)
+        return " or ".join(dict.fromkeys(kinds))
+    if origin is Literal:
+        return listed(str(part) or "empty" for part in parts)
+    if origin is tuple and parts[1:] != (...,):
+        return f"[{', '.join(_form(part, ()) for part in parts)}]"
+    if origin in (tuple, list, dict):
+        what, item = ("table", "value") if origin is dict else ("list", "item")
+        inner = _form(parts[origin is dict], ())
+        return f"a {what}{_length(metadata)}" + (f", each {item} {inner}" if inner else "")
+    if hasattr(annotation, "model_fields"):
+        return f"a table of {listed(_keys(annotation))}"
+    if annotation is bool:
         return "true or false"
-    if kind:
-        return f"{kind} {_limits(field)}".strip()
-    description = field.description or "another value"
-    return description.partition(": ")[2] or description
+    if annotation is str:
+        patterns = [f" like {m.pattern}" for m in metadata if getattr(m, "pattern", None)]
+        return f"{_WORDS[str]}{_length(metadata)}{''.join(patterns)}"
+    return f"{_WORDS.get(annotation, '')} {_limits(metadata, 'ge', 'le')}".strip()
 
 
 def kind_of(field: "FieldInfo") -> str:
@@ -143,17 +198,22 @@ def choices_of(field: "FieldInfo") -> list[str]:
     return [*map(str, get_args(field.annotation))] if is_choice else []
 
 
-def _limits(field: "FieldInfo") -> str:
-    """The limits of a number, such as ``2..256`` or ``above 0``."""
+def _length(metadata: Sequence[Any]) -> str:
+    limits = _limits(metadata, "min_length", "max_length")
+    return f" of length {limits}" if limits else ""
+
+
+def _limits(metadata: Sequence[Any], least: str, most: str) -> str:
+    """The limits in pydantic's metadata, such as ``2..256`` or ``above 0``."""
+    words = {"gt": "above", least: "from", "lt": "below", most: "up to"}
     ends = {
         end: f"{getattr(limit, end):,}"
-        for limit in field.metadata
-        for end in ("gt", "ge", "lt", "le")
-        if hasattr(limit, end)
+        for limit in metadata
+        for end in words
+        if getattr(limit, end, None) is not None
     }
-    if ends.keys() == {"ge", "le"}:
-        return f"{ends['ge']}..{ends['le']}"
-    words = {"gt": "above", "ge": "from", "lt": "below", "le": "up to"}
+    if ends.keys() == {least, most}:
+        return "..".join(dict.fromkeys((ends[least], ends[most])))
     return ", ".join(f"{words[end]} {limit}" for end, limit in ends.items())
 
 
@@ -166,14 +226,19 @@ def _field_at(
         The fields that may stand there, the innermost field that contains the place, and whether
         the place is the whole field, not a part of it.
     """
-    fields, field, is_whole = model.model_fields, None, False
+    fields, field, is_whole = _keys(model), None, False
     for part in loc:
         is_whole = part in fields
         if is_whole:
             field = fields[str(part)]
             tables = [kind for kind in _leaves(field.annotation) if hasattr(kind, "model_fields")]
-            fields = tables[0].model_fields if len(tables) == 1 else {}
+            fields = _keys(tables[0]) if len(tables) == 1 else {}
     return fields, field, is_whole
+
+
+def _keys(model: "type[BaseModel]") -> dict[str, "FieldInfo"]:
+    """The fields of a model by the names that the input has for them."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
 
 
 def _leaves(annotation: Any) -> list[Any]:
@@ -183,6 +248,6 @@ def _leaves(annotation: Any) -> list[Any]:
         return _leaves(parts[0])
     if origin in (Union, UnionType):
         return [leaf for part in parts for leaf in _leaves(part)]
-    if origin is tuple and parts[1:] == (...,) and hasattr(parts[0], "model_fields"):
-        return _leaves(parts[0])
+    if origin in (tuple, list, dict) and hasattr(parts[origin is dict], "model_fields"):
+        return _leaves(parts[origin is dict])
     return [annotation]

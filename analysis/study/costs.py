@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from analysis.study.stopping import MOST, StrictTable, Text
+from analysis.study.stopping import MOST, Line, StrictTable
 from dess.scenario import Integer, Number, ScenarioSpace
 
 # A price; the sums of all missions that may be planned are still finite.
@@ -33,7 +33,7 @@ class Costs(StrictTable):
         pydantic.ValidationError: If a price is below 0, or hours are without ``slot_seconds``.
     """
 
-    currency: Text = Field("EUR", min_length=1, max_length=16, description="name of the currency")
+    currency: Line = Field("EUR", min_length=1, max_length=16, description="name of the currency")
     uav: Price = Field(0.0, description="price of a UAV")
     pad: Price = Field(0.0, description="price of a charging pad")
     charge: Price = Field(0.0, description="price of charging a battery from 0 to 100 %")

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from analysis.study.stopping import StrictTable, of_its_kind
-from dess import InputError
+from dess.errors import InputError, shown
 from dess.scenario import Integer, Scenario, dotted, fields_of
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
@@ -67,9 +67,9 @@ def _are_ranges(ranges: dict[str, Any]) -> dict[str, Any]:
     for field, ends in ranges.items():
         if not _is_range(field, ends):
             numbers = "integers" if field in INTEGERS else "numbers"
-            shown = list(ends) if isinstance(ends, tuple) else repr(ends)
+            given = shown(list(ends) if isinstance(ends, tuple) else ends)
             raise ValueError(
-                f"{field}: {shown} is not a range; allowed: [low, high], {numbers} with low <= high"
+                f"{field}: {given} is not a range; allowed: [low, high], {numbers} with low <= high"
             )
     return ranges
 

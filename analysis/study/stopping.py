@@ -18,7 +18,7 @@ from scipy.special import ndtri, stdtrit
 
 from analysis.names import BOUNDED, MEANS, MEASURES, SHARES
 from analysis.stats.bounded import LEVEL, bounded_ends
-from dess.errors import InputError, one_of, shown, validation_line
+from dess.errors import InputError, listed, one_of, shown, validation_line
 from dess.scenario import Integer, Number
 
 _METRICS = [*SHARES, *MEANS, *MEASURES]
@@ -37,14 +37,15 @@ def _printable(text: str) -> str:
 
 def _known(metric: str) -> str:
     if metric not in _METRICS:
-        raise ValueError(f"{metric!r} is unknown{one_of(metric, _METRICS)}")
+        raise ValueError(f"{shown(metric)} is unknown{one_of(metric, _METRICS)}")
     return metric
 
 
 # A metric of missions; those of ``MEASURES`` only where the scenario measures them.
 Metric = Annotated[str, AfterValidator(_known)]
-# A name, or another line of text.
-Text = Annotated[str, Field(max_length=4000), AfterValidator(_printable)]
+# A line of text, such as a name.
+Line = Annotated[str, AfterValidator(_printable)]
+Text = Annotated[Line, Field(max_length=4000)]
 
 
 class StrictTable(BaseModel):
@@ -244,7 +245,7 @@ def values_in(sample: Mapping[str, np.ndarray], metric: str) -> np.ndarray:
     """
     if metric not in sample:
         known = [name for name in _METRICS if name in sample]
-        raise InputError(f"{metric}: is not measured by the scenario; allowed: {', '.join(known)}")
+        raise InputError(f"{metric}: is not measured by the scenario; allowed: {listed(known)}")
     return np.asarray(sample[metric], float)
 
 

@@ -24,7 +24,7 @@ from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.engine import Engine, engine_of
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
-from dess.errors import InputError, one_of, validation_line
+from dess.errors import InputError, cut, one_of, validation_line
 from dess.files import Shipped
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.streams import MAX_SEED
@@ -82,7 +82,9 @@ class StudyData(StrictTable):
         {}, description="fields of the scenario, the same everywhere"
     )
     design: Design | None = Field(
-        None, description="the design points; without one, the scenario is the only point"
+        None,
+        description="the design points: a table with the kind of the design; without one, the "
+        "scenario is the only point",
     )
     policies: Annotated[tuple[_Team, ...], BeforeValidator(as_tuples)] = Field(
         min_length=1, description='teams: "P" or "P,P,..."'
@@ -91,10 +93,10 @@ class StudyData(StrictTable):
         1000, ge=1, le=MOST, description="per design point and policy; with a rule, not given"
     )
     precision: Precision | None = Field(
-        None, description="a rule: as many missions as narrow intervals take"
+        None, description="a rule that asks for as many missions as narrow intervals take"
     )
     selection: AnySelection | None = Field(
-        None, description="a rule: as many missions as finding the best design point takes"
+        None, description="a rule that asks for as many missions as finding the best point takes"
     )
     costs: Costs | None = Field(None, description="prices, for questions about costs")
     seed: Integer = Field(0, ge=0, le=MAX_SEED)
@@ -362,4 +364,5 @@ def budget_of(study: Mapping[str, Any]) -> str:
 
 
 def _shown(values: dict[str, Any]) -> str:
-    return ", ".join(f"{key}={value}" for key, value in values.items()) or "the scenario as it is"
+    text = ", ".join(f"{key}={value}" for key, value in values.items())
+    return cut(text, MOST_CHARACTERS) or "the scenario as it is"

@@ -111,7 +111,9 @@ def check_sampled(ranges: dict[str, tuple[int, int]], zone_cells: int) -> None:
         least, most, reason = limits[name]
         if not least <= low <= high <= most:
             shown = low if low == high else [low, high]
-            raise ValueError(f"{name}: {shown} is not within {least}..{most} ({reason})")
+            raise ValueError(
+                f"{name}: {shown} is out of range; allowed: {least}..{most} ({reason})"
+            )
     start, complete = ranges["charge_start"][1], ranges["charge_complete"][0]
     if start >= complete:
         raise ValueError(

@@ -169,10 +169,13 @@ class TrainingConfig(_Settings):
     @model_validator(mode="after")
     def _is_consistent(self) -> "TrainingConfig":
         if self.replay < self.n_step + 2:  # of two slots an environment has simulated at least one
-            raise ValueError(f"replay: {self.replay} is not above n_step {self.n_step} + 1")
+            raise ValueError(
+                f"replay: {self.replay} is too few; allowed: n_step {self.n_step} + 2 or more"
+            )
         if self.learning_starts <= self.n_step:
             raise ValueError(
-                f"learning_starts: {self.learning_starts} is not above n_step {self.n_step}"
+                f"learning_starts: {self.learning_starts} is too few; allowed: more than n_step "
+                f"{self.n_step}"
             )
         if self.observation == "nodes" and len(self.hidden) < 2:
             raise ValueError(f"hidden: {list(self.hidden)} are too few; allowed: two or more")
@@ -182,10 +185,12 @@ class TrainingConfig(_Settings):
                 f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
             )
         if self.evaluation_seed == MISSION_SEED + self.seed:
-            raise ValueError(f"evaluation_seed: {self.evaluation_seed} is that of the training")
+            raise ValueError(
+                f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"
+            )
         names = [phase.name for phase in self.phases]
         if len(set(names)) < len(names):
-            raise ValueError(f"phases: {names} are not distinct")
+            raise ValueError(f"phases: {shown(names)} are not distinct; allowed: distinct names")
         return self
 
     @property

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dess.errors import form_of, one_of, validation_line
 
 MANY = [f"field_{number:02}" for number in range(20)] + ["uavs"]
+FIRST = ", ".join(MANY[:18])
 
 
 @pytest.mark.parametrize(
@@ -20,7 +21,8 @@ MANY = [f"field_{number:02}" for number in range(20)] + ["uavs"]
         ("other", [], "", "; allowed: none"),
         (None, ["tour"], "", "; allowed: tour"),
         ("uvs", MANY, "", " (did you mean uavs?); allowed: uavs and 20 others"),
-        ("speed", MANY, "", f"; allowed: {', '.join(MANY)}"),
+        ("speed", MANY, "", f"; allowed: {FIRST} and 3 others"),
+        ("speed", ["x" * 4000, "y"], "", f"; allowed: {'x' * 4000} and 1 others"),
     ],
 )
 def test_a_close_name_comes_first(name: object, names: list[str], also: str, end: str) -> None:
@@ -37,22 +39,37 @@ class Part(BaseModel):
 class Whole(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    name: str = Field(description="name of the whole")
+    name: str = Field(min_length=1, max_length=8, description="name of the whole")
     count: int | None = Field(None, ge=1, le=1000)
     ready: bool = False
     size: tuple[int, int] = Field((1, 1), description="width and height")
     part: Part | None = None
-    parts: tuple[Part, ...] = ()
+    parts: tuple[Part, ...] = Field((), strict=False, min_length=1, max_length=3)
+    prices: dict[Literal["a", "b"], float] = {}
 
 
 LINES = [
-    ({}, "name: is missing; allowed: name of the whole"),
+    ({}, "name: is missing; allowed: text in quotes of length 1..8 (name of the whole)"),
     ({"part": {"price": -1}, "nam": "x"}, "nam: unknown key (did you mean name?)"),
-    ({"nam": "x"}, "nam: unknown key (did you mean name?); allowed: {}part, parts"),
+    ({"nam": "x"}, "nam: unknown key (did you mean name?); allowed: {}part, parts, prices"),
     ({"count": 0}, "count: 0 is out of range; allowed: an integer 1..1,000"),
+    ({"name": "x" * 9}, "name: 'xxxxxxxxx' is too long; allowed: text in quotes of length 1..8"),
+    (
+        {"prices": {"a": "b"}},
+        "prices.a: 'b' is not a number; allowed: a table, each value a number",
+    ),
+    ({"prices": {"c": 1}}, "prices.c: 'c' is unknown; allowed: 'a' or 'b'"),
+    (
+        {"parts": ()},
+        "parts: () is too short; allowed: a list of length 1..3, each item a table of {}",
+    ),
+    ({"parts": [3]}, "parts.0: 3 is not a table; allowed: a list of length 1..3, each item a {}"),
     ({"count": "few"}, "count: 'few' is not an integer; allowed: an integer 1..1,000"),
     ({"ready": 1}, "ready: 1 is not a truth value; allowed: true or false"),
-    ({"size": (1,)}, "size.1: {} has the wrong form; allowed: width and height"),
+    (
+        {"size": (1,)},
+        "size: (1,) is too short; allowed: [an integer, an integer] (width and height)",
+    ),
     ({"part": {"prize": 1}}, "part.prize: unknown key (did you mean price?); allowed: price, kind"),
     ({"part": {"price": -1}}, "part.price: -1 is out of range; allowed: a number from 0"),
     ({"part": {"kind": "smal"}}, "part.kind: 'smal' is unknown (did you mean small?); allowed: {}"),
@@ -74,4 +91,4 @@ def test_an_error_is_a_line_about_the_innermost_field(values: dict, line: str) -
 def test_the_form_of_a_field_is_told_in_words() -> None:
     forms = {name: form_of(field) for name, field in Part.model_fields.items()}
     assert forms == {"price": "a number from 0", "kind": "small, large"}
-    assert form_of(Whole.model_fields["size"]) == "width and height"
+    assert form_of(Whole.model_fields["size"]) == "[an integer, an integer] (width and height)"

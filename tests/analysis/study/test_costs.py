@@ -23,6 +23,12 @@ def test_hours_need_the_length_of_a_slot() -> None:
     assert Costs(hour=100, slot_seconds=60).hour == 100
 
 
+@pytest.mark.parametrize("name", ["", "x" * 17, "x" * 4000])
+def test_a_currency_has_a_short_name(name: str) -> None:
+    with pytest.raises(ValidationError, match="currency"):
+        Costs(currency=name)
+
+
 def test_prices_change_no_key_of_a_mission() -> None:
     free = Manifest.of(load_study("table4", missions=2, policies=["greedy"]))
     study = load_study("table4", missions=2, policies=["greedy"], costs={"uav": 20_000})

@@ -97,7 +97,7 @@ BAD = {
     "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
     "engine = 'fast'": ["engine: 'fast' is unknown; allowed: batch, events"],
     "logged = 2000": ["logged: 2000", "0..1000"],
-    "name = 'a/b'": ["name", "not 'a/b'"],
+    "name = 'a/b'": ["name: 'a/b' has the wrong form"],
     "policies = []": ["policies"],
     "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "nearest, greedy, tour"],
     "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
@@ -139,7 +139,7 @@ BAD = {
         "costs: are missing; allowed: a table of prices"
     ],
     "costs.uav = 1\nselection = {procedure = 'cheapest', requirements.success = 0.99}": [
-        "selection: cheapest: indifference: is missing; allowed: the least saving that matters"
+        "selection: cheapest: indifference: is missing; allowed: a number 1e-09.."
     ],
     "costs.uav = 1\n"
     "selection = {procedure = 'cheapest', requirements.success = 1.0, indifference = 1}": [

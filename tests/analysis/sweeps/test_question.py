@@ -168,13 +168,13 @@ def test_a_name_is_of_one_question(asking, tmp_path):
 
 REFUSED = {
     "small.toml: uavz: unknown key": {"fields": {"uavz": [1, 2]}},
-    "uavs: 7 is not within 1..6": {"fields": {"uavs": [2, 7]}},
+    "uavs: 7 is out of range; allowed: 1..6": {"fields": {"uavs": [2, 7]}},
     "pads: 7 is more than the zone has cells": {"fields": {"pads": 7}},
     "'gredy' is unknown": {"policies": ["gredy"]},
     "greedy is listed twice": {"policies": ["greedy", "greedy"]},
-    "policies: Tuple should have at least 1": {"policies": []},
+    "policies: .. is too short": {"policies": []},
     "missions: 0 is out of range; allowed: an integer 1..": {"missions": 0},
-    "name: String should match": {"name": "../mine"},
+    "name: '../mine' has the wrong form": {"name": "../mine"},
     "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000": {"prices": {"uav": -1}},
     "prices: 'uaf' is unknown; allowed: currency, uav": {"prices": {"uaf": 1}},
     "requirements: need prices": {"requirements": {"success": 0.9}},

@@ -107,7 +107,7 @@ def test_rates_and_a_schedule_beside_nodes_from_a_file(tmp_path: Path) -> None:
         ("slot,rate\n1,2\n", "has columns slot, rate; allowed: slot and factor"),
         ("slot,factor\n1,2\n2,much\n", "line 3: factor is 'much'; allowed: a number"),
         ("slot,factor\n1\n", "line 2: factor is None; allowed: a number"),
-        ("slot,factor\n1,-2\n", r"schedule.0.1: .*not -2.0"),
+        ("slot,factor\n1,-2\n", r"schedule.0.1: -2.0 is out of range"),
         ("slot,factor\n5,1\n4,1\n", "slot 4 comes after slot 5"),
     ],
 )
