@@ -32,7 +32,7 @@ MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
 EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 
 # A reward per event. Sums of many of them are still finite, and so are their squares.
-Reward = Annotated[float, Field(ge=-(10**9), le=10**9, allow_inf_nan=False)]
+Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
 
 
 class Constants(BaseModel):

@@ -21,12 +21,13 @@ from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError, shown
 from dess.files.reading import read_text
-from dess.sections.section import Integer, Section
+from dess.sections.section import Integer, Number, Section
 
-Rate = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
-Time = Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False)]
+Rate = Annotated[Number, Field(ge=0, le=100)]
+Time = Annotated[Number, Field(ge=0, le=1_000_000)]
 
 _MOST_BYTES = 2**20
+MOST_CANDIDATES = 2**20  # that one call of compiled code draws
 _COLUMNS = ("slot", "factor")
 
 # The Poisson process of one node.
@@ -125,7 +126,6 @@ def factors_of(arrivals: Arrivals) -> tuple[np.ndarray, np.ndarray]:
     return starts, factors
 
 
-@kernel
 def draw_arrival(missions, sources, starts, factors, k):
     """Draw the next arrival at node ``k``; its time is infinite if the mission ends before it.
 
@@ -135,9 +135,18 @@ def draw_arrival(missions, sources, starts, factors, k):
         starts, factors: As from ``factors_of``.
         k: Index of the node.
     """
+    while not _draw(missions, sources, starts, factors, k):
+        pass  # between two calls, a signal can end it
+
+
+@kernel
+def _draw(missions, sources, starts, factors, k):
+    """Draw up to ``MOST_CANDIDATES`` candidates; return whether the next arrival was among them."""
     mission, source = missions[0], sources[k]
     highest = factors.max()
-    while source.time < math.inf:
+    for _ in range(MOST_CANDIDATES):
+        if source.time == math.inf:
+            return True
         words = streams.block(
             mission.seed, mission.replication, streams.ARRIVAL_TIME, 0, k, source.candidate
         )
@@ -145,7 +154,8 @@ def draw_arrival(missions, sources, starts, factors, k):
         source.time -= math.log(streams.uniform(words[0])) / (source.rate * highest)
         if not source.time < mission.max_slots:
             source.time = math.inf
-            return
+            return True
         factor = factors[np.searchsorted(starts, source.time, side="right") - 1]
         if streams.uniform(words[1]) * highest < factor:
-            return
+            return True
+    return False

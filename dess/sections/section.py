@@ -3,16 +3,17 @@
 from typing import Annotated, Any, Self
 
 from numba.extending import overload
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 # A strict integer: 2.0, true and "2" are refused.
 Integer = Annotated[int, Field(strict=True)]
-# A finite number, integer or not.
-Number = Annotated[float, Field(allow_inf_nan=False)]
+# A finite number, integer or not. All numbers of a scenario are made of it: -0.0 becomes 0.0, since
+# compiled code divides by some of them and would then count time backwards.
+Number = Annotated[float, Field(allow_inf_nan=False), AfterValidator(lambda value: value + 0.0)]
 # A probability that something happens in a mission slot.
-Probability = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+Probability = Annotated[Number, Field(ge=0, le=1)]
 # A mean duration; 0 has a meaning of its own, which the description tells.
-Slots = Annotated[float, Field(ge=0, le=1_000_000, allow_inf_nan=False)]
+Slots = Annotated[Number, Field(ge=0, le=1_000_000)]
 
 
 def tuples(value: Any) -> Any:

@@ -118,9 +118,8 @@ def begin(mission, uavs, residual, rates, flight):
 @inlined
 def _revival(mission):
     """The slots after which an emptied node has data again."""
-    if mission.arrival_rate == 0.0:
-        return NEVER
-    return int(math.ceil(_HALF_A_PACKET / mission.arrival_rate))
+    slots = _HALF_A_PACKET / mission.arrival_rate  # infinite at a rate of 0
+    return int(math.ceil(slots)) if slots < NEVER else NEVER
 
 
 @inlined

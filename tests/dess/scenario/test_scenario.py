@@ -316,6 +316,27 @@ def test_values_at_the_limits_are_allowed_and_those_beyond_are_not() -> None:
                 ScenarioSpace.of(space, **{field: kind(refused)})
 
 
+def test_no_number_of_a_scenario_is_minus_zero() -> None:
+    """Compiled code divides by rates, and by -0.0 with another result than by 0.0."""
+    space = load_scenario("paper")
+    allowed = {name: space.limits(name) for name in space.numeric}
+    values = {
+        name: -0.0
+        for name, (low, high) in allowed.items()
+        if low <= 0 <= high and isinstance(space.value(name), float)
+    }
+    assert {"arrival_rate", "shadowing_variance", "wind.direction", "failures.uav_rate"} < {*values}
+    values |= {
+        "initial_data": [-0.0, -0.0],
+        "arrivals.process": "continuous",
+        "arrivals.rates": [-0.0] * 25,
+        "arrivals.schedule": [[-0.0, -0.0], [5, 1]],
+    }
+    dumped = ScenarioSpace.of(space, **values).model_dump_json()
+    assert "-0.0" not in dumped
+    assert '"schedule":[[0.0,0.0],[5.0,1.0]]' in dumped
+
+
 def test_limits_follow_the_zone() -> None:
     space = ScenarioSpace.of(zone=(0, 0, 2, 2))
     assert space.limits("uavs") == space.limits("pads") == (1, 4)

@@ -140,6 +140,15 @@ def test_an_emptied_node_has_data_again_when_half_a_packet_has_gathered() -> Non
     assert taken == pytest.approx([10.0] * 5 + [10.5] * 2)
 
 
+@pytest.mark.parametrize("rate", [0.0, 5e-324, 1e-300])
+def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) -> None:
+    view = _view(Scenario.of(**ALONE, arrival_rate=rate))
+    (mission,), uavs = view.state.missions, view.state.uavs[0]
+    flight = empty_flight(MOST_SLOTS, 1, 1)
+    begin(mission, uavs, np.zeros(1), rates_of(view), flight)
+    assert flight.sea["since"][0].tolist() == [NEVER]
+
+
 def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set() -> None:
     scenario = Scenario.of(**ALONE, **CALM)
     plan = _plan(1, [(2, 2, CHARGE), (4, 2, 0)])
