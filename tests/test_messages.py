@@ -12,13 +12,13 @@ import pytest
 from pydantic import BaseModel
 
 from analysis.execution.decision_time import Timing
-from analysis.results.documents import Document
 from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.study.study import Study
 from analysis.verification.cross_check import CrossCheck
 from dess import InputError
-from dess.record import MISSION_RECORD
+from dess.files.documents import Document
+from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.scenario import Scenario, ScenarioSpace
 from dess.scenario.space import validated
 from policies.ddqn.checkpoint import Header
@@ -108,8 +108,11 @@ def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
             "curve": [ROW | {f"evaluation_{metric}": 0.5 for metric in METRICS}],
         },
     )
-    lists = {"missions": [{}], "uavs": [{}], "rates": [0.5], "slots": [0.5]}
-    yield CrossCheck, {"study": "0" * 16, "queues": {"batches": [0.5]}} | lists
+    mission = {"policy": "greedy", **dict.fromkeys(MISSION_RECORD.names or (), 0)}
+    uav = {**dict.fromkeys(UAV_RECORD.names or (), 0), "end": "quota"}
+    lists = {"missions": [mission], "rates": [0.5], "slots": [0.5, 0.5]}
+    of_uav = {"policy": "greedy", "replication": 0, "uav": 0, **uav}
+    yield CrossCheck, {"study": "0" * 16, "queues": {"batches": [0.5]}, "uavs": [of_uav]} | lists
 
 
 EXAMPLES = [*documents(), *tables()]
@@ -158,7 +161,7 @@ def refusal(model: type[BaseModel], data: Any) -> str:
     """The line about data that a model refuses, as its files are read; empty if it does not."""
     try:
         if issubclass(model, Document):
-            model.parse(json.dumps(data), "input", "allowed: another file")
+            model.parse(json.dumps(data), "input")
         else:
             validated(model, data, "input")
     except InputError as error:
