@@ -1,7 +1,6 @@
 """Studies as data: which policies, design points and replications to simulate."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -49,6 +48,11 @@ class Point(NamedTuple):
     values: dict[str, Any]
     scenario: ScenarioSpace
     replication: int = 0
+
+    @property
+    def key(self) -> frozenset[tuple[str, Any]]:
+        """What the design sets, as the scenario has it: it is the same for 1 and 1.0."""
+        return frozenset((field, self.scenario.value(field)) for field in self.values)
 
 
 def _by_field(values: Any) -> Any:
@@ -224,16 +228,6 @@ class Study(StudyData):
                     f"allowed: {fleet} at most"
                 )
 
-    def _check_rows(self, rows: Sequence[DesignPoint]) -> None:
-        for row in rows:
-            if both := sorted(self.set.keys() & row.values.keys()):
-                raise InputError(f"design: {both[0]} is also in set; allowed: either")
-        if hasattr(self.design, "ranges"):  # sampled integers may be equal by chance
-            return
-        for shown, count in Counter(_shown(row.values) for row in rows).items():
-            if count > 1:
-                raise InputError(f"design: {shown} is listed twice; allowed: once")
-
     @property
     def command(self) -> list[str]:
         """The command that runs the study, if it was read by ``load_study``."""
@@ -260,9 +254,15 @@ class Study(StudyData):
             InputError: If there are too many points, one is listed twice or has no valid scenario.
                 Studies with at most ``MANY_POINTS`` points raise these errors when they are made.
         """
-        rows = self.design.points if self.design else (DesignPoint({}),)
-        self._check_rows(rows)
-        return tuple(map(self._point, rows))
+        points = tuple(map(self._point, self.design.points if self.design else [DesignPoint({})]))
+        if not hasattr(self.design, "ranges"):  # sampled integers may be equal by chance
+            found = set()
+            for point in points:
+                if point.key in found:
+                    shown = _shown(point.values)
+                    raise InputError(f"design: {shown} is listed twice; allowed: once")
+                found.add(point.key)
+        return points
 
     def point(self, number: int) -> Point:
         """A design point by its number; the other points are not made.
@@ -270,11 +270,11 @@ class Study(StudyData):
         Raises:
             InputError: If its scenario is not valid.
         """
-        row = self.design.point(number) if self.design else DesignPoint({})
-        self._check_rows([row])
-        return self._point(row)
+        return self._point(self.design.point(number) if self.design else DesignPoint({}))
 
     def _point(self, row: DesignPoint) -> Point:
+        if both := sorted(self.set.keys() & row.values.keys()):
+            raise InputError(f"design: {both[0]} is also in set; allowed: either")
         return Point(row.values, self._scenario_at(row.values), row.replication)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:

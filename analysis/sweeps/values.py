@@ -9,7 +9,6 @@ two numbers for ``initial_data``, four for ``zone``, cells for ``nodes``. For a 
 draw at random, such as ``uavs``, a range is written inside a list: ``uavs=[[1, 3]]``.
 """
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,31 +28,24 @@ def values_of(field: str, given: Any) -> tuple[Any, ...]:
         given: A value, or a list, tuple, range or array of values.
 
     Raises:
-        InputError: If there is none, one is listed twice, or there are too many.
+        InputError: If there is none, or there are too many.
     """
     if _is_value(field, given):
         return (_plain(given),)
-    return distinct(field, given)
+    return listed(field, given)
 
 
-def distinct(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
+def listed(field: str, given: Sequence[Any] | np.ndarray) -> tuple[Any, ...]:
     """One or several values of a field, in the types of TOML.
 
     Raises:
-        InputError: If there is none, one is listed twice, or there are too many.
+        InputError: If there is none, or there are too many.
     """
     count = _count(given)
     if not 0 < count <= MAX_SIZE:
         counted = f"{count:,}" if count else "no"
         raise InputError(f"{field}: has {counted} values; allowed: 1 to {MAX_SIZE:,}")
-    values = tuple(_plain(value) for value in given)
-    known = set()
-    for value in values:
-        text = json.dumps(value, default=str)
-        if text in known:
-            raise InputError(f"{field}: {text} is listed twice; allowed: distinct values")
-        known.add(text)
-    return values
+    return tuple(_plain(value) for value in given)
 
 
 def _count(given: Sequence[Any] | np.ndarray) -> int:

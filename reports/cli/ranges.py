@@ -45,7 +45,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     Raises:
         InputError: If the text has another form, or a range is none.
     """
-    from analysis.sweeps.values import distinct
+    from analysis.sweeps import values as sweeps
     from dess.scenario import ScenarioSpace, fields_of
 
     field, equals, values = text.partition("=")
@@ -54,7 +54,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
     if equals and field not in fields:
         raise InputError(f"--set: {field}: unknown key{one_of(field, fields)}")
     if found := _RANGE.fullmatch(values.strip()):
-        return field, distinct(field, _range(field, text, **found.groupdict()))
+        return field, sweeps.listed(field, _range(field, text, **found.groupdict()))
     try:
         listed = setting(f"{field}=[{values}]" if equals else text)[1]
     except InputError:
@@ -63,7 +63,7 @@ def values_of(text: str) -> tuple[str, tuple[Any, ...]]:
             for word in filter(str.isidentifier, unknown):
                 check_words(field, word)
             raise _refused(text, "is not KEY=VALUES", ALLOWED) from None
-    return field, distinct(field, listed)
+    return field, sweeps.listed(field, listed)
 
 
 def _range(field: str, text: str, low: str, high: str, count: str | None) -> Any:

@@ -109,6 +109,12 @@ BAD = {
     "design = {kind = 'grid', values.uavs = []}": ["uavs has no values"],
     "design = {kind = 'grid', values.uavs = 2}": ["values.uavs"],
     "design = {kind = 'grid', values.uavs = [1, 2, 1]}": ["uavs=1 is listed twice"],
+    "design = {kind = 'grid', values.uavs = [[1, 1], 1]}": ["uavs=1 is listed twice"],
+    "design = {kind = 'grid', values.arrival_rate = [1, 1.0]}": ["arrival_rate=1.0 is listed"],
+    "design = {kind = 'one-at-a-time', values.arrival_rate = [0.0, -0.0]}": ["is listed twice"],
+    "design = {kind = 'table', rows = [{quota = 1, uavs = 1}, {uavs = 1, quota = 1}]}": [
+        "uavs=1, quota=1 is listed twice"
+    ],
     "design = {kind = 'grid', values.uavz = [1, 2]}": ["at uavz=1", "uavz: unknown key"],
     "design = {kind = 'cube', values.uavs = [1]}": ["kind: 'cube' is unknown", "grid", "saltelli"],
     "design = {values.uavs = [1]}": ["design", "kind"],

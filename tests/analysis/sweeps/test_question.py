@@ -171,6 +171,7 @@ REFUSED = {
     "uavs: 7 is out of range; allowed: 1..6": {"fields": {"uavs": [2, 7]}},
     "pads: 7 is more than the zone has cells": {"fields": {"pads": 7}},
     "'gredy' is unknown": {"policies": ["gredy"]},
+    "uavs=2 is listed twice; allowed: once": {"fields": {"uavs": [2, 3, 2]}},
     "greedy is listed twice": {"policies": ["greedy", "greedy"]},
     "policies: .. is too short": {"policies": []},
     "missions: 0 is out of range; allowed: an integer 1..": {"missions": 0},
