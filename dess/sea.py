@@ -10,29 +10,58 @@ centre of their bounding box, which becomes the centre of the grid (J. P. Snyder
 working manual, U.S. Geological Survey 1987).
 """
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
-from dess.errors import InputError, shown
-from dess.files.parsing import parse_json
-from dess.files.reading import read_text
+from pydantic import AfterValidator, Field
+
+from dess.errors import InputError
+from dess.files.documents import Document
+from dess.files.rows import LIMIT, rows_in
 
 Cell = tuple[int, int]
 
-MAX_BYTES = 2**20
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
+
+
+GEOGRAPHIC = ("lon", "lat")
+# The pairs of columns, and the largest number of each; cells off the grid are refused later.
+LIMITS = {("x", "y"): {"x": 99_999.0, "y": 99_999.0}, GEOGRAPHIC: {"lon": 180.0, "lat": 90.0}}
+
+_ALLOWED = "a GeoJSON FeatureCollection of points"
+
+
+def _on_earth(position: list[float]) -> list[float]:
+    if len(position) < 2:
+        raise ValueError("has not two numbers; allowed: [lon, lat]")
+    for (name, most), value in zip(LIMITS[GEOGRAPHIC].items(), position, strict=False):
+        if abs(value) > most:
+            raise ValueError(f"{name} is {value:g}; allowed: -{most:g}..{most:g}")
+    return position
+
+
+class _Point(Document, extra="ignore"):
+    type: Literal["Point"]
+    coordinates: Annotated[list[float], AfterValidator(_on_earth)]
+
+
+class _Feature(Document, extra="ignore"):
+    geometry: _Point = Field(description="a Point")
+
+
+class _Collection(Document, extra="ignore"):
+    features: tuple[_Feature, ...] = Field(description=_ALLOWED)
 
 
 class Place(NamedTuple):
     """Where a node is.
 
     Attributes:
-        name: Where the node stands in the file, such as ``line 3``; used in messages.
+        name: Where the node stands in the file, such as ``line 3`` or ``features.2``; used in
+            messages.
         x: Longitude [degrees], or column of the cell.
         y: Latitude [degrees], or row of the cell.
     """
@@ -57,7 +86,7 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
     readers = {".csv": _of_csv, ".geojson": _of_geojson, ".json": _of_geojson}
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: has no known file ending; allowed: {', '.join(readers)}")
-    is_geographic, places = readers[path.suffix.lower()](path, _text(path))
+    is_geographic, places = readers[path.suffix.lower()](path)
     if not 0 < len(places) <= MAX_NODES:
         raise InputError(f"{path}: has {len(places):,} nodes; allowed: 1..{MAX_NODES}")
     cells = _projected(places, grid, cell_size) if is_geographic else _integers(path, places)
@@ -72,76 +101,26 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-def _text(path: Path) -> str:
-    """The content of a regular file that is not too large."""
-    try:
-        return read_text(path, MAX_BYTES, "utf-8-sig")
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; allowed: a file of nodes"
-        ) from None
-
-
-def _of_csv(path: Path, text: str) -> tuple[bool, list[Place]]:
+def _of_csv(path: Path) -> tuple[bool, list[Place]]:
     """Whether the nodes are geographic, and where they are."""
-    try:
-        rows = list(csv.reader(io.StringIO(text), strict=True))
-    except csv.Error as error:
-        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
-    header = [name.strip() for name in rows[0]] if rows else []
-    found = [pair for pair in (("x", "y"), ("lon", "lat")) if {*pair} <= {*header}]
+    columns, rows = rows_in(path)
+    found = [pair for pair in LIMITS if {*pair} <= {*columns}]
     if len(found) != 1:
-        columns = ", ".join(header) or "none"
-        raise InputError(f"{path}: has columns {columns}; allowed: x and y, or lon and lat")
-    pair = [header.index(name) for name in found[0]]
-    places = []
-    for number, row in enumerate(rows[1:], 2):
-        if any(field.strip() for field in row):  # not an empty line
-            values = [row[column].strip() if column < len(row) else "" for column in pair]
-            places.append(_place(path, f"line {number}", found[0], values))
-    is_geographic = found[0] == ("lon", "lat")
-    return is_geographic, [_on_earth(path, p) for p in places] if is_geographic else places
+        there = ", ".join(columns) or "none"
+        raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
+    limits = LIMITS[found[0]]
+    places = [
+        Place(row.line, *(row.number(name, -most, most) for name, most in limits.items()))
+        for row in rows
+    ]
+    return found[0] == GEOGRAPHIC, places
 
 
-def _of_geojson(path: Path, text: str) -> tuple[bool, list[Place]]:
+def _of_geojson(path: Path) -> tuple[bool, list[Place]]:
     """True, because the positions in GeoJSON are geographic, and where the nodes are."""
-    data = parse_json(text, str(path))
-    features = data.get("features") if isinstance(data, dict) else None
-    if not isinstance(features, list):
-        raise InputError(f"{path}: has no list of features; allowed: a GeoJSON FeatureCollection")
-    places = []
-    for number, feature in enumerate(features, 1):
-        name = f"feature {number}"
-        geometry = feature.get("geometry") if isinstance(feature, dict) else None
-        kind = geometry.get("type") if isinstance(geometry, dict) else None
-        if not isinstance(geometry, dict) or kind != "Point":
-            raise InputError(f"{path}: {name} is {kind or 'without geometry'}; allowed: Point")
-        at = geometry.get("coordinates")
-        values = at[:2] if isinstance(at, list) else []
-        places.append(_on_earth(path, _place(path, name, ("lon", "lat"), values)))
-    return True, places
-
-
-def _place(path: Path, name: str, columns: Sequence[str], values: Sequence[Any]) -> Place:
-    """Make a place from the values of two columns, or from two coordinates."""
-    numbers = []
-    for column, value in zip(columns, [*values, None, None], strict=False):
-        try:
-            number = math.nan if isinstance(value, bool) else float(value)
-        except (TypeError, ValueError, OverflowError):
-            number = math.nan
-        if not math.isfinite(number):
-            raise InputError(f"{path}: {name}: {column} is {shown(value)}; allowed: a number")
-        numbers.append(number)
-    return Place(name, *numbers)
-
-
-def _on_earth(path: Path, place: Place) -> Place:
-    for column, value, most in (("lon", place.x, 180), ("lat", place.y, 90)):
-        if abs(value) > most:
-            line = f"{place.name}: {column} is {value:g}; allowed: -{most}..{most} degrees"
-            raise InputError(f"{path}: {line}")
-    return place
+    features = _Collection.load(path, absent=f"allowed: {_ALLOWED}", limit=LIMIT).features
+    positions = [feature.geometry.coordinates[:2] for feature in features]
+    return True, [Place(f"features.{n}", *position) for n, position in enumerate(positions)]
 
 
 def _integers(path: Path, places: Iterable[Place]) -> list[Cell]:

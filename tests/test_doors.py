@@ -119,3 +119,34 @@ def test_a_way_past_the_door_is_seen(source: str) -> None:
 )
 def test_the_door_and_memory_are_no_way_past_it(source: str) -> None:
     assert all(in_memory(call) for _, call in called(ast.parse(source)))
+
+
+# What makes data of text. All JSON that is read becomes a model, in ``Document``; other text is
+# parsed only where this process has made it (``dumps``, ``to_json``).
+PARSING = {"loads", "parse_json", "validate_json", "model_validate_json"}
+MADE_HERE = {"dumps", "to_json"}
+# Text that is parsed outside the door, by the module.
+PARSED = {
+    # The header of a checkpoint, which is a ``Document``, as it was written: for its checksum.
+    "policies.ddqn.checkpoint": {"parse_json"},
+    # Lists and tables that are no objects of JSON, by types of pydantic.
+    "analysis.results.parquet": {"validate_json"},
+    "reports.pages.verify": {"validate_json"},
+    # Keys of a dictionary, which are texts of JSON.
+    "analysis.study.candidates": {"loads"},
+}
+
+
+def parsed(tree: ast.Module) -> Iterator[tuple[str, ast.Call]]:
+    """The calls that make data of text which others may have written."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            inner = {getattr(n, "attr", "") for part in node.args for n in ast.walk(part)}
+            if name in PARSING and not inner & MADE_HERE:
+                yield name, node
+
+
+@pytest.mark.parametrize("name", [name for name in SOURCES if not name.startswith(DOOR)])
+def test_documents_become_models(name: str) -> None:
+    assert {what for what, _ in parsed(SOURCES[name])} == PARSED.get(name, set())

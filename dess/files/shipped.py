@@ -4,6 +4,7 @@ where, values = Shipped("scenario", "dess", "scenarios").load("paper")
 """
 
 from importlib import resources
+from os.path import realpath
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,11 +34,27 @@ class Shipped(NamedTuple):
         files = resources.files(self.package).joinpath(self.folder).iterdir()
         return sorted(file.name[:-5] for file in files if file.name.endswith(".toml"))
 
-    def folder_of(self, name_or_path: str | Path) -> Path:
-        """The folder from which ``load`` would read a file of this name or path."""
+    def beside(self, name_or_path: str | Path, key: str, file: str) -> Path:
+        """The path of a file that a TOML file names, which must lie in the same folder.
+
+        Args:
+            name_or_path: The TOML file, as ``load`` takes it.
+            key: The key that names the file, for the message.
+            file: The name.
+
+        Raises:
+            InputError: If it is no name, or that of a link that leads out of the folder.
+        """
+        folder = Path(name_or_path).parent
         if str(name_or_path) in self.names():
-            return Path(str(resources.files(self.package).joinpath(self.folder)))
-        return Path(name_or_path).parent
+            folder = Path(str(resources.files(self.package).joinpath(self.folder)))
+        is_name = Path(file).name == file and file not in ("", "..") and "\0" not in file
+        if not is_name or Path(realpath(folder / file)).parent != Path(realpath(folder)):
+            raise InputError(
+                f"{name_or_path}: {key}: {shown(file)} is not in the same folder; allowed: the "
+                "name of a file beside this one"
+            )
+        return folder / file
 
     def load(self, name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
         """Read a shipped file by its name, or any TOML file by its path.

@@ -31,10 +31,11 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     table = read.get("arrivals")
     schedule = table.get("schedule") if isinstance(table, dict) else None
     if isinstance(schedule, str) and not {"arrivals", "arrivals.schedule"} & {*overrides}:
-        values["arrivals"]["schedule"] = schedule_in(_SCENARIOS.folder_of(name_or_path) / schedule)
+        path = _SCENARIOS.beside(name_or_path, "arrivals.schedule", schedule)
+        values["arrivals"]["schedule"] = schedule_in(path)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
         without = validated(ScenarioSpace, values | {"nodes": [[0, 0]], "arrivals": {}}, where)
-        path = _SCENARIOS.folder_of(name_or_path) / read["nodes"]
+        path = _SCENARIOS.beside(name_or_path, "nodes", read["nodes"])
         values["nodes"] = nodes_in(path, without.grid, without.cell_size)
     return validated(ScenarioSpace, values, where)
 

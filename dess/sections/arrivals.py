@@ -7,8 +7,6 @@ at its time has. Candidate number c of a node is a draw of its own, so arrivals 
 the policy nor on those of other nodes.
 """
 
-import csv
-import io
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -19,14 +17,16 @@ from pydantic import Field, model_validator
 
 from dess import streams
 from dess.code.kernels import kernel
-from dess.errors import InputError, shown
-from dess.files.reading import read_text
+from dess.errors import InputError
+from dess.files.rows import rows_in
 from dess.sections.section import Integer, Number, Section
 
-Rate = Annotated[Number, Field(ge=0, le=100)]
-Time = Annotated[Number, Field(ge=0, le=1_000_000)]
+# The highest rate or factor, the last slot and the largest number of a schedule.
+MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
 
-_MOST_BYTES = 2**20
+Rate = Annotated[Number, Field(ge=0, le=MOST)]
+Time = Annotated[Number, Field(ge=0, le=LAST)]
+
 MOST_CANDIDATES = 2**20  # that one call of compiled code draws
 _COLUMNS = ("slot", "factor")
 
@@ -56,7 +56,7 @@ class Arrivals(Section):
     )
     schedule: tuple[tuple[Time, Rate], ...] = Field(
         (),
-        max_length=10_000,
+        max_length=MOST_ROWS,
         description="factors of the rates over time: a list of [slot, factor], the factor 0..100 "
         "from this slot on and 1 before the first; or in a TOML file the name of a CSV file with "
         "the columns slot and factor",
@@ -88,29 +88,20 @@ def schedule_in(path: Path) -> tuple[tuple[float, float], ...]:
     """The schedule in a CSV file: a header line with ``slot`` and ``factor``, then numbers.
 
     Raises:
-        InputError: If the file cannot be read, or has other columns or no numbers.
+        InputError: If the file cannot be read, or has other columns, or rows that are no schedule.
     """
-    try:
-        rows = csv.DictReader(io.StringIO(read_text(path, _MOST_BYTES, "utf-8-sig")), strict=True)
-        if not {*_COLUMNS} <= {*(rows.fieldnames or ())}:
-            columns = ", ".join(rows.fieldnames or ()) or "none"
-            raise InputError(f"{path}: has columns {columns}; allowed: {' and '.join(_COLUMNS)}")
-        return tuple((_number(path, n, r, "slot"), _number(path, n, r, "factor"))
-                     for n, r in enumerate(rows, 2))  # fmt: skip
-    except csv.Error as error:
-        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot be read: {error.strerror}; allowed: a file of slots and factors"
-        ) from None
-
-
-def _number(path: Path, line: int, row: dict[str, str | None], column: str) -> float:
-    try:
-        return float(row[column] or "")
-    except ValueError:
-        value = shown(row[column])
-        raise InputError(f"{path}: line {line}: {column} is {value}; allowed: a number") from None
+    columns, rows = rows_in(path)
+    if not {*_COLUMNS} <= {*columns}:
+        there = ", ".join(columns) or "none"
+        raise InputError(f"{path}: has columns {there}; allowed: {' and '.join(_COLUMNS)}")
+    if len(rows) > MOST_ROWS:
+        raise InputError(f"{path}: has {len(rows):,} rows; allowed: {MOST_ROWS:,} at most")
+    schedule = [(row.number("slot", 0, LAST), row.number("factor", 0, MOST)) for row in rows]
+    for row, (earlier, later) in zip(rows[1:], pairwise(schedule), strict=True):
+        if later[0] <= earlier[0]:
+            line = f"slot {later[0]:g} comes after slot {earlier[0]:g}"
+            raise InputError(f"{path}: {row.line}: {line}; allowed: growing slots")
+    return tuple(schedule)
 
 
 def sources_of(arrivals: Arrivals, arrival_rate: float, nodes: int) -> np.ndarray:

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from dess import InputError, load_scenario, sea
+from dess import InputError, load_scenario
+from dess.files import rows
 from dess.sea import EARTH_RADIUS, nodes_in
 
 METRES_PER_DEGREE = EARTH_RADIUS * math.pi / 180  # of latitude: 111,195 m
@@ -104,14 +105,14 @@ TABLES = {
     "x,y\n": "has 0 nodes; allowed: 1..1024",
     "x,y\n1,two\n": "line 2: y is 'two'; allowed: a number",
     "x,y\n1,1\n\n2\n": "line 4: y is ''; allowed: a number",
-    "x,y\nnan,1\n": "line 2: x is 'nan'; allowed: a number",
+    "x,y\nnan,1\n": "line 2: x is nan; allowed: -99,999..99,999",
     "x,y\n1.5,1\n": "line 2: x is 1.5; allowed: an integer",
     "x,y\n1,-1\n": r"line 2 is off the grid of 8 x 8 cells, at \[1, -1\]; allowed: 0 <= x, y$",
     "x,y\n1,1\n3,11\n": r"line 3 is off .* at \[3, 11\]; allowed: grid = 12 or more$",
     "x,y\n1,999\n": "allowed: 0 <= x, y < 256",
     "x,y\n1,1\n2,2\n1,1\n": r"line 2 and line 4 lie in one cell, \[1, 1\]; allowed: distinct",
-    "lon,lat\n181,54\n": "line 2: lon is 181; allowed: -180..180 degrees",
-    "lon,lat\n54,91\n": "line 2: lat is 91; allowed: -90..90 degrees",
+    "lon,lat\n181,54\n": "line 2: lon is 181; allowed: -180..180",
+    "lon,lat\n54,91\n": "line 2: lat is 91; allowed: -90..90",
     "lon,lat\n8,54\n8.02,54.02\n8.00001,54.00001\n": "line 2 and line 4 lie.*cell_size below 800 m",
     # 0.09 degrees are 10,008 m, 12.5 cells: 6.25 to both sides of the middle, at 4.
     "lon,lat\n0,0\n0,0.09\n": r"line 2 is off .* at \[4, 10\]; allowed: grid = 14 or more, or a l",
@@ -133,13 +134,16 @@ def test_the_grid_that_is_named_would_do(tmp_path: Path) -> None:
 
 
 FEATURES: dict[str, Any] = {
-    "has no list of features": {"type": "Point", "coordinates": [8, 54]},
-    "feature 1 is LineString; allowed: Point": {
-        "features": [{"geometry": {"type": "LineString", "coordinates": [[8, 54], [9, 54]]}}]
+    "features: is missing; allowed: a list": {"type": "Point", "coordinates": [8, 54]},
+    "features.0.geometry.type: 'LineString' is unknown; allowed: Point": {
+        "features": [{"geometry": {"type": "LineString", "coordinates": [8, 54]}}]
     },
-    "feature 2 is without geometry": {"features": [_point(8, 54), {"geometry": None}]},
-    "feature 1: lat is None; allowed: a number": {"features": [_point(8)]},
-    "feature 1: lon is True; allowed: a number": {"features": [_point(True, 54)]},
+    "features.1.geometry: ": {"features": [_point(8, 54), {"geometry": None}]},
+    "features.1: ": {"features": [_point(8, 54), None]},
+    "features.0.geometry.coordinates: has not two numbers; allowed: ": {"features": [_point(8)]},
+    "features.0.geometry.coordinates.0: ": {"features": [_point(True, 54)]},
+    "features.0.geometry.coordinates: lat is 91; allowed: -90..90": {"features": [_point(8, 91)]},
+    "features.0 and features.1 lie in one cell": {"features": [_point(8, 54), _point(8, 54)]},
     "has 0 nodes": {"features": []},
 }
 
@@ -157,7 +161,8 @@ def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         with pytest.raises(InputError, match=line):
             nodes_in(tmp_path / name, 8, 800.0)
 
-    refuse("nowhere.csv", "nowhere.csv: cannot be read: No such file")
+    refuse("nowhere.csv", "nowhere.csv: no such file; allowed: a CSV file")
+    refuse("nowhere.json", "nowhere.json: no such file; allowed: a GeoJSON")
     refuse("buoys.xlsx", "buoys.xlsx: has no known file ending; allowed: .csv, .geojson, .json")
     (tmp_path / "folder.csv").mkdir()
     refuse("folder.csv", "folder.csv: cannot be read: it is a folder")
@@ -168,8 +173,37 @@ def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     (tmp_path / "no.json").write_text("{")
     refuse("no.json", "no.json: not valid JSON")
     _csv(tmp_path, "x,y\n1,1\n")
-    monkeypatch.setattr(sea, "MAX_BYTES", 7)
+    monkeypatch.setattr(rows, "LIMIT", 7)
     refuse("buoys.csv", "buoys.csv: is too large; allowed: 7 bytes at most")
+
+
+@pytest.mark.parametrize("key", ["nodes", "arrivals.schedule"])
+@pytest.mark.parametrize(
+    "name", ["../secret.csv", "{}/secret.csv", "in/../../secret.csv", "link.csv", "deep.csv"]
+    + ["in/own.csv", "", "..", ".", "a\0b", "/etc/passwd", "/etc/shadow", "loop/secret.csv"],
+)  # fmt: skip
+def test_a_table_lies_in_the_folder_of_its_scenario(name: str, key: str, tmp_path: Path) -> None:
+    """What a stranger's scenario names is neither read nor shown, be it by a link."""
+    secret, folder = tmp_path / "secret.csv", tmp_path / "sea"
+    secret.write_text("password\n")
+    (folder / "in").mkdir(parents=True)
+    (folder / "in" / "own.csv").write_text("password\n")
+    (folder / "link.csv").symlink_to(secret)
+    (folder / "deep.csv").symlink_to("in/own.csv")
+    (folder / "loop").symlink_to("loop")
+    path, named = folder / "sea.toml", json.dumps(name.format(tmp_path))
+    path.write_text(f"{key} = {named}\n")
+    with pytest.raises(InputError, match=f"^{path}: {key}: .*allowed: the name of a file") as error:
+        load_scenario(path)
+    assert "password" not in str(error.value)
+
+
+def test_a_link_within_the_folder_is_followed(tmp_path: Path) -> None:
+    _csv(tmp_path, "x,y\n5,6\n")
+    (tmp_path / "nodes.csv").symlink_to("buoys.csv")
+    path = tmp_path / "sea.toml"
+    path.write_text('nodes = "nodes.csv"\n')
+    assert load_scenario(path).nodes == ((5, 6),)
 
 
 def test_the_shipped_bay_has_its_nodes_beside_it() -> None:

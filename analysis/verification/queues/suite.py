@@ -10,9 +10,10 @@ their own, of so many customers that the first ones do not matter.
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from pydantic import Field
 from scipy import stats
 
 from analysis.numbers import decimals
@@ -41,7 +42,7 @@ _THINNED = "Thinned arrivals"
 
 AGES = 3  # of the visits at fixed gaps: mean, peak and 99th percentile
 
-Measured = dict[str, list[float]]
+Measured = dict[str, list[Annotated[float, Field(ge=0, le=1e9)]]]
 
 
 class System(NamedTuple):

@@ -124,13 +124,15 @@ def test_rates_and_a_schedule_beside_nodes_from_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "cannot be read"),
+        (None, "storm.csv: no such file; allowed: a CSV file"),
         ("", "has columns none; allowed: slot and factor"),
         ("slot,rate\n1,2\n", "has columns slot, rate; allowed: slot and factor"),
         ("slot,factor\n1,2\n2,much\n", "line 3: factor is 'much'; allowed: a number"),
-        ("slot,factor\n1\n", "line 2: factor is None; allowed: a number"),
-        ("slot,factor\n1,-2\n", r"schedule.0.1: -2.0 is out of range"),
-        ("slot,factor\n5,1\n4,1\n", "slot 4 comes after slot 5"),
+        ("slot,factor\n1\n", "storm.csv: line 2: factor is ''; allowed: a number"),
+        ("slot,factor\n1,-2\n", "storm.csv: line 2: factor is -2; allowed: 0..100"),
+        ("slot,factor\n1,2\n\nnan,2\n", "storm.csv: line 4: slot is nan; allowed: 0..1"),
+        ("slot,factor\n5,1\n\n4,1\n", "storm.csv: line 4: slot 4 comes after slot 5; allowed"),
+        ("slot,factor\n" + "1,1\n" * 10_001, "storm.csv: has 10,001 rows; allowed: 10,000 at"),
     ],
 )
 def test_a_file_without_a_schedule_is_refused(
