@@ -15,6 +15,7 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
+from dess.code.portable import log10
 from dess.scenario import ScenarioSpace
 from dess.sections import fleet
 from dess.state import STEP_X, STEP_Y
@@ -104,7 +105,7 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     horizontal = scenario.cell_size * np.hypot(coarse, fine)
     distance = np.hypot(horizontal, scenario.altitude)
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
-    mean_snr = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
+    mean_snr = scenario.edge_snr - 10 * scenario.path_loss_exponent * log10(distance / edge)
     nodes = np.array(scenario.nodes, np.int64)
     steps = 5 * grid * grid * fleet.legs(scenario.fleet)
     # The operating system allocates memory page by page as the rows are filled.

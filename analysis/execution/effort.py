@@ -32,6 +32,10 @@ TRIAL_SEED = 400_000_000
 LONG_RUN, FEW = 3600.0, 10_000
 ORDINARY = 3 * 500  # UAVs times mission slots of the missions that FEW counts
 
+# In the SimPy engine: the time of an event [s], with its share of the decisions, and the memory of
+# a packet [bytes], with its share of the event log.
+EVENT, PACKET_MEMORY = 5e-5, 400
+
 CONFIRMED = "--yes, or less"  # in Python: yes=True
 
 
@@ -47,7 +51,7 @@ def check_workers(workers: int) -> None:
 
 def are_few(missions: int, space: ScenarioSpace) -> bool:
     """Whether missions are so few and so short that no estimate of their time is needed."""
-    longer = space.uavs[1] * space.max_slots / ORDINARY
+    longer = (space.uavs[1] * space.max_slots + space.packets) / ORDINARY
     return missions * max(longer, 1.0) <= FEW
 
 
@@ -94,6 +98,34 @@ def check_time(what: str, seconds: float, allowed: str = CONFIRMED) -> None:
         raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {allowed}")
 
 
+def check_missions(what: str, spaces: Sequence[ScenarioSpace], earlier: float = 0.0) -> float:
+    """Refuse missions of the SimPy engine that may take too much, before the first is simulated.
+
+    Args:
+        what: What needs the missions, for the message.
+        spaces: Their scenarios.
+        earlier: The time of what is done before [s].
+
+    Returns:
+        The longest time of all [s].
+
+    Raises:
+        InputError: If they may take more than ``LONG_RUN``, or one more memory than is available.
+    """
+    seconds = earlier + sum(map(_longest, spaces))
+    check_time(f"{what}: {len(spaces)} missions to simulate", seconds)
+    for space in spaces:
+        check_memory(f"{what}: a mission", mission_memory(space), CONFIRMED)
+    return seconds
+
+
+def _longest(space: ScenarioSpace) -> float:
+    """The longest time that the SimPy engine takes for a mission [s]."""
+    arrivals = len(space.nodes) * space.arrival_rate * space.max_slots
+    in_slots = space.max_slots * space.uavs[1] * space.communication_slots
+    return (in_slots + max(arrivals, space.packets)) * EVENT
+
+
 def check_workers_memory(
     what: str,
     workers: int,
@@ -113,11 +145,13 @@ def check_workers_memory(
     Raises:
         InputError: If they do.
     """
-    each = max(map(channel_memory, spaces)) + (WORKER_MEMORY if are_processes else 0)
+    each = max(map(mission_memory, spaces)) + (WORKER_MEMORY if are_processes else 0)
     check_memory(what, workers * each + more, CONFIRMED)
 
 
-def channel_memory(space: ScenarioSpace) -> int:
-    """The memory [bytes] of the tables of ``dess.channel.World``, if all rows are filled."""
+def mission_memory(space: ScenarioSpace) -> float:
+    """The memory [bytes] of the packets, and the tables of ``dess.channel.World``, all filled."""
     nodes = len(space.nodes)
-    return 5 * space.grid**2 * (8 * nodes * space.communication_slots + 2 * (nodes + 1))
+    return PACKET_MEMORY * space.packets + 5 * space.grid**2 * (
+        8 * nodes * space.communication_slots + 2 * (nodes + 1)
+    )

@@ -6,15 +6,14 @@ its job is run again; a job that kills its worker every time also has a ``Proble
 
 import os
 import signal
-import time
 import warnings
 from abc import abstractmethod
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from threading import Thread
 from typing import Any
 
 from analysis.execution.jobs import Job, Problem, Progress, attempt
+from analysis.execution.orphans import live_and_die_with
 from analysis.results.chunks import Part
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
@@ -90,7 +89,7 @@ class Here(Pool):
             self.workers,
             return_as="generator_unordered",
             batch_size=1,
-            initializer=_live_and_die_with,
+            initializer=live_and_die_with,
             initargs=(os.getpid(),),
         )
 
@@ -186,15 +185,3 @@ def _compile(jobs: Sequence[Job]) -> None:
 
 def _numbered(number: int, job: Job) -> tuple[int, Any]:
     return number, attempt(job)
-
-
-def _live_and_die_with(parent: int) -> None:
-    """Ignore interrupts, which the parent process handles, and end when the parent is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1)
-        os._exit(1)
-
-    Thread(target=watch, daemon=True).start()

@@ -7,6 +7,7 @@ slots to the east is worth, and not once for every node.
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.code.portable import exp
 from dess.observations.states import CompactStates, Layout, X, Y
 from dess.observations.vector import DATA_UNIT, SCALES, Vector, nearest_teammates, spare_slots
 
@@ -27,9 +28,9 @@ class Nodes:
         self.layout, self._vector = layout, Vector(layout)
         self.shapes = (*self._vector.shapes, (len(layout.nodes), NODE))
         slots = np.arange(2 * layout.grid + 2)
-        self._nearness = np.exp(-slots / SCALES[:, None])
+        self._nearness = exp(-slots / SCALES[:, None])
         between = np.abs(layout.nodes[:, None] - layout.nodes[None]).sum(2)
-        self._around = np.stack([np.exp(-between / 6.0) / 25.0, np.exp(-between / 12.0) / 80.0])
+        self._around = np.stack([exp(-between / 6.0) / 25.0, exp(-between / 12.0) / 80.0])
         self._home = layout.zone_slots(layout.nodes)
 
     def encode(

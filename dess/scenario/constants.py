@@ -172,6 +172,15 @@ class Constants(BaseModel):
         """Whether only the SimPy engine can simulate the scenario."""
         return self.arrivals.process != "slotted"
 
+    @property
+    def packets(self) -> float:
+        """The packets of a mission with continuous arrivals at their highest rate; otherwise 0."""
+        if not self.needs_events:
+            return 0.0
+        rates = self.arrivals.rates or [self.arrival_rate] * len(self.nodes)
+        highest = max([1.0, *(factor for _, factor in self.arrivals.schedule)])
+        return sum(rates) * highest * self.max_slots
+
     def value(self, field: str) -> Any:
         """The value of a field; ``failures.uav_rate`` is the field of a section."""
         section, _, name = field.rpartition(".")

@@ -11,6 +11,10 @@ SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
 # Largest amount of initial data of a node [data units].
 MOST_DATA = 10**9
 
+# Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70
+# bytes each, and less than a second of compiled code to draw them all.
+MOST_PACKETS = 2_000_000
+
 # Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
 _CHANNEL_LIMIT = 2**30
 
@@ -73,6 +77,11 @@ def _check_counts(constants: Constants) -> None:
         raise ValueError(
             f"arrivals.rates: there are {len(constants.arrivals.rates)} rates for "
             f"{len(constants.nodes)} nodes; allowed: a rate per node"
+        )
+    if constants.packets > MOST_PACKETS:
+        raise ValueError(
+            f"arrivals: {constants.packets:,.0f} packets at the highest rate; allowed: "
+            f"{MOST_PACKETS:,} at most (rates of all nodes * highest factor * max_slots)"
         )
     pads, cells = constants.pads, constants.zone_cells
     if pads is not None and pads > cells:

@@ -23,14 +23,14 @@ from policies.heuristics import step_towards
 from policies.planner.fluid import CRAFT, fly
 from policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
 from policies.planner.rates import rates_of
-from policies.planner.search import empty_workspace, improve
+from policies.planner.search import TRIED, empty_workspace, improve
 
 # The temperature of the first step of a search [data units]: for a new plan, for a thorough search,
 # and for a short one. Every so many slots, a search is thorough.
 _NEW, _THOROUGH, _SHORT = 2.0, 1.0, 0.3
 _ROUND = 8
-# Rows that are decided together. Ctrl-C waits until they are.
-_ROWS = 4
+# Edits that are tried in one call of compiled code. Ctrl-C waits until they are.
+_EDITS = 1_000
 
 
 class Budget(NamedTuple):
@@ -86,12 +86,11 @@ class Planner:
         rates, safe = rates_of(view), guard(view)
         memory = memory_of(state, self.budget)
         workspace = empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1])
-        actions = np.empty(len(view), np.int64)
-        for start in range(0, len(view), _ROWS):
-            rows = slice(start, start + _ROWS)
-            actions[rows] = _decide(
+        actions, decided = np.empty(len(view), np.int64), 0
+        while decided < len(view):
+            decided = _decide(
                 state.missions, state.uavs, state.residual, view.world.nodes, rates,
-                memory, workspace, view.mission[rows], view.uav[rows], safe[rows], self.budget,
+                memory, workspace, view.mission, view.uav, safe, self.budget, actions, decided,
             )  # fmt: skip
         return actions
 
@@ -122,10 +121,13 @@ def memory_of(state: State, budget: Budget) -> Memory:
 @kernel
 def _decide(
     missions, uavs, residual, nodes, rates, memory, workspace,
-    rows_mission, rows_uav, safe, budget,
+    rows_mission, rows_uav, safe, budget, actions, decided,
 ):  # fmt: skip
-    actions = np.empty(len(rows_mission), np.int64)
-    for row in range(len(rows_mission)):
+    """Choose the actions of rows; return how many are decided once enough edits were tried."""
+    most = _EDITS
+    for row in range(decided, len(rows_mission)):
+        if most <= 0:
+            return row
         b, i = rows_mission[row], rows_uav[row]
         mission, team, made = missions[b], uavs[b], memory.made[b]
         plan = Plan(memory.waypoints[b], memory.lengths[b])
@@ -137,10 +139,15 @@ def _decide(
                 steps, hottest = budget.short, _SHORT
                 if mission.slot % _ROUND == 0:
                     steps, hottest = budget.thorough, _THOROUGH
+            if workspace.course[TRIED] == 0 and hottest != _NEW:
                 _take_up(mission, team, plan, memory.first[b])
-            else:
+            elif workspace.course[TRIED] == 0:
                 _start(mission, team, residual[b].sum(), plan)
-            improve(mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest)
+            most -= improve(
+                mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest, most
+            )
+            if workspace.course[TRIED] > 0:
+                return row
             ahead = workspace.ahead
             fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
             for j in range(mission.uavs):
@@ -157,7 +164,7 @@ def _decide(
                 x, y = plan.waypoints[i, number].x, plan.waypoints[i, number].y
             action = step_towards(mission, team, i, safe[row], x, y)
         actions[row] = action
-    return actions
+    return len(rows_mission)
 
 
 @inlined

@@ -1,6 +1,7 @@
 """The search for a plan: simulated annealing over the waypoints of the whole team.
 
-    value = improve(mission, uavs, residual, nodes, rates, plan, workspace, 20_000, 2.0)
+    improve(mission, uavs, residual, nodes, rates, plan, workspace, 20_000, 2.0, 20_000)
+    value = workspace.course[BEST]
 
 Each step edits the plan, flies it in the fluid model from the first slot that the edit can change,
 and keeps the edit or takes it back (S. Kirkpatrick, C. Gelatt, M. Vecchi, *Optimization by
@@ -47,6 +48,9 @@ _SHORTEST = 30_000
 # The most waypoints that are moved together.
 _MOST_MOVED = 3
 _NO_EDIT = -1
+# Workspace.course: the edits tried so far, the values of the present and the best plan, and the
+# temperature. The first is 0 between two searches.
+TRIED, VALUE, BEST, HEAT = range(4)
 _LOW = np.uint64(0xFFFF)
 _HIGH = np.uint64(16)
 
@@ -57,24 +61,28 @@ class Workspace(NamedTuple):
     Attributes:
         present, trial: The plan that the search has come to, and an edit of it.
         flight, ahead: Their flights; ``ahead`` is written from the first slot that differs on.
+        course: How far the search has come.
     """
 
     present: Plan
     trial: Plan
     flight: Flight
     ahead: Flight
+    course: np.ndarray
 
 
 def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
     """Working memory for missions of at most that many slots, UAVs and nodes."""
     slots = min(slots, MOST_SLOTS)
-    flights = (empty_flight(slots, uavs, nodes) for _ in range(2))
-    return Workspace(empty_plan(uavs), empty_plan(uavs), *flights)
+    flight, ahead = (empty_flight(slots, uavs, nodes) for _ in range(2))
+    return Workspace(empty_plan(uavs), empty_plan(uavs), flight, ahead, np.zeros(4))
 
 
 @kernel
-def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hottest):
-    """Improve a plan in place, and return its value in the fluid model; it is never worse.
+def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hottest, most):
+    """Improve a plan in place; its value in the fluid model is never worse.
+
+    A long search takes several calls, so that a signal can end it in between.
 
     Args:
         mission: ``MISSION`` record.
@@ -84,19 +92,26 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         rates: ``Rates``.
         plan: ``Plan``, changed.
         workspace: ``Workspace``, overwritten.
-        steps: Number of edits to try.
+        steps: Number of edits to try in the whole search.
         hottest: The temperature of the first step [data units].
+        most: The largest number of edits to try in this call.
+
+    Returns:
+        The number of edits that were tried in this call. ``workspace.course[TRIED]`` is 0 if the
+        search has ended.
     """
-    present, trial, flight, ahead = workspace
-    slots = min(mission.max_slots - mission.slot, MOST_SLOTS)
-    begin(mission, uavs, residual, rates, flight)
-    value = fly(mission, rates, plan, flight, 0, flight, slots)
-    best = value
-    copy_plan(mission, plan, present)
-    copy_plan(mission, plan, trial)
+    present, trial, flight, ahead, course = workspace
+    slots, first = min(mission.max_slots - mission.slot, MOST_SLOTS), int(course[TRIED])
+    if first == 0:
+        begin(mission, uavs, residual, rates, flight)
+        course[VALUE] = course[BEST] = fly(mission, rates, plan, flight, 0, flight, slots)
+        course[HEAT] = hottest
+        copy_plan(mission, plan, present)
+        copy_plan(mission, plan, trial)
+    value, best, heat = course[VALUE], course[BEST], course[HEAT]
     words = np.empty(4, np.uint64)
-    heat, cooling = hottest, (_COLDEST / hottest) ** (1.0 / max(steps, 1))
-    for step in range(steps):
+    cooling, last = (_COLDEST / hottest) ** (1.0 / max(steps, 1)), min(first + most, steps)
+    for step in range(first, last):
         heat *= cooling
         words[0], words[1], words[2], words[3] = streams.block(
             mission.seed, mission.replication, streams.PLAN, 0, mission.slot, step
@@ -120,7 +135,9 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
                 copy_plan(mission, present, plan)
         else:
             copy_plan(mission, present, trial)
-    return best
+    course[TRIED] = last if last < steps else 0
+    course[VALUE], course[BEST], course[HEAT] = value, best, heat
+    return last - first
 
 
 @kernel

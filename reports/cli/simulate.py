@@ -11,6 +11,7 @@ import typer
 
 from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
+from reports.cli.running import YesOption
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 
 if TYPE_CHECKING:
@@ -87,9 +88,11 @@ def simulate(
             "with its player.",
         ),
     ] = None,
+    yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Simulate one mission with the SimPy model."""
+    from analysis.execution.effort import check_missions
     from dess import simulate
     from dess.files import writable
     from dess.state import check_seed, sample_scenario
@@ -103,6 +106,8 @@ def simulate(
     else:
         space = load_space(scenario, settings)
         asked = _Asked(space, TypedByUser(policy or "greedy"), seed, replication or 0, scenario)
+    if not yes:
+        check_missions("simulate", [asked.space])
     team = load_team(asked.policy, asked.space.uavs[1] if of else None)
     check_seed(asked.seed, asked.replication)
     _check_suffix("--figure", figure, FIGURES, "a picture")

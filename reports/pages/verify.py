@@ -18,7 +18,7 @@ import pyarrow as pa
 from pydantic import TypeAdapter, ValidationError
 
 from analysis.bound import upper_bound
-from analysis.execution.effort import CONFIRMED, channel_memory, check_time
+from analysis.execution.effort import check_missions
 from analysis.results import commands
 from analysis.results.evidence import Evidence, Mission, chosen, learned_files
 from analysis.results.files import MANIFEST
@@ -27,7 +27,6 @@ from analysis.results.resimulate import difference
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
-from dess.code.memory import check_memory
 from dess.files import paths_in, read_text
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
@@ -36,7 +35,6 @@ from reports.pages.html import FILES, STUDY, embedded
 
 LIMIT = 64 * 2**20  # bytes of the largest page
 BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each takes seconds
-EVENT = 5e-5  # the time of an event in the SimPy engine [s], with its share of the decisions
 
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
@@ -88,17 +86,8 @@ class _Sampling:
         Raises:
             InputError: If all missions may take more than an hour, or one takes too much memory.
         """
-        self.seconds += sum(map(_longest, spaces))
         if not self.yes:
-            check_time(f"{what}: {len(spaces)} missions to simulate", self.seconds)
-            for space in spaces:
-                check_memory(f"{what}: a mission", channel_memory(space), CONFIRMED)
-
-
-def _longest(space: ScenarioSpace) -> float:
-    """The longest time that the SimPy engine takes for a mission [s]."""
-    in_slot = space.uavs[1] * space.communication_slots + len(space.nodes) * space.arrival_rate
-    return space.max_slots * in_slot * EVENT
+            self.seconds = check_missions(what, spaces, self.seconds)
 
 
 def sealed(html: str) -> str:

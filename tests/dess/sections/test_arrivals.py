@@ -72,7 +72,7 @@ def test_a_schedule_that_ends_at_zero_ends_the_arrivals() -> None:
 def test_long_thinning_is_cut_into_calls(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled code cannot be interrupted, so no call of it draws very many candidates."""
     space = ScenarioSpace.of(
-        _space(schedule=[[0, 0], [29_999, 100]]), arrival_rate=2.0, max_slots=30_000
+        _space(schedule=[[0, 0], [29_999, 100]]), arrival_rate=0.5, max_slots=30_000
     )
     calls, draw = [], arrivals._draw
 
@@ -84,9 +84,9 @@ def test_long_thinning_is_cut_into_calls(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(arrivals, "_draw", counted)
     times = arrivals_of(space, 3)
-    assert sum(calls) == pytest.approx(30_000 * 200, rel=0.01)
+    assert sum(calls) == pytest.approx(30_000 * 50, rel=0.01)
     assert max(calls) == calls[0] == arrivals.MOST_CANDIDATES
-    assert len(times) > 100
+    assert len(times) > 25
     assert times[0] >= 29_999
 
 

@@ -9,7 +9,7 @@ from dess.view import View, acting_rows
 from policies.planner.fluid import MOST_SLOTS, begin, empty_flight, fly
 from policies.planner.plan import CHARGE, NEVER, Plan, empty_plan, insert
 from policies.planner.rates import rates_of
-from policies.planner.search import empty_workspace, improve
+from policies.planner.search import BEST, TRIED, empty_workspace, improve
 
 CALM = {"shadowing_variance": 0.0, "arrival_rate": 0.0}
 
@@ -61,12 +61,16 @@ def _flown(view: View, plan: Plan, slots: int) -> tuple[list[np.ndarray], float,
     return crafts, value, float(residual.sum() - flight.sea["base"][flight.last[0]].sum())
 
 
-def _improved(view: View, plan: Plan, steps: int) -> float:
+def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
     state = view.state
     (mission,), uavs, residual = state.missions, state.uavs[0], state.residual[0]
     workspace = empty_workspace(int(mission["max_slots"]), len(uavs), len(residual))
     nodes, rates = view.world.nodes, rates_of(view)
-    return improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, 1.0)
+    arguments = mission, uavs, residual, nodes, rates, plan, workspace, steps, 1.0
+    improve(*arguments, most)
+    while workspace.course[TRIED]:
+        improve(*arguments, most)
+    return workspace.course[BEST]
 
 
 @pytest.mark.parametrize("uavs", [1, 2, 3, 6])
@@ -103,6 +107,15 @@ def test_more_search_is_never_worse(replication: int) -> None:
         values.append(_improved(view, plan, steps))
         assert values[-1] == _flown(view, plan, 400)[1]
     assert values == sorted(values) and values[-1] > values[0] + 100
+
+
+def test_a_search_in_pieces_is_the_whole_search() -> None:
+    view, found = _view(load_scenario("paper"), 777001, 1), []
+    for most in (10_000, 700, 333):
+        plan = empty_plan(view.state.uavs.shape[1])
+        value = _improved(view, plan, 1000, most)
+        found.append((value, plan.waypoints.tobytes(), plan.lengths.tobytes()))
+    assert found[0] == found[1] == found[2]
 
 
 def test_a_resumed_flight_is_the_whole_flight() -> None:
