@@ -27,7 +27,6 @@ MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
 Rate = Annotated[Number, Field(ge=0, le=MOST)]
 Time = Annotated[Number, Field(ge=0, le=LAST)]
 
-MOST_CANDIDATES = 2**20  # that one call of compiled code draws
 _COLUMNS = ("slot", "factor")
 
 # The Poisson process of one node.
@@ -117,6 +116,7 @@ def factors_of(arrivals: Arrivals) -> tuple[np.ndarray, np.ndarray]:
     return starts, factors
 
 
+@kernel
 def draw_arrival(missions, sources, starts, factors, k):
     """Draw the next arrival at node ``k``; its time is infinite if the mission ends before it.
 
@@ -126,18 +126,9 @@ def draw_arrival(missions, sources, starts, factors, k):
         starts, factors: As from ``factors_of``.
         k: Index of the node.
     """
-    while not _draw(missions, sources, starts, factors, k):
-        pass  # between two calls, a signal can end it
-
-
-@kernel
-def _draw(missions, sources, starts, factors, k):
-    """Draw up to ``MOST_CANDIDATES`` candidates; return whether the next arrival was among them."""
     mission, source = missions[0], sources[k]
     highest = factors.max()
-    for _ in range(MOST_CANDIDATES):
-        if source.time == math.inf:
-            return True
+    while source.time < math.inf:
         words = streams.block(
             mission.seed, mission.replication, streams.ARRIVAL_TIME, 0, k, source.candidate
         )
@@ -145,8 +136,7 @@ def _draw(missions, sources, starts, factors, k):
         source.time -= math.log(streams.uniform(words[0])) / (source.rate * highest)
         if not source.time < mission.max_slots:
             source.time = math.inf
-            return True
+            return
         factor = factors[np.searchsorted(starts, source.time, side="right") - 1]
         if streams.uniform(words[1]) * highest < factor:
-            return True
-    return False
+            return

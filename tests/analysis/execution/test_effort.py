@@ -91,9 +91,7 @@ def test_packets_count(monkeypatch):
     assert busy.packets == 25 * 40 * 500 and PAPER.packets == 0
     assert mission_memory(busy) > mission_memory(PAPER)
     assert not are_few(100, busy)
-    with pytest.raises(
-        InputError, match="a study: 200 missions to simulate, about 84 minutes"
-    ):
+    with pytest.raises(InputError, match="a study: 200 missions to simulate, about 84 minutes"):
         check_missions("a study", [busy] * 200)
 
 

@@ -12,7 +12,6 @@ from scipy.stats import kstest, poisson
 from analysis.verification.queues.sources import arrivals_of, integrated
 from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
-from dess.sections import arrivals
 from tests.drawn import replications, seeds
 
 
@@ -67,27 +66,6 @@ def test_a_schedule_of_ones_and_other_rates_change_no_arrival(
 def test_a_schedule_that_ends_at_zero_ends_the_arrivals() -> None:
     assert (arrivals_of(_space(schedule=[[0, 50], [100, 0]]), 4) < 100).all()
     assert len(arrivals_of(_space(schedule=[[0, 0]]), 4)) == 0
-
-
-def test_long_thinning_is_cut_into_calls(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compiled code cannot be interrupted, so no call of it draws very many candidates."""
-    space = ScenarioSpace.of(
-        _space(schedule=[[0, 0], [29_999, 100]]), arrival_rate=0.5, max_slots=30_000
-    )
-    calls, draw = [], arrivals._draw
-
-    def counted(missions: Any, sources: Any, starts: Any, factors: Any, k: int) -> bool:
-        before = sources["candidate"][k]
-        found = draw(missions, sources, starts, factors, k)
-        calls.append(sources["candidate"][k] - before)
-        return found
-
-    monkeypatch.setattr(arrivals, "_draw", counted)
-    times = arrivals_of(space, 3)
-    assert sum(calls) == pytest.approx(30_000 * 50, rel=0.01)
-    assert max(calls) == calls[0] == arrivals.MOST_CANDIDATES
-    assert len(times) > 25
-    assert times[0] >= 29_999
 
 
 # --- scenarios ---
