@@ -159,7 +159,7 @@ def margin(mission, u):
 
 @kernel
 def waiting_time(mission, uavs, i):
-    """The slots for which UAV ``i`` must expect to wait for a pad, where the guard allows for them.
+    """The slots for which UAV ``i`` must expect to wait for a pad.
 
     Before it, pads are given to the teammates that have asked, and to those in the air that must
     charge and have less battery (on a tie, a lower index). If they take all pads that work, it
@@ -172,9 +172,12 @@ def waiting_time(mission, uavs, i):
         i: Index of the UAV.
     """
     u = uavs[i]
-    if not is_extended(mission) or u.pad_request >= 0:
+    if u.pad_request >= 0:
         return 0
-    if not (mission.plans_waits or mission.pad_rate > 0.0):
+    if is_extended(mission):
+        if not (mission.plans_waits or mission.pad_rate > 0.0):
+            return 0
+    elif mission.uavs <= mission.pads:
         return 0
     ahead = lacking = 0
     for j in range(mission.uavs):

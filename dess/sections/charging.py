@@ -30,9 +30,9 @@ class Charging(Section):
         False, description="whether records have the queue, waiting time and use of the pads"
     )
     plan_waits: bool = Field(
-        False,
+        True,
         description="whether the return guard allows for the wait for a pad; always with another "
-        "order or a limit of power",
+        "order, a limit of power or pads that may fail",
     )
 
     def constants(self) -> dict[str, Any]:

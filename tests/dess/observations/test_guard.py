@@ -155,23 +155,25 @@ def _wait(batteries: list[int], asked: list[int], quota: int = 440, **scenario: 
     return int(waiting_time(state.missions[0], team, 0))
 
 
-ON: dict[str, Any] = {"charging": {"plan_waits": True}}
+OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
 
 
 @pytest.mark.parametrize(
     ("batteries", "asked", "scenario", "slots"),
     [
-        ([60, 30, 60], [1], {}, 0),  # the section is off
-        ([60, 30, 60], [1], ON, 5),  # 50 % at 10 % per slot
-        ([60, 70, 70], [], ON, 0),  # it comes first
-        ([60, 20, 50], [1], ON, 11),  # 60 % and, of the one in the air at C_S, 50 %
-        ([60, 20, 60], [1], ON, 6),  # on a tie the lower index, its own, comes first
-        ([60, 20, 20], [1, 2], ON | {"pads": 2}, 6),  # 120 % at 20 % per slot
-        ([60, 20, 20], [1], ON | {"pads": 3}, 0),
+        ([60, 30, 60], [1], OFF, 0),
+        ([60, 30, 60], [1], OFF | {"failures": {"pad_rate": 0.1}}, 5),
+        ([60, 30, 60], [1], {"charging": {"measured": True}}, 5),
+        ([60, 30, 60], [1], {}, 5),  # 50 % at 10 % per slot
+        ([60, 70, 70], [], {}, 0),  # it comes first
+        ([60, 20, 50], [1], {}, 11),  # 60 % and, of the one in the air at C_S, 50 %
+        ([60, 20, 60], [1], {}, 6),  # on a tie the lower index, its own, comes first
+        ([60, 20, 20], [1, 2], {"pads": 2}, 6),  # 120 % at 20 % per slot
+        ([60, 20, 20], [1], {"pads": 3}, 0),
         ([60, 20, 20], [1, 2], {"charging": {"power": 5}}, 24),
         ([60, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
-        ([20, 20, 20], [0, 1], ON, 0),  # it has asked
-        ([60, 50, 50], [], ON | {"quota": 40}, 0),  # they need not charge
+        ([20, 20, 20], [0, 1], {}, 0),  # it has asked
+        ([60, 50, 50], [], {"quota": 40}, 0),  # they need not charge
     ],
 )
 def test_the_time_that_a_uav_expects_to_wait(
@@ -182,8 +184,8 @@ def test_the_time_that_a_uav_expects_to_wait(
 
 def test_the_guard_brings_uavs_home_in_time_to_wait_for_the_only_pad() -> None:
     values = {"uavs": 3, "pads": 1, "quota": 300}
-    plain = simulate_batch(load_scenario("paper", **values), Guarded(), 7, 60)
-    aware = simulate_batch(load_scenario("paper", **values, **ON), Guarded(), 7, 60)
+    plain = simulate_batch(load_scenario("paper", **values, **OFF), Guarded(), 7, 60)
+    aware = simulate_batch(load_scenario("paper", **values), Guarded(), 7, 60)
     depleted = [int((records.uavs["end"] == BATTERY).sum()) for records in (plain, aware)]
     assert depleted[1] < depleted[0] / 2
 
