@@ -1,5 +1,6 @@
 """Jobs: units of work that are sent to workers: chunks of missions or of bounds, event logs."""
 
+import errno
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -19,6 +20,9 @@ from dess.scenario import ScenarioSpace
 from policies.registry import load_team
 
 Progress = Callable[[int], object]
+
+# The errors of a disk without room, or with none for this user.
+_FULL = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG")} - {None}
 
 
 @dataclass(frozen=True)
@@ -202,7 +206,8 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
     """Run a job and return its result, or a ``Problem``.
 
     Raises:
-        InputError: If the job cannot be run at all, for example because a policy is missing.
+        InputError: If the job cannot be run at all, for example because a policy is missing, or the
+            disk has no room for compiled code.
         KeyboardInterrupt: If it is interrupted.
     """
     try:
@@ -212,6 +217,9 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
     except Exception as error:
         if was_interrupted(error):
             raise KeyboardInterrupt from None
+        if isinstance(error, OSError) and error.errno in _FULL:
+            line = f"{job.policy}: {error.strerror}; allowed: a disk with room for compiled code"
+            raise InputError(line) from None
         return Problem.of(error, _culprit(job))
 
 

@@ -30,6 +30,7 @@ from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from analysis.study.cheapest import Cheapest
 from analysis.study.study import Study, load_study
+from dess import InputError
 from policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
@@ -261,6 +262,8 @@ class _Run:
         """Store the result of a job; if the store refuses it, the job has a problem."""
         try:
             job.save(self.store, result)
+        except InputError:  # it cannot be written
+            raise
         except ValueError as error:
             return Problem.of(error)
         return None

@@ -1,6 +1,8 @@
+import errno
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -9,6 +11,7 @@ import pytest
 from analysis import evaluate, load_results, load_study, resimulate, run_study
 from analysis.execution import jobs, runner
 from analysis.questions.sensitivity import sensitivity
+from analysis.results import parquet
 from analysis.study.study import CHECK
 from dess import InputError, load_scenario, simulate
 from dess.record import MISSION_RECORD, UAV_RECORD
@@ -365,6 +368,32 @@ def test_points_that_are_one_scenario_share_their_missions(tmp_path):
     assert sizes == [n for of_team in results.manifest["missions"] for n in of_team]
     there = [row for table in results.store._tables.values() for row in table.missions.to_pylist()]
     assert len({(row["cell"], row["replication"]) for row in there}) == len(there)
+
+
+def test_a_full_disk_is_no_failure_of_a_chunk(tmp_path, monkeypatch):
+    """Neither where results are stored nor where numba keeps compiled code: one line says it."""
+    write, full = parquet.write, OSError(errno.ENOSPC, "No space left on device")
+
+    def fill_up(folder, name, table):
+        with monkeypatch.context() as patch, pytest.raises(InputError) as refusal:
+            patch.setattr(Path, "write_bytes", raises(full))
+            write(folder, name, table)
+        raise refusal.value
+
+    monkeypatch.setattr(parquet, "write", fill_up)
+    with pytest.raises(InputError, match="parquet: cannot be written: No space left on device"):
+        run_study(small_study(tmp_path), tmp_path / "out")
+    assert files_of(tmp_path / "out").keys() == {"manifest.json"}
+    monkeypatch.setattr(jobs, "simulate_missions", raises(full))
+    with pytest.raises(InputError, match="greedy: No space left on device; allowed: "):
+        run_study(small_study(tmp_path), tmp_path / "out")
+
+
+def raises(error):
+    def fail(*_, **__):
+        raise error
+
+    return fail
 
 
 def test_there_is_at_least_one_worker(tmp_path):
