@@ -97,7 +97,6 @@ def reports(session: nox.Session) -> None:
         less = ["--missions", str(MISSIONS[study])] if study in MISSIONS and not full else []
         out = ["--out", str(results / study), "--workers", "2"]
         session.run("dess", "study", "run", study, *out, *policies, *less)
-    session.run("dess", "timing", "--out", str(results / "timing"))
     session.run("dess", "report", "--results", str(results), "--out", str(reports))
     session.log(f"The reports are at {(reports / 'index.html').resolve().as_uri()}")
 

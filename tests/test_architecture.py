@@ -52,7 +52,7 @@ MAY_RUN_FILES = {
     *("policies", "policies.registry", "policies.about"),
     *("analysis.study.study", "analysis.sweeps.question", "analysis.questions.what_if.question"),
     *("analysis.execution.evaluation", "analysis.results.provenance"),
-    *("reports.cli.evaluate", "reports.cli.simulate", "reports.cli.report", "reports.pages.verify"),
+    *("reports.cli.evaluate", "reports.cli.simulate", "reports.pages.verify"),
 }
 PERMITS = {"TypedByUser", "typed", "permitted"}
 

@@ -7,10 +7,9 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
+from matplotlib.ticker import PercentFormatter
 
 from analysis import numbers
-from analysis.execution.decision_time import Cost
 from analysis.figures import style
 from analysis.figures.missions import mission_figure
 from analysis.names import parameter
@@ -140,39 +139,6 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
         style.points_axis(ax.xaxis, 7)
         ax.yaxis.set_major_formatter(PercentFormatter(1))
-    return figure
-
-
-def decision_time(costs: Sequence[Cost], policies: Sequence[str]) -> Figure:
-    """The time of a decision, by policy: for one mission at a time, and in the batch.
-
-    A dot is the median of the calls for the UAVs of one mission, and its line ends at the 95 %
-    quantile. A diamond is the time per UAV in calls for the UAVs of many missions.
-
-    Args:
-        costs: The times of an ``execution.decision_time.Timing``.
-        policies: All policies of the study, so that every policy has the same colour on all pages.
-    """
-    colours = style.policy_colours([*policies, *(cost.policy for cost in costs)])
-    with style.look():
-        figure, ax = style.panels(1.5 + 0.45 * len(costs), values="x")
-        for y, cost in enumerate(costs):
-            colour, _ = colours[cost.policy]
-            first = not y
-            ax.plot([cost.median, cost.slow], [y, y], color=colour, linewidth=2.4, zorder=2)
-            ax.plot(cost.slow, y, "|", color=colour, markersize=10, markeredgewidth=2.4)
-            ax.plot(cost.median, y, "o", color=colour, markersize=7, gid="median",
-                    label="one mission: median, and line to the 95 % quantile" * first)  # fmt: skip
-            ax.plot(cost.batch, y, "D", color=colour, markerfacecolor="white", markersize=6,
-                    gid="batch", label="many missions at once, per UAV" * first)  # fmt: skip
-        ends = [end for cost in costs for end in (cost.median, cost.slow, cost.batch)]
-        ax.set_xscale("log")
-        ax.set_xlim(min(ends) / 2, max(ends) * 2)
-        ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: numbers.seconds(x)))
-        ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_yticks(range(len(costs)), [cost.policy for cost in costs])
-        ax.set(title="Time of a decision", ylim=(len(costs) - 0.5, -0.5))
-        style.legend_below(figure, ax, 1)
     return figure
 
 

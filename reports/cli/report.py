@@ -1,4 +1,4 @@
-"""``dess report`` and ``dess verify``: pages and checks of them; ``dess timing``: of decisions."""
+"""``dess report`` and ``dess verify``: pages and checks of them."""
 
 import json
 import os
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess import InputError
-from reports.cli import completion, console
+from reports.cli import console
 from reports.cli.running import YesOption
 from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
 
@@ -148,36 +148,3 @@ def _print_verdicts(path: Path, verdicts: "list[Check]") -> None:
     console.print_table([str(path), "compared", "differing"], rows)
     for note in dict.fromkeys(f"{v.what}: {note}" for v in verdicts for note in v.notes):
         console.say(f"note: {note}")
-
-
-@app.command()
-def timing(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the measurements.")] = RESULTS
-    / "timing",
-    policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="P[,P...]",
-            autocompletion=completion.policies,
-            help="Policies to measure; repeatable.  [default: those of comparison and gap]",
-        ),
-    ] = None,
-    missions: Annotated[int, typer.Option(min=1, max=1_000, help="Missions per policy.")] = 30,
-) -> None:
-    """Measure how long a policy takes to decide; measurements of this machine and code are kept."""
-    from analysis.execution.decision_time import FILE, is_current, measure, read, write
-    from analysis.study.study import load_study
-    from dess.files import check_target
-    from policies.registry import typed
-
-    shown = (name for study in ("comparison", "gap") for name in load_study(study).policies)
-    teams = typed(policy or dict.fromkeys(shown))
-    if not is_current(out, teams, missions):
-        check_target(out / FILE)
-        with console.compile_notice(), console.counted_bar("step") as progress:
-            write(measure(teams, missions=missions, progress=progress), out)
-    rows = [
-        [cost.policy, *(f"{1e6 * t:,.1f} µs" for t in (cost.median, cost.slow, cost.batch))]
-        for cost in read(out).costs
-    ]
-    console.print_table(["policy", "median", "95 % below", "in a batch, per UAV"], rows)

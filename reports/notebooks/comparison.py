@@ -15,7 +15,7 @@
 # they differ, for which parameters and in which missions, and how long their decisions take.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folders comparison and timing
+results = "../../results"  # folder that holds the results folder comparison
 learned = None  # the learned policy to show; None for the best of the study
 heuristic = None  # the policy to compare it with; None for the best that is not learned
 
@@ -25,15 +25,14 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers
-from analysis.execution import decision_time
 from analysis.figures import comparison as figures
-from analysis.questions import decision_costs, head_to_head, regions, summary
+from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import kept_missions
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "comparison")
-times = decision_time.read(Path(results) / "timing")
+times = decision_times.read(results, study)
 pair = head_to_head.pair_of(study, learned, heuristic)
 policy, title = pair.policy, f"{pair.policy} − {pair.baseline}"
 missions = head_to_head.duels(study, pair)
@@ -174,27 +173,19 @@ display(html.say("{commands}", commands=html.commands(lines)), *map(html.gallery
 # %% [markdown]
 # ## The time of a decision
 #
-# In every mission slot, a policy is called once for all UAVs of a mission that must act. The time
-# of this call was measured for one mission at a time, then for many missions in the batch engine.
-# Times depend on the machine. A decision must be ready within a mission slot, in which a UAV flies
-# one cell. The model does not define the length of a slot in seconds, so the last column gives the
+# In every mission slot, a policy is called once for all UAVs of a mission that must act. Times
+# depend on the machine. A decision must be ready within a mission slot, in which a UAV flies one
+# cell. The model does not define the length of a slot in seconds, so the last column gives the
 # speed at which a UAV crosses a cell in the time of a slow call (95 % quantile).
 
 # %%
-costs = decision_costs.timed(times, study.policies)
-alt = "Time of a decision of every policy, for one mission and in the batch"
-caption = (
-    f"n = {min(cost.calls for cost in costs):,} calls or more per policy. A line goes from the "
-    "median to the 95 % quantile of the calls; it is not a confidence interval."
-)
 display(
-    html.say("{remarks}", remarks=decision_costs.remarks(times, study, pair)),
-    html.figure(figures.decision_time(costs, study.policies), alt, caption),
-    html.table(decision_costs.listed(times, costs), "Times of decisions, and the speed they allow"),
+    html.table(decision_times.listed(times, study), "Times of decisions, and the speed they allow"),
+    html.say("{remarks}", remarks=decision_times.remarks(times, study, pair)),
 )
 
 # %% [markdown]
 # ## Where the figures come from
 
 # %%
-display(html.provenance([study]), html.table(decision_costs.origin(times), wrap=True))
+html.provenance([study])

@@ -11,14 +11,14 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from analysis.questions import head_to_head
+from analysis.questions import decision_times, head_to_head
 from analysis.questions.missions import keep_logs
 from analysis.results.tables import load_results
 from analysis.verification import cross_check
 from reports.pages.kernels import Progress
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
-TIMED = (COMPARISON, "planner")  # the pages that show how long decisions take
+PLANNER, GAP = "planner", "gap"  # a page and its study
 
 
 def make(
@@ -48,5 +48,8 @@ def make(
         pair = head_to_head.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
         drawn = head_to_head.drawn(head_to_head.duels(study, pair), pair)
         keep_logs(study, drawn, results, show)
+        decision_times.make(results, study, show)
+    if PLANNER in pages:
+        decision_times.make(results, load_results(results / GAP), show)
     if VERIFICATION in pages:
         cross_check.make(results, load_results(results / VERIFICATION), show)

@@ -6,8 +6,7 @@ The same results give the same bytes, since a page contains no time and no path 
 import logging
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,7 +18,6 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
-from analysis.execution import decision_time
 from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
@@ -158,18 +156,12 @@ def _write(
 
 def _lacking(report: Report, results: Path) -> dict[str, InputError]:
     """The results that a report lacks: the command that makes them, and what is wrong."""
-    needs: dict[str, Callable[[], object]] = {
-        f"dess study run {study}": partial(_check_results, results / study)
-        for study in report.studies
-    }
-    if report.name in missions.TIMED:
-        needs["dess timing"] = partial(decision_time.read, results / "timing")
     errors = {}
-    for command, check in needs.items():
+    for study in report.studies:
         try:
-            check()
+            _check_results(results / study)
         except InputError as error:
-            errors[command] = error
+            errors[f"dess study run {study}"] = error
     return errors
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import tomli_w
 
 from analysis import load_study
-from analysis.execution.decision_time import FILE, Timing, write
 from analysis.questions.what_if import question as what_if
 from analysis.results.tables import Results
 from analysis.study.study import Study
@@ -74,9 +73,3 @@ def files_of(folder: Path) -> dict[str, bytes]:
 def environment() -> dict[str, str]:
     """A process of its own imports what this one imports."""
     return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-
-
-def write_timing(timing: Timing, folder: Path) -> Path:
-    """Write a timing into a folder; its file."""
-    write(timing, folder)
-    return folder / FILE

@@ -55,7 +55,7 @@ class Case:
         command = "study run" if words[:2] == ["study", "run"] else "".join(words[:1])
         is_named = any(word.startswith("--out") for word in self.arguments)
         allowed = [OUT]
-        if command == "sweep" or (command in ("study run", "timing") and not is_named):
+        if command == "sweep" or (command == "study run" and not is_named):
             allowed.append(f"{CWD}/results")
         if "--report" in self.arguments or (command in ("sweep", "report") and not is_named):
             allowed.append(f"{CWD}/build")

@@ -15,7 +15,6 @@ import pytest
 
 from analysis import load_study, run_study
 from analysis.bound import Bound
-from analysis.execution import decision_time as timing
 from analysis.execution import jobs
 from analysis.verification import cross_check
 from dess.scenario import ScenarioSpace
@@ -23,7 +22,6 @@ from policies.planner import Budget, Planner
 from reports.pages import html
 from reports.pages.notebook import Report, read
 from reports.player import library
-from tests.analysis.small import write_timing
 
 EMBEDDED = re.compile("data:image/svg\\+xml;base64,([A-Za-z0-9+/=]+)")
 
@@ -95,7 +93,7 @@ def quick() -> Iterator[None]:
 
 
 def run_small_studies(folder: Path, *names: str) -> Path:
-    """Run the studies, all or some, each into a folder of its name; with all, a timing.
+    """Run the studies, all or some, each into a folder of its name.
 
     Beside the study verification stand missions of its cross-check, fewer than a page has.
     """
@@ -104,8 +102,6 @@ def run_small_studies(folder: Path, *names: str) -> Path:
             study = run_study(load_study(name, **STUDIES[name]), folder / name)
         if name == cross_check.STUDY:
             cross_check.write(cross_check.simulate_missions(study, 2), folder)
-    if not names:
-        write_timing(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
     return folder
 
 

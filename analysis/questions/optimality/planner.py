@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.execution.decision_time import Timing
 from analysis.names import PRODUCT, SUCCESS
+from analysis.questions.decision_times import Times
 from analysis.questions.missions import LoggedMission, logged_mission
 from analysis.questions.node_shares import collected, held
 from analysis.questions.optimality.gap import ALL, fleet
@@ -86,7 +86,7 @@ def listed(table: pd.DataFrame) -> pd.DataFrame:
     return wide.rename(columns=names)
 
 
-def front(results: Results, times: Timing) -> pd.DataFrame:
+def front(results: Results, times: Times) -> pd.DataFrame:
     """The product and the decision time of every policy whose decisions were timed.
 
     Returns:

@@ -15,7 +15,7 @@
 # better, where, how much time its decisions take, and how far both are from the best possible.
 
 # %% tags=["parameters"]
-results = "../../results"  # folder that holds the results folders gap and timing
+results = "../../results"  # folder that holds the results folder gap
 planner = "planner"  # the policy that plans
 longer = "planner-long"  # the same with a longer search, if the study has it
 learner = "ddqn"  # the policy that has learned
@@ -26,17 +26,16 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers
-from analysis.execution import decision_time
 from analysis.figures import comparison
 from analysis.figures import optimality as figures
-from analysis.questions import decision_costs, head_to_head, regions
+from analysis.questions import decision_times, head_to_head, regions
 from analysis.questions.optimality import gap
 from analysis.questions.optimality import planner as questions
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "gap")
-times = decision_time.read(Path(results) / "timing")
+times = decision_times.read(results, study)
 planners = [name for name in (planner, longer) if name in study.policies]
 differences = questions.differences(study, planners, learner)
 gaps = gap.by_fleet(study)
@@ -158,8 +157,10 @@ html.figure(
 )
 
 # %%
-shown = decision_costs.timed(times, points["policy"])
-html.table(decision_costs.listed(times, shown), "Times of decisions, and the speed they allow")
+display(
+    html.table(decision_times.listed(times, study), "Times of decisions, and the speed they allow"),
+    html.say("{remarks}", remarks=decision_times.remarks(times, study, pair)),
+)
 
 # %% [markdown]
 # ## One mission: the plan, and which data are worth fetching
@@ -186,4 +187,4 @@ html.gallery(
 # ## Where the figures come from
 
 # %%
-display(html.provenance([study]), html.table(decision_costs.origin(times), wrap=True))
+html.provenance([study])

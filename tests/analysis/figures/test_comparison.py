@@ -3,15 +3,12 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 
-from analysis.execution.decision_time import Cost
 from analysis.figures import comparison as drawings
 from analysis.figures.comparison import COLOURS
 from analysis.names import PARAMETERS
 from analysis.questions import regions
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
-from analysis.results.provenance import Member
 from analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.questions.test_regions import missions_of
 
@@ -27,16 +24,6 @@ def missions():
 @pytest.fixture(scope="module")
 def table(missions):
     return regions.along(missions)
-
-
-@pytest.fixture(scope="module")
-def costs():
-    (member,) = [Member(name="p", **{"class": "m:C"}, code="0" * 64)]
-    return [
-        Cost(policy=name, members=[member], calls=9, rows=18, median=m, slow=s, batch_rows=18,
-             batch=b)
-        for name, m, s, b in (("greedy", 2e-6, 5e-6, 4e-7), ("ddqn", 3e-4, 7e-4, 2e-5))
-    ]  # fmt: skip
 
 
 def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
@@ -133,29 +120,9 @@ def test_no_difference_at_all_can_be_drawn(missions):
     assert low < 0 < high
 
 
-def test_times_are_dots_lines_and_diamonds(costs):
-    (ax,) = drawings.decision_time(costs, ["tour", "greedy", "ddqn"]).axes
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["greedy", "ddqn"]
-    for gid, field in (("median", "median"), ("batch", "batch")):
-        marks = [line for line in ax.lines if line.get_gid() == gid]
-        expected = [(getattr(cost, field), y) for y, cost in enumerate(costs)]
-        assert [(m.get_xdata()[0], m.get_ydata()[0]) for m in marks] == expected
-    spans = [tuple(line.get_xdata()) for line in ax.lines if len(line.get_xdata()) == 2]
-    assert spans == [(cost.median, cost.slow) for cost in costs]
-    low, high = ax.get_xlim()
-    assert low < min(c.batch for c in costs) < max(c.slow for c in costs) < high
-
-
-def test_a_policy_keeps_its_colour_whoever_else_was_timed(costs):
-    policies = ["tour", "greedy", "ddqn"]
-    both, alone = (drawings.decision_time(c, policies).axes[0] for c in (costs, costs[1:]))
-    assert to_hex(both.lines[-1].get_color()) == to_hex(alone.lines[-1].get_color())
-
-
-def test_figures_leave_no_state_behind(missions, table, costs):
+def test_figures_leave_no_state_behind(missions, table):
     before = dict(mpl.rcParams)
     drawings.lead(table, "uavs", 0.0)
     drawings.heat(regions.across(missions, "uavs", "flying_time"), "uavs", "flying_time")
     drawings.distribution(missions, PAIR)
-    drawings.decision_time(costs, [])
     assert dict(mpl.rcParams) == before

@@ -23,7 +23,6 @@ _FILES = (
 _FOLDERS = (
     ("study", "run", f"../in/{ready.STUDY}", "--out", "{}"),
     ("train", f"../in/{ready.TRAINING}", "--out", "{}"),
-    ("timing", "--policy", "greedy", "--missions", "1", "--out", "{}"),
 )
 _PRINTING = (
     ("studies",),

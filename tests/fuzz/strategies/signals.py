@@ -16,7 +16,6 @@ _COMMANDS = (
     ("evaluate", *_SEA, "--policy", "greedy", "--missions", "3000", "--engine", "events"),
     ("train", f"../in/{ready.TRAINING}", "--out", "../out/a"),
     ("verify", f"../in/{ready.RESULTS}"),
-    ("timing", "--policy", "greedy", "--missions", "20", "--out", "../out/a"),
 )
 _STUDIES = ((*_RUN,), (*_RUN, "--missions", "5000"))
 

@@ -42,7 +42,6 @@ def sizes(draw: st.DrawFn) -> Case:
         ("sweep", "--set", f"quota=1..{n}", "--results", "../out/r", "--out", "../out/p"),
         ("sweep", "--set", f"arrival_rate=0..1:{n}", "--results", "../out/r", "--out", "../out/p"),
         ("train", "../in/big-training.toml", "--out", "../out/a"),
-        ("timing", *_POLICY, "--missions", str(n), "--out", "../out/a"),
         ("study", "show", f"../in/{ready.RESULTS}", "--worst", str(n)),
         ("verify", f"../in/{ready.RESULTS}", "--missions", str(n)),
     )

@@ -117,7 +117,7 @@ def test_an_output_below_a_long_name_is_a_line(refused, tmp_path):
     refused("study", "run", "trial.toml", "--out", "x/" * 3000)
 
 
-@pytest.mark.parametrize("command", [("train", "quick"), ("timing", "--policy", "greedy")])
+@pytest.mark.parametrize("command", [("train", "quick"), ("study", "run", "trial.toml")])
 def test_an_output_that_is_a_loop_of_links_is_a_line(refused, tmp_path, command):
     (tmp_path / "loop").symlink_to("loop")
     refused(*command, "--out", "loop")

@@ -1,6 +1,5 @@
 """The page of the comparison says what its missions say, and takes no times of its own."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,10 @@ import pytest
 from scipy import stats
 
 from analysis import load_results, load_study, numbers, run_study
-from analysis.execution import decision_time as timing
-from analysis.questions import head_to_head, regions, summary
+from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import FOLDER
 from dess import InputError
 from reports.pages import missions as missions_of_pages
-from tests.analysis.small import write_timing
 from tests.reports.small import said_by, shown_by
 
 NAME = "comparison"
@@ -25,8 +22,8 @@ POLICIES = ["random", "greedy", "nearest", "ddqn"]
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
-    run_study(load_study(NAME, policies=POLICIES, missions=120), folder / NAME)
-    write_timing(timing.measure(["greedy", "ddqn"], missions=2), folder / "timing")
+    study = run_study(load_study(NAME, policies=POLICIES, missions=120), folder / NAME)
+    decision_times.make(folder, study)
     return folder
 
 
@@ -39,11 +36,9 @@ def text(results: Path) -> str:
     return said(results)
 
 
-def with_studies_of(results: Path, folder: Path, **changes: Any) -> Path:
-    """Results of other missions, with the same times."""
-    folder.mkdir()
-    (folder / "timing").symlink_to(results / "timing")
-    run_study(load_study(NAME, **changes), folder / NAME)
+def with_studies_of(folder: Path, **changes: Any) -> Path:
+    """Results of other missions."""
+    decision_times.make(folder, run_study(load_study(NAME, **changes), folder / NAME))
     return folder
 
 
@@ -92,12 +87,11 @@ def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: 
     """Captions have the numbers of the files; pages have the maps of missions that are kept."""
     assert "a single one (n = 1)" not in said(results)
     (tmp_path / NAME).symlink_to(results / NAME)
-    (tmp_path / "timing").symlink_to(results / "timing")
     for chosen in ({}, {"learned": "random", "heuristic": "nearest"}):
         missions_of_pages.make([NAME, "learning"], tmp_path, chosen)
         shown = shown_by(NAME, results=str(tmp_path), **chosen)
         assert shown.count('alt="Map of mission ') == 4
-    assert len([*(tmp_path / FOLDER).iterdir()]) == 8
+    assert len([*(tmp_path / FOLDER).glob("*.parquet")]) == 8
     columns = ["policy", "replication", "collected", "initial", "arrived", "slots"]
     records = pd.read_parquet(results / NAME / "missions").astype({"policy": str})
     product = ["collection_ratio_and_communication", "collection_ratio"]
@@ -111,29 +105,12 @@ def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: 
 
 
 def test_the_times_are_those_that_were_kept(text: str, results: Path) -> None:
-    times = timing.read(results / "timing")
+    times = decision_times.read(results, load_results(results / NAME))
+    assert [cost.policy for cost in times.costs] == POLICIES
     for cost in times.costs:
         shown = f"{cost.policy} {numbers.seconds(cost.median)} {numbers.seconds(cost.slow)}"
-        assert f"{shown} {cost.rows / cost.calls:.2f} {cost.calls:,}" in text
-    assert "Not timed: random and nearest." in text
+        assert f"{shown} {cost.calls:,}" in text
     assert times.processor in text
-    assert "with other code or weights" not in text
-
-
-def test_times_of_other_code_are_told(results: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "results"
-    (folder / "timing").mkdir(parents=True)
-    (folder / NAME).symlink_to(results / NAME)
-    data = json.loads((results / "timing" / "timing.json").read_text("utf-8"))
-    (folder / "timing" / "timing.json").write_text(json.dumps(data | {"code": "0" * 64}))
-    text = said(folder)
-    assert "with other code or weights than those of the study: greedy and ddqn." in text
-
-
-def test_without_times_it_says_how_to_take_them(results: Path, tmp_path: Path) -> None:
-    (tmp_path / NAME).symlink_to(results / NAME)
-    with pytest.raises(InputError, match=r"timing.json: no such file; .*: dess timing --out /"):
-        said(tmp_path)
 
 
 def test_policies_can_be_chosen(results: Path) -> None:
@@ -147,9 +124,7 @@ def test_policies_can_be_chosen(results: Path) -> None:
 
 
 def test_few_missions_and_no_learned_policy_make_a_page(results: Path, tmp_path: Path) -> None:
-    folder = with_studies_of(
-        results, tmp_path / "results", policies=["random", "greedy"], missions=3
-    )
+    folder = with_studies_of(tmp_path / "results", policies=["random", "greedy"], missions=3)
     text = said(folder)
     assert "greedy minus random" in text
     assert not re.search(r"Traceback|Warning|\bnan\b|NaN|None|\binf\b", text)
@@ -159,7 +134,7 @@ def test_several_trainings_are_one_learner_and_the_first_is_shown(
     results: Path, tmp_path: Path
 ) -> None:
     folder = with_studies_of(
-        results, tmp_path / "results", policies=["greedy", "ddqn", "ddqn-2"], missions=60
+        tmp_path / "results", policies=["greedy", "ddqn", "ddqn-2"], missions=60
     )
     text = said(folder)
     assert "ddqn is training 1 of 2 of the best learner of the study, greedy is the best" in text
@@ -170,6 +145,6 @@ def test_several_trainings_are_one_learner_and_the_first_is_shown(
 
 
 def test_a_single_policy_is_refused_in_a_line(results: Path, tmp_path: Path) -> None:
-    folder = with_studies_of(results, tmp_path / "results", policies=["greedy"], missions=3)
+    folder = with_studies_of(tmp_path / "results", policies=["greedy"], missions=3)
     with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
         said(folder)

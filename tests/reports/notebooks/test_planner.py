@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from analysis import load_results, load_study, run_study
-from analysis.execution import decision_time
+from analysis.questions import decision_times
 from analysis.questions.optimality import gap, planner
 from reports.pages.notebook import read
-from tests.analysis.small import write_timing
 from tests.reports.small import quick, run_small_studies, said_by, words
 
 NAMES = {"planner": "tour", "longer": "greedy", "learner": "random"}
@@ -19,8 +18,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     study = load_study("gap", policies=[*NAMES.values()], missions=30, logged=3)
     with quick():
-        run_study(study, folder / "gap")
-    write_timing(decision_time.measure(["greedy", "tour"], missions=1), folder / "timing")
+        decision_times.make(folder, run_study(study, folder / "gap"))
     return folder
 
 

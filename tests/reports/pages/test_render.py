@@ -307,7 +307,7 @@ def test_pages_without_results_are_left_out_with_a_note(
     results: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Of all pages; a page that is named must have its results."""
-    lacking = MISSION.replace("[trial]", "[trial, fleets]")
+    lacking = MISSION.replace("[trial]", "[trial, fleets, pads]")
     notebooks = write_notebooks(tmp_path / "notebooks", scorecard=SCORECARD, comparison=lacking)
     index = render([], results, tmp_path / "out", notebooks=notebooks)
     assert {path.stem for path in index.parent.iterdir()} == {"index", "scorecard"}
@@ -315,7 +315,7 @@ def test_pages_without_results_are_left_out_with_a_note(
     listed = re.findall("<li>(.*?)</li>", page)
     assert len(listed) == 1
     commands = re.findall("<code>(.*?)</code>", listed[0])
-    assert commands == ["dess study run fleets", "dess timing"]
+    assert commands == ["dess study run fleets", "dess study run pads"]
     assert str(results) not in page
     assert "note: report comparison is left out: results: " in caplog.text
     with pytest.raises(InputError, match="holds no results of study fleets; they are made by"):

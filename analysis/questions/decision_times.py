@@ -1,0 +1,189 @@
+"""The time that the policies of a study take to decide: measured once, and kept in a file.
+
+A measured time is different every time. So it is kept beside the results, and a page that shows it
+stays the same::
+
+    make("results", study)
+    listed(read("results", study), study)
+"""
+
+import platform
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+from threadpoolctl import threadpool_limits
+
+from analysis import numbers
+from analysis.questions.head_to_head import Pair
+from analysis.questions.missions import FOLDER
+from analysis.results.documents import Count, Finite
+from analysis.results.tables import Results
+from analysis.study.stopping import Text
+from dess import InputError, simulate
+from dess.files import check_target, read_text, write_file
+from dess.files.documents import Document
+from dess.view import View
+from policies.base import Policy
+from policies.registry import load_team
+
+CALLS = 60  # calls of every policy that are timed at least: those of about one mission
+SLOW = 0.95  # the quantile that is reported for slow calls
+
+Seconds = Annotated[Finite, Field(gt=0, le=1e6)]
+Clock = Callable[[], float]
+# Called with the number of policies done and of all policies.
+Progress = Callable[[int, int], None]
+
+
+class Cost(Document):
+    """The time of a call of ``Policy.act``, which decides for all UAVs of a mission that must act.
+
+    Attributes:
+        policy: The team.
+        calls: The number of calls.
+        median: Their median time [s].
+        slow: The ``SLOW`` quantile of their times [s].
+    """
+
+    policy: Text
+    calls: Count
+    median: Seconds
+    slow: Seconds
+
+
+class Times(Document):
+    """The measured times of a study's policies, and the processor on which they were measured."""
+
+    processor: Text
+    costs: list[Cost] = Field(max_length=10_000)
+
+
+def make(folder: str | Path, results: Results, progress: Progress | None = None) -> None:
+    """Measure the times and write them, unless the folder has those of this study.
+
+    Args:
+        folder: A folder that contains a results folder per study.
+        results: The results of the study.
+        progress: Called after every policy.
+
+    Raises:
+        InputError: If the times cannot be written.
+    """
+    path = _file(folder, results)
+    if not path.exists():
+        check_target(path)
+        write_file(path, measure(results, progress=progress).model_dump_json(indent=1))
+
+
+def read(folder: str | Path, results: Results) -> Times:
+    """Read the times that ``make`` has written.
+
+    Raises:
+        InputError: If there are none, or they are damaged.
+    """
+    return Times.load(_file(folder, results), "allowed: what is made by: dess report")
+
+
+def _file(folder: str | Path, results: Results) -> Path:
+    return Path(folder, FOLDER, f"times-{results.store.manifest.key}.json")
+
+
+def measure(
+    results: Results, clock: Clock = perf_counter, progress: Progress | None = None
+) -> Times:
+    """Measure the times of a study's policies: one mission at a time, on one thread.
+
+    Policies that cannot be loaded here are left out, and so are classes of Python files, since
+    anybody may have made the results.
+
+    Args:
+        results: The results of the study.
+        clock: Returns the time [s].
+        progress: Called after every policy.
+    """
+    costs = []
+    for done, policy in enumerate(results.policies, 1):
+        try:
+            team = load_team(str(policy))  # for plain text, no file is run
+        except InputError:
+            team = []
+        if team:
+            seconds = _calls(team, results, clock)
+            median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
+            costs.append(Cost(policy=policy, calls=len(seconds), median=median, slow=slow))
+        if progress:
+            progress(done, len(results.policies))
+    return Times(processor=_processor(), costs=costs)
+
+
+def _calls(team: list[Policy], results: Results, clock: Clock) -> list[float]:
+    """The times of the calls of a team [s], in as many whole missions as ``CALLS`` calls take."""
+    calls: list[float] = []
+    timed = [_Timed(policy, clock, calls) for policy in team]
+    space, seed, replication = results.scenario(), results.store.manifest.seed, 0
+    with threadpool_limits(1):
+        while len(calls) < CALLS:
+            simulate(space, timed, seed, replication)
+            replication += 1
+    return calls
+
+
+class _Timed:
+    """A policy whose calls are timed; the first one is made twice, since it compiles and loads."""
+
+    def __init__(self, policy: Policy, clock: Clock, calls: list[float]):
+        self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
+
+    def act(self, view: View) -> np.ndarray:
+        """Return the actions of the policy, and note the time."""
+        if not self.calls:
+            self.policy.act(view)
+        begin = self.clock()
+        actions = self.policy.act(view)
+        self.calls.append(self.clock() - begin)
+        return actions
+
+
+def _processor() -> str:
+    """The model of the processor, as the operating system names it."""
+    try:
+        lines = read_text(Path("/proc/cpuinfo")).splitlines()
+    except (OSError, InputError):
+        lines = []
+    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(models, "") or platform.processor() or platform.machine() or "unknown"
+
+
+def listed(times: Times, results: Results) -> pd.DataFrame:
+    """The times as a table to print, with a row per policy.
+
+    The last column is the speed of a UAV that crosses one cell in the time of a slow call.
+    """
+    cell_size = results.scenario().cell_size
+    return pd.DataFrame(
+        {
+            "Policy": cost.policy,
+            "Median": numbers.seconds(cost.median),
+            "95 % below": numbers.seconds(cost.slow),
+            "Calls": f"{cost.calls:,}",
+            "Fast enough up to [m/s]": f"{float(f'{cell_size / cost.slow:.2g}'):,.0f}",
+        }
+        for cost in times.costs
+    )
+
+
+def remarks(times: Times, results: Results, pair: Pair) -> str:
+    """On what decisions were timed, how a pair of policies compares, and what was not timed."""
+    medians = {cost.policy: cost.median for cost in times.costs}
+    sentences = [f"Measured once, on one core of a processor {times.processor}."]
+    if pair.policy in medians and pair.baseline in medians:
+        ratio = medians[pair.policy] / medians[pair.baseline]
+        sentences.append(f"{pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}.")
+    if missing := [policy for policy in results.policies if policy not in medians]:
+        sentences.append(f"Not timed: {numbers.words(missing)}.")
+    return " ".join(sentences)
