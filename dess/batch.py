@@ -11,8 +11,9 @@ order of the missions nor on how they are divided into batches.
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from ctypes import c_ulong, py_object, pythonapi
 from itertools import groupby
-from threading import Event
+from threading import Lock, get_ident
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,9 @@ from dess.view import decide, team_of
 
 # Enough missions that the time spent in Python is a small part, few enough for the CPU's cache.
 BATCH_SIZE = 256
+# The most work of a slot of all missions in progress, in units of about 3 ns: for Ctrl-C, which
+# waits for compiled code, and for memory.
+MOST_WORK = 2**26
 
 
 def simulate_batch(
@@ -57,7 +61,7 @@ def simulate_batch(
         seed: Seed of all missions.
         replications: The replication numbers, or a number n for the replications 0 to n - 1.
         workers: Number of threads; the compiled code does not hold Python's global lock.
-        batch_size: Missions in progress per thread.
+        batch_size: Missions in progress per thread; fewer if a slot of them would take long.
         progress: Called with the number of missions finished since its last call.
 
     Returns:
@@ -88,11 +92,9 @@ def simulate_batch(
     team = team_of(policy, spaces)
     fleet = max((space.uavs[1] for space in spaces), default=0)
     records = empty_records(len(numbers), fleet, any(space.is_extended for space in spaces))
-    stop = Event()
 
     def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:
-        batch = _Batch(group, team, seed, batch_size)
-        batch.run(jobs, which, numbers, records, progress, stop)
+        _Batch(group, team, seed, batch_size).run(jobs, which, numbers, records, progress)
 
     tasks = []
     for members in _by_world(spaces):
@@ -104,12 +106,7 @@ def simulate_batch(
         for task in tasks:
             run(*task)
     else:
-        with ThreadPoolExecutor(workers) as pool:
-            try:
-                for future in [pool.submit(run, *task) for task in tasks]:
-                    future.result()
-            finally:  # after an error or Ctrl-C, let the other threads stop too
-                stop.set()
+        _run_in_threads(workers, run, tasks)
     return records
 
 
@@ -127,6 +124,13 @@ def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
             )
 
 
+def work_of(space: ScenarioSpace) -> int:
+    """The most work of a slot of a mission: the loops of the engine, the guard and the policies."""
+    nodes, fleet = len(space.nodes), space.uavs[1]
+    each = nodes * (nodes + space.communication_slots) + fleet * space.zone_cells
+    return fleet * each + teeth_lengths([space])
+
+
 def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     """The replication numbers as an array of integers."""
     if isinstance(replications, int | np.integer):
@@ -135,6 +139,36 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     if len(numbers) and numbers.dtype.kind not in "iu":
         raise ValueError(f"replications must be integers, not {numbers.dtype}")
     return numbers.astype(np.int64)
+
+
+class _Stopped(BaseException):
+    """Ends a thread."""
+
+
+def _run_in_threads(workers: int, run: Callable[..., None], tasks: Iterable[tuple]) -> None:
+    """Run tasks in threads; after an error or Ctrl-C, none of them goes on."""
+    running: set[int] = set()
+    lock = Lock()
+
+    def watched(task: tuple) -> None:
+        with lock:
+            running.add(get_ident())
+        try:
+            run(*task)
+        finally:
+            with lock:
+                running.discard(get_ident())
+
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for future in [pool.submit(watched, task) for task in tasks]:
+                future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            with lock:
+                for thread in running:
+                    pythonapi.PyThreadState_SetAsyncExc(c_ulong(thread), py_object(_Stopped))
+            raise
 
 
 def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
@@ -161,10 +195,12 @@ class _Batch:
         self.ranges = np.stack([ranges_of(space) for space in spaces])
         self.uavs, self.lengths = int(self.ranges[:, 0, 1].max()), teeth_lengths(spaces)
         self.types = np.stack([types_of(space, self.uavs) for space in spaces])
+        self.work = max(map(work_of, spaces))
 
-    def run(self, jobs, which, numbers, records, progress, stop) -> None:
-        """Simulate the missions ``jobs`` and write their records, until ``stop`` is set."""
-        size, nodes = min(self.batch_size, len(jobs)), len(self.world.nodes)
+    def run(self, jobs, which, numbers, records, progress) -> None:
+        """Simulate the missions ``jobs`` and write their records."""
+        size = min(self.batch_size, len(jobs), max(MOST_WORK // self.work, 1))
+        nodes = len(self.world.nodes)
         state = empty_state(size, self.uavs, nodes, self.lengths, self.constants.dtype)
         scratch = empty_scratch(self.uavs, nodes)
         job_of = np.full(size, -1)
@@ -174,7 +210,7 @@ class _Batch:
             _next_mission(b, job_of, queue, source, state)
         # Reporting holds Python's global lock, so about a hundred reports are made in all.
         reported, step = 0, max(1, len(jobs) // 100)
-        while queue[1] < len(jobs) and not stop.is_set():
+        while queue[1] < len(jobs):
             decide(self.team, state, self.world)
             _advance(job_of, queue, source, state, self.world, scratch, records)
             if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):

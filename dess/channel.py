@@ -100,12 +100,14 @@ def world_of(scenario: ScenarioSpace) -> World:
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
     m, grid = scenario.communication_slots, scenario.grid
     places = m * fleet.places_per_slot(scenario.fleet)
-    coarse = np.arange(grid)[:, None]
-    fine = np.arange(places * (grid - 1) + 1)[None, :] / places
-    horizontal = scenario.cell_size * np.hypot(coarse, fine)
-    distance = np.hypot(horizontal, scenario.altitude)
+    fine = np.arange(places * (grid - 1) + 1) / places
     edge = np.sqrt(2) / 2 * grid * scenario.cell_size
-    mean_snr = scenario.edge_snr - 10 * scenario.path_loss_exponent * log10(distance / edge)
+    mean_snr = np.empty((grid, len(fine)))
+    for row in range(grid):  # each takes a moment, all of a large grid may take seconds
+        horizontal = scenario.cell_size * np.hypot(row, fine)
+        distance = np.hypot(horizontal, scenario.altitude)
+        loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
+        mean_snr[row] = scenario.edge_snr - loss
     nodes = np.array(scenario.nodes, np.int64)
     steps = 5 * grid * grid * fleet.legs(scenario.fleet)
     # The operating system allocates memory page by page as the rows are filled.

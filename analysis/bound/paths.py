@@ -129,7 +129,6 @@ def beginning(blocks, local, now, ahead, had, then_had, home, there, level, late
     return least + max(left - start, 0.0) * had[home], best
 
 
-@kernel
 def bound_paths(mission, phases, data, period, blocks, local, values, waiting, ceilings):
     """Bound what a UAV can earn from every state.
 
@@ -145,34 +144,40 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
         ceilings: (F + 1, P, M, M, J, Q) worth of the future per memory and local price,
             overwritten where a UAV can be.
     """
+    for f in range(len(ceilings) - 1, -1, -1):  # between two, a signal can end it
+        _bound_slot(f, mission, phases, data, period, blocks, local, values, waiting, ceilings)
+
+
+@kernel
+def _bound_slot(f, mission, phases, data, period, blocks, local, values, waiting, ceilings):
+    """Bound what a UAV can earn after f flying slots, from what it can earn after f + 1."""
     slots, grid, levels = len(ceilings) - 1, len(blocks.home), len(blocks.levels)
     begins = np.empty((5, grid, grid, levels, levels))
     scratch = np.empty(local.shape[1]), np.empty(local.shape[1])
-    for phase in range(len(phases.deadline)):
-        ceilings[slots, phase] = -waiting[last_slot(phases, phase, slots, len(waiting) - 1)]
-    for f in range(slots - 1, -1, -1):
-        for phase in range(len(phases.deadline) - 1, -1, -1):
-            if phase > 0 and f < phases.opens[0]:
-                continue
-            here = ceilings[f, phase]
-            here[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
-            had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
-            if f < phases.deadline[phase]:
-                gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
-                _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
-                for x in range(grid):
-                    for y in range(grid):
-                        if _is_reached(mission, phases, phase, f, x, y):
-                            _act(
-                                blocks, local, gain, then, had, then_had, begins, x, y, scratch,
-                                here[x, y],
-                            )  # fmt: skip
-            target = phases.after[f]
+    for phase in range(len(phases.deadline) - 1, -1, -1):
+        if phase > 0 and f < min(phases.opens[0], slots):
+            continue
+        here = ceilings[f, phase]
+        here[:] = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
+        if f == slots:
+            continue
+        had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
+        if f < phases.deadline[phase]:
+            gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
+            _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
             for x in range(grid):
                 for y in range(grid):
-                    if may_charge(mission, phases, phase, f, x, y):
-                        new = data_had(data, phases, target, f) - had
-                        _charge(blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y])
+                    if _is_reached(mission, phases, phase, f, x, y):
+                        _act(
+                            blocks, local, gain, then, had, then_had, begins, x, y, scratch,
+                            here[x, y],
+                        )  # fmt: skip
+        target = phases.after[f]
+        for x in range(grid):
+            for y in range(grid):
+                if may_charge(mission, phases, phase, f, x, y):
+                    new = data_had(data, phases, target, f) - had
+                    _charge(blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y])
 
 
 @inlined

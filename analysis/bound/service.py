@@ -136,7 +136,6 @@ def _place_values(x, y, offset, along_x, home, worth, local, nodes, rates, below
         result[q] += total
 
 
-@kernel
 def step_values(worth, local, nodes, block, rates, below, values):
     """What each step is worth in a flying slot at given prices.
 
@@ -149,6 +148,15 @@ def step_values(worth, local, nodes, block, rates, below, values):
         below: (J + 1,) From ``spread``.
         values: (S, 5, M, M, Q) worth of the step with an action to a cell ``x, y``, overwritten.
     """
+    values[:] = 0.0
+    for of_period, values_of_period in zip(worth, values, strict=True):
+        for x in range(len(block)):  # between two, a signal can end it
+            _row_values(x, of_period, local, nodes, block, rates, below, values_of_period)
+
+
+@kernel
+def _row_values(x, worth, local, nodes, block, rates, below, values):
+    """Add to ``values`` what hovering in the cells of row ``x`` and flying from there is worth."""
     grid, count, levels = len(block), len(nodes), rates.shape[2]
     m = (rates.shape[1] - 1) // (grid - 1)
     scratch = (
@@ -156,31 +164,27 @@ def step_values(worth, local, nodes, block, rates, below, values):
         np.empty(count * levels + 1, np.int64), np.empty(count, np.int64),
         np.empty(count, np.int64),
     )  # fmt: skip
-    for s in range(len(worth)):
-        values[s] = 0.0
-        for x in range(grid):
-            for y in range(grid):
-                cell = values[s, HOVER, x, y]
-                _place_values(x, y, 0, True, block[x, y], worth[s], local, nodes, rates,
-                              below, scratch, cell)  # fmt: skip
-                for action in range(4):
-                    values[s, action, x, y] += cell
-                cell *= m
-        for x in range(grid):
-            for y in range(grid):
-                for along_x in (True, False):
-                    x2, y2 = x + along_x, y + (not along_x)
-                    if x2 == grid or y2 == grid:
-                        continue
-                    there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
-                    between = np.zeros((2, local.shape[1]))
-                    homes = block[x2, y2], block[x, y]
-                    for way in range(2 if homes[0] != homes[1] else 1):
-                        for n in range(1, m):
-                            _place_values(x, y, n, along_x, homes[way], worth[s], local, nodes,
-                                          rates, below, scratch, between[way])  # fmt: skip
-                    values[s, there, x2, y2] += between[0]
-                    values[s, back, x, y] += between[1 if homes[0] != homes[1] else 0]
+    for y in range(grid):
+        cell = values[HOVER, x, y]
+        _place_values(x, y, 0, True, block[x, y], worth, local, nodes, rates,
+                      below, scratch, cell)  # fmt: skip
+        for action in range(4):
+            values[action, x, y] += cell
+        cell *= m
+    for y in range(grid):
+        for along_x in (True, False):
+            x2, y2 = x + along_x, y + (not along_x)
+            if x2 == grid or y2 == grid:
+                continue
+            there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
+            between = np.zeros((2, local.shape[1]))
+            homes = block[x2, y2], block[x, y]
+            for way in range(2 if homes[0] != homes[1] else 1):
+                for n in range(1, m):
+                    _place_values(x, y, n, along_x, homes[way], worth, local, nodes,
+                                  rates, below, scratch, between[way])  # fmt: skip
+            values[there, x2, y2] += between[0]
+            values[back, x, y] += between[1 if homes[0] != homes[1] else 0]
 
 
 @kernel

@@ -20,7 +20,7 @@ from dess.rules import in_zone, zone_cell
 from dess.state import HOVER, State
 from dess.view import View
 from policies.heuristics import step_towards
-from policies.planner.fluid import CRAFT, fly
+from policies.planner.fluid import CRAFT, MOST_SLOTS, fly
 from policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
 from policies.planner.rates import rates_of
 from policies.planner.search import TRIED, empty_workspace, improve
@@ -29,8 +29,9 @@ from policies.planner.search import TRIED, empty_workspace, improve
 # and for a short one. Every so many slots, a search is thorough.
 _NEW, _THOROUGH, _SHORT = 2.0, 1.0, 0.3
 _ROUND = 8
-# Edits that are tried in one call of compiled code. Ctrl-C waits until they are.
-_EDITS = 1_000
+# The most work of a call of compiled code, as UAVs times their teammates and communication slots in
+# all slots that are planned. Ctrl-C waits until it is done.
+_WORK = 2**25
 
 
 class Budget(NamedTuple):
@@ -85,12 +86,15 @@ class Planner:
         slots = int(state.missions["max_slots"].max())
         rates, safe = rates_of(view), guard(view)
         memory = memory_of(state, self.budget)
-        workspace = empty_workspace(slots, state.uavs.shape[1], state.residual.shape[1])
+        fleet, m = state.uavs.shape[1], int(state.missions["communication_slots"][0])
+        edits = max(_WORK // (min(slots, MOST_SLOTS) * fleet * (fleet + m)), 1)
+        workspace = empty_workspace(slots, fleet, state.residual.shape[1])
         actions, decided = np.empty(len(view), np.int64), 0
         while decided < len(view):
             decided = _decide(
                 state.missions, state.uavs, state.residual, view.world.nodes, rates,
                 memory, workspace, view.mission, view.uav, safe, self.budget, actions, decided,
+                edits,
             )  # fmt: skip
         return actions
 
@@ -121,10 +125,9 @@ def memory_of(state: State, budget: Budget) -> Memory:
 @kernel
 def _decide(
     missions, uavs, residual, nodes, rates, memory, workspace,
-    rows_mission, rows_uav, safe, budget, actions, decided,
+    rows_mission, rows_uav, safe, budget, actions, decided, most,
 ):  # fmt: skip
-    """Choose the actions of rows; return how many are decided once enough edits were tried."""
-    most = _EDITS
+    """Choose the actions of rows; return how many are decided once ``most`` edits were tried."""
     for row in range(decided, len(rows_mission)):
         if most <= 0:
             return row

@@ -1,6 +1,8 @@
 """Both engines, any grouping: the same mission is the same record, bit for bit."""
 
 from collections.abc import Sequence
+from threading import active_count, get_ident
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -8,8 +10,8 @@ import pytest
 from hypothesis import event, given
 from hypothesis import strategies as st
 
-from dess import InputError
-from dess.batch import simulate_batch
+from dess import InputError, batch
+from dess.batch import BATCH_SIZE, MOST_WORK, simulate_batch
 from dess.mission import simulate
 from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
@@ -166,6 +168,56 @@ def test_a_batch_is_its_missions_in_any_order_and_grouping() -> None:
 def test_workers_change_nothing(workers: int) -> None:
     one = simulate_batch(BUSY, [Fidget(), Wanderer()], 4, 13, workers=1)
     assert _equal(simulate_batch(BUSY, [Fidget(), Wanderer()], 4, 13, workers=workers), one)
+
+
+class _Endless:
+    """A policy that fails in one thread, and never ends in the others."""
+
+    name = "endless"
+    failing = -1
+
+    def act(self, view: View) -> np.ndarray:
+        if self.failing < 0:
+            self.failing = get_ident()
+        waited = 0
+        while self.failing != get_ident() and waited < 20_000:
+            sleep(0.001)
+            waited += 1
+        raise RuntimeError("waited" if waited == 20_000 else "failed")
+
+
+def test_an_error_in_one_thread_ends_the_others() -> None:
+    """So does Ctrl-C, which is raised in the main thread."""
+    policy, threads = _Endless(), active_count()
+    with pytest.raises(RuntimeError, match="failed"):
+        simulate_batch(BUSY, policy, 4, 13, workers=3)
+    assert active_count() == threads
+
+
+def test_a_batch_is_small_where_a_mission_is_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A slot of all missions in progress is one call of compiled code, which cannot be ended."""
+    advanced: list[int] = []
+    original = batch._advance
+
+    def counted(job_of: np.ndarray, *others: Any) -> None:
+        advanced.append(len(job_of))
+        original(job_of, *others)
+
+    monkeypatch.setattr(batch, "_advance", counted)
+    whole = simulate_batch(BUSY, Fidget(), 9, 30)
+    assert {*advanced} == {30}
+    monkeypatch.setattr(batch, "MOST_WORK", 5 * batch.work_of(BUSY))
+    advanced.clear()
+    assert _equal(simulate_batch(BUSY, Fidget(), 9, 30), whole)
+    assert {*advanced} == {5}
+    large = ScenarioSpace.of(
+        grid=57,
+        zone=[0, 0, 57, 57],
+        uavs=64,
+        communication_slots=64,
+        nodes=[[x, y] for x in range(32) for y in range(32)],
+    )
+    assert batch.work_of(large) > MOST_WORK > BATCH_SIZE * batch.work_of(load_scenario("paper"))
 
 
 @given(st.lists(spaces(), min_size=2, max_size=5), st.data(), seeds)

@@ -15,6 +15,7 @@ from dess.scenario import ScenarioSpace
 from dess.state import TRUNCATED
 from dess.view import View
 from policies.planner import LongPlanner, Planner, plan_of
+from policies.planner import policy as module
 from policies.planner.policy import _MEMORIES, Budget, memory_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 
@@ -51,6 +52,25 @@ def test_the_planner_does_the_same_in_any_engine_and_batch(
     )
     for job, number in enumerate(numbers):
         _same(simulate(space, team, seed, number), records, job)
+
+
+def test_a_call_of_compiled_code_takes_a_moment_on_any_sea(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The larger a mission is, the fewer edits are tried in one call; it changes no decision."""
+    tried: list[int] = []
+    original = module._decide
+
+    def counted(*arguments: Any) -> int:
+        tried.append(arguments[-1])
+        return original(*arguments)
+
+    monkeypatch.setattr(module, "_decide", counted)
+    space = load_scenario("paper", max_slots=12)
+    records = simulate_batch(space, QUICK, 1, 3)
+    assert min(tried) > QUICK.budget.new
+    monkeypatch.setattr(module, "_WORK", module._WORK // min(tried))
+    tried.clear()
+    assert simulate_batch(space, QUICK, 1, 3).missions.tobytes() == records.missions.tobytes()
+    assert {*tried} == {1}
 
 
 @given(spaces(), seeds, replications)
