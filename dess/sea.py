@@ -118,7 +118,7 @@ def _of_csv(path: Path) -> tuple[bool, list[Place]]:
 
 def _of_geojson(path: Path) -> tuple[bool, list[Place]]:
     """True, because the positions in GeoJSON are geographic, and where the nodes are."""
-    features = _Collection.load(path, absent=f"allowed: {_ALLOWED}", limit=LIMIT).features
+    features = _Collection.load(path, absent=_ALLOWED, limit=LIMIT).features
     positions = [feature.geometry.coordinates[:2] for feature in features]
     return True, [Place(f"features.{n}", *position) for n, position in enumerate(positions)]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import dess
-from dess.files import read_text
+from dess.files.reading import Missing, read_text
 from dess.scenario import SAMPLED, load_scenario, scenario_names
 from policies.base import Policy
 from policies.ddqn.description import read_description
@@ -65,7 +65,7 @@ def _card(folder: Path | None) -> str:
     """The model card in the folder of a trained policy; empty without one."""
     try:
         return read_text(folder / CARD, CARD_LIMIT) if folder else ""
-    except FileNotFoundError:
+    except Missing:
         return ""
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dess.env.stepper import checked_actions
-from dess.files import read_bytes
+from dess.files.reading import read_bytes
 from dess.observations.observer import Observer
 from dess.scenario import ScenarioSpace
 from dess.view import View
@@ -55,8 +55,7 @@ class Adapter:
             weights: The file with the weights of ``act``, so that a study notices if they change.
 
         Raises:
-            FileNotFoundError, NotADirectoryError: If there is no file of weights.
-            InputError: If it cannot be read.
+            InputError: If the file of weights cannot be read.
         """
         self.name, self.observation, self.guarded = name, observation, guarded
         self._choose = act

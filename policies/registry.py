@@ -19,7 +19,7 @@ from typing import Any
 
 from dess.code.libraries import needs
 from dess.errors import InputError, one_of, shown
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from policies.base import Policy
 
 GROUP = "dess.policies"

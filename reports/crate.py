@@ -27,12 +27,13 @@ from analysis.results.files import BOUNDS, MANIFEST, partition
 from analysis.results.parquet import files_in
 from analysis.results.tables import Results
 from dess import InputError
-from dess.files import documents, read_bytes, tables
+from dess.files import documents, tables
 from dess.files.archives import write_zip
+from dess.files.reading import read_bytes, read_text
 from reports.pages.html import STUDY as EVIDENCE
 from reports.pages.html import embedded
 from reports.pages.index import LARGEST
-from reports.pages.verify import is_sealed, page_text
+from reports.pages.verify import LIMIT, is_sealed
 
 RESULTS, STUDY, SCENARIO = "results", "study.toml", "scenario.toml"
 RUN, REPORT = f"dess study run {STUDY} --out {RESULTS}", f"dess report {RESULTS}"
@@ -84,13 +85,12 @@ def check_page(page: Path, results: Results) -> None:
     Raises:
         InputError: If the file is not a page, shows other results, or has been changed.
     """
-    allowed = (
-        f"allowed: their page, as {REPORT.replace(RESULTS, str(results.store.folder))} writes it"
-    )
-    html = page_text(page, allowed)
+    command = REPORT.replace(RESULTS, str(results.store.folder))
+    allowed = f"their page, as {command} writes it"
+    html = read_text(page, LIMIT, allowed=allowed)
     keys = [Evidence.parse(text, str(page), allowed).key for text in embedded(EVIDENCE, html)]
     if keys != [results.store.manifest.key] or not is_sealed(html):
-        raise InputError(f"{page}: does not show the results of this study; {allowed}")
+        raise InputError(f"{page}: does not show the results of this study; allowed: {allowed}")
 
 
 def licence_of(text: str) -> str:

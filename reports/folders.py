@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from dess.files import check_lock, check_target
+from dess.files.locks import check_lock
+from dess.files.writing import check_target
 
 INDEX = "index.html"
 LOCK = ".index.lock"  # held while the index is written, which shows the pages of all processes

@@ -25,8 +25,9 @@ from analysis.results.documents import Count, Finite
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from dess import InputError, simulate
-from dess.files import check_target, read_text, write_file
 from dess.files.documents import Document
+from dess.files.reading import read_text
+from dess.files.writing import check_target, write_file
 from dess.view import View
 from policies.base import Policy
 from policies.registry import load_team

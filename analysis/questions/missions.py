@@ -22,7 +22,7 @@ from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results
 from analysis.stats.intervals import summary
 from dess import InputError
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, Scenario
 from dess.sections.fleet import types_of
 

@@ -19,8 +19,8 @@ from analysis.results.provenance import Origin
 from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
-from dess.files import paths_in, read_bytes
 from dess.files.documents import Document
+from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT
 from dess.record import MISSION_RECORD
 from policies.registry import TRAINED

@@ -8,7 +8,7 @@ from urllib.parse import quote
 
 from analysis.results.chunks import short_hash
 from dess import InputError
-from dess.files import paths_in
+from dess.files.reading import paths_in
 
 MANIFEST, LOCK = "manifest.json", ".lock"
 LONG = 150  # largest number of characters of a policy's name in the name of a folder

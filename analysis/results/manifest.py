@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 import dess
-from analysis.results.documents import Hash, check_versions
+from analysis.results.documents import Hash
 from analysis.results.provenance import (
     Acceptance,
     Origin,
@@ -148,12 +148,8 @@ class Manifest(Origin):
         Raises:
             InputError: If the file does not exist, is damaged, or has another version.
         """
-        absent = "allowed: a results folder, made by dess study run"
-
-        def check(data: dict) -> None:
-            check_versions(data, path, SCHEMA_VERSION, _ALLOWED)
-
-        return cls.load(path, _ALLOWED, absent, check)
+        made_by = {"version": dess.__version__, "schema_version": SCHEMA_VERSION}
+        return cls.load(path, _ALLOWED, "a results folder, made by dess study run", made_by)
 
     def extended_to(self, new: "Manifest", path: Path, accepting: int | None) -> "Manifest":
         """The manifest of a folder with these results, after a new run has added to them.
@@ -175,7 +171,7 @@ class Manifest(Origin):
         if changes and accepting is None:
             modules = ", ".join(changes)
             raise InputError(
-                f"{path}: made by other code of {modules}; {_ALLOWED}, or --accept-code"
+                f"{path}: made by other code of {modules}; allowed: {_ALLOWED}, or --accept-code"
             )
         accepted = [Acceptance(modules=changes, missions=accepting or 0)] if changes else []
         held = {team.policy: team for team in self.policies}
@@ -210,7 +206,7 @@ class Manifest(Origin):
         }
         for complaint, holds in complaints.items():
             if holds:
-                raise InputError(f"{path}: {complaint}; {_ALLOWED}")
+                raise InputError(f"{path}: {complaint}; allowed: {_ALLOWED}")
 
     @property
     def key(self) -> str:
@@ -304,7 +300,7 @@ def _suits(selected: Selected, study: StudyData, complete: bool) -> bool:
     return isinstance(selected, list) == isinstance(study.selection, Cheapest)
 
 
-_ALLOWED = "allowed: another --out, or remove the folder"
+_ALLOWED = "another --out, or remove the folder"
 
 
 def _canonical(data: Any) -> str:

@@ -21,8 +21,9 @@ from pydantic import Field, TypeAdapter
 from analysis.results.chunks import Chunk, name_of, short_hash
 from analysis.results.documents import Key, Replication
 from dess import InputError
-from dess.files import paths_in, read_bytes, write_file
+from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT, check_size, parquet_of
+from dess.files.writing import write_file
 from dess.record import EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.scenario import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.state import END_NAMES
@@ -224,10 +225,7 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     Raises:
         InputError: If it cannot be read, or takes more memory than there is.
     """
-    try:
-        content = read_bytes(path, LIMIT)
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; allowed: a file of results") from None
+    content = read_bytes(path, LIMIT, "a file of results")
     if short_hash(content) != path.stem.rpartition("-")[2]:
         return None
     words = [name for name in schema.names if name in WORDS]

@@ -28,7 +28,9 @@ from analysis.results.files import FOLDERS, LOCK, MANIFEST
 from analysis.results.manifest import Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
-from dess.files import check_folder, delete, locked, make_folder, paths_in, write_file
+from dess.files.locks import locked
+from dess.files.reading import paths_in
+from dess.files.writing import check_folder, delete, make_folder, write_file
 from dess.record import Records
 
 _BUSY = "in use by another run; allowed: another --out, or wait for its end"

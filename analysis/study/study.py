@@ -24,7 +24,7 @@ from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.engine import Engine, engine_of
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, cut, one_of, validation_line
-from dess.files import Shipped
+from dess.files.shipped import Shipped
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.streams import MAX_SEED
 from policies.registry import TypedByUser, load_team, typed

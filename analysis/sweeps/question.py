@@ -34,7 +34,8 @@ from analysis.study.costs import Costs
 from analysis.study.design import Grid
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
-from dess.files import paths_in, write_file
+from dess.files.reading import paths_in
+from dess.files.writing import write_file
 from dess.scenario import ScenarioSpace, load_scenario, scenario_names
 from policies.registry import typed
 

@@ -11,7 +11,7 @@ from analysis.results.tables import Results, load_results
 from analysis.verification.checks import CONSERVATION, ENERGY, Check
 from analysis.verification.logs import Log
 from dess import InputError
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from dess.scenario import Scenario
 from dess.sections.fleet import type_of
 from dess.sections.wind import surcharges

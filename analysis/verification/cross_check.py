@@ -23,8 +23,9 @@ from analysis.study.stopping import Text
 from analysis.verification import lone_uav
 from analysis.verification.queues import suite as queues
 from dess import InputError, simulate
-from dess.files import check_target, write_file
-from dess.files.documents import Document
+from dess.files.documents import Document, Outdated
+from dess.files.reading import Missing
+from dess.files.writing import check_target, write_file
 from dess.record import MISSION_RECORD, UAV_RECORD, MissionRecord
 from dess.state import END_NAMES
 from policies.registry import files_of, load_team
@@ -36,7 +37,7 @@ MISSIONS = 50  # missions of every policy to simulate again, spread over its rep
 # Called with the number of steps done and of all steps.
 Progress = Callable[[int, int], None]
 
-_ALLOWED = "allowed: what is made by: dess report verification"
+_ALLOWED = "what is made by: dess report verification"
 
 
 def _fields(record: np.dtype) -> dict[str, Any]:
@@ -55,10 +56,6 @@ _OF_UAV = {"policy": (Text, ...), "replication": (Whole, ...), "uav": (Whole, ..
 Uav: Any = create_model(
     "Uav", __base__=Document, **_OF_UAV | _fields(UAV_RECORD) | {"end": (Text, ...)}
 )
-
-
-class Outdated(InputError):  # noqa: N818 - the missions are made again
-    """There are no missions of these results."""
 
 
 class CrossCheck(Document):
@@ -148,7 +145,7 @@ def make(folder: str | Path, results: Results, progress: Progress | None = None)
     """
     try:
         read(folder, results)
-    except Outdated:
+    except (Missing, Outdated):
         check_target(Path(folder) / FILE)
         write(simulate_missions(results, progress=progress), folder)
 
@@ -176,19 +173,14 @@ def read(folder: str | Path, results: Results) -> CrossCheck:
         results: The results of the study to which the missions must belong.
 
     Raises:
-        Outdated: If there are none, or they belong to other results.
+        Missing: If there are none.
+        Outdated: If they belong to other results.
         InputError: If they are damaged.
     """
     path, space, key = Path(folder) / FILE, results.scenario(), results.store.manifest.key
-
-    def check(data: dict) -> None:
-        if data.get("study", key) != key:
-            raise Outdated(f"{path}: belongs to other results than those of the study")
-
-    if not path.exists():
-        raise Outdated(f"{path}: no such file; {_ALLOWED}")
-    missions = CrossCheck.load(path, _ALLOWED, first=check)
-    if len(missions.rates) != len(lone_uav.offsets(space)):
-        raise InputError(f"{path}: rates are not those of the study; {_ALLOWED}")
-    queues.check_measured(missions.queues, space, str(path), _ALLOWED)
+    missions = CrossCheck.load(path, _ALLOWED, fixed={"study": key})
+    fits = {"rates": len(missions.rates) == len(lone_uav.offsets(space))}
+    fits["queues"] = queues.fits(missions.queues, space)
+    for key in (key for key, is_fit in fits.items() if not is_fit):
+        raise InputError(f"{path}: {key}: are not those of the study; allowed: {_ALLOWED}")
     return missions

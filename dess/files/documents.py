@@ -3,20 +3,27 @@
 class Notes(Document):
     author: str = Field(max_length=100, description="who wrote them")
 
-notes = Notes.load(Path("notes.json"), "allowed: what dess notes has written")
+notes = Notes.load(Path("notes.json"), "what dess notes has written")
 """
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from dess.errors import InputError, validation_line
+from dess.errors import InputError, shown, validation_line
 from dess.files.parsing import parse_json
 from dess.files.reading import read_bytes
 
 LIMIT = 256 * 2**20  # bytes of the largest document; a design point of a manifest takes about 150
+
+_NONE: Mapping[str, object] = MappingProxyType({})
+
+
+class Outdated(InputError):  # noqa: N818 - it may be no error
+    """A document is of another version, or of other data, than the wanted one."""
 
 
 class Document(BaseModel):
@@ -31,37 +38,37 @@ class Document(BaseModel):
 
     @classmethod
     def parse(
-        cls,
-        text: str | bytes,
-        where: str,
-        allowed: str = "",
-        first: Callable[[dict], object] | None = None,
+        cls, text: str | bytes, where: str, allowed: str = "", fixed: Mapping[str, object] = _NONE
     ) -> Self:
         """Read a document from its JSON text.
 
         Args:
             text: The text.
             where: The file or page that contains the text, for messages.
-            allowed: The end of the message, such as ``allowed: a page of dess report``; by default
-                what the field may be.
-            first: Called with the plain data before they are compared with the model, to refuse
-                those of another version.
+            allowed: What messages say is allowed; by default, what the field may be.
+            fixed: Values that keys must have if they are there, such as a version. They are
+                compared first, as another version may have other fields.
 
         Raises:
+            Outdated: If a key has not its fixed value.
             InputError: If the text is not a valid document.
         """
         try:
             data = parse_json(text, where)  # also refuses integers that cannot be printed
-        except InputError as error:
-            raise _refused(str(error), allowed) from None
-        if not isinstance(data, dict):
-            raise _refused(f"{where}: is not an object; allowed: an object of JSON", allowed)
-        if first:
-            first(data)
-        try:
+            if not isinstance(data, dict):
+                raise InputError(f"{where}: is not an object; allowed: an object of JSON")
+            for key, value in fixed.items():
+                held = data.get(key, value)
+                if type(held) is not type(value) or held != value:
+                    line = f"{where}: has {key} {shown(held)}, not {shown(value)}; allowed: {value}"
+                    raise Outdated(_refused(line, allowed))
             return cls.model_validate_json(text, strict=True)
         except ValidationError as error:
-            raise _refused(validation_line(error, where, cls), allowed) from None
+            raise InputError(_refused(validation_line(error, where, cls), allowed)) from None
+        except Outdated:
+            raise
+        except InputError as error:
+            raise InputError(_refused(str(error), allowed)) from None
 
     @classmethod
     def load(
@@ -69,7 +76,7 @@ class Document(BaseModel):
         path: Path,
         allowed: str = "",
         absent: str = "",
-        first: Callable[[dict], object] | None = None,
+        fixed: Mapping[str, object] = _NONE,
         limit: int = LIMIT,
     ) -> Self:
         """Read a document from a file.
@@ -77,22 +84,19 @@ class Document(BaseModel):
         Args:
             path: The file.
             allowed: As for ``parse``.
-            absent: The end of the message if the file does not exist; by default ``allowed``.
-            first: As for ``parse``.
+            absent: What messages say is allowed if the file cannot be read; by default ``allowed``.
+            fixed: As for ``parse``.
             limit: The largest size of the file [bytes].
 
         Raises:
-            InputError: If the file does not exist, cannot be read, or is not valid.
+            Missing: If there is no such file.
+            Outdated: If a key has not its fixed value.
+            InputError: If the file cannot be read, or is not valid.
         """
-        try:
-            content = read_bytes(path, limit)
-        except (FileNotFoundError, NotADirectoryError):
-            raise _refused(f"{path}: no such file", absent or allowed) from None
-        except InputError as error:
-            raise _refused(str(error), allowed) from None
-        return cls.parse(content, str(path), allowed, first)
+        content = read_bytes(path, limit, absent or allowed or "a file")
+        return cls.parse(content, str(path), allowed, fixed)
 
 
-def _refused(line: str, allowed: str) -> InputError:
-    """The error of a line, with other words for what is allowed, if there are some."""
-    return InputError(f"{line.partition('; allowed:')[0]}; {allowed}" if allowed else line)
+def _refused(line: str, allowed: str) -> str:
+    """The line, with other words for what is allowed, if there are some."""
+    return f"{line.partition('; allowed:')[0]}; allowed: {allowed}" if allowed else line

@@ -23,27 +23,34 @@ _KINDS = {
 }
 
 
-def read_text(path: Path, limit: int = TEXT_LIMIT, encoding: str = "utf-8") -> str:
+class Missing(InputError):  # noqa: N818 - it may be no error
+    """There is no such file."""
+
+
+def read_text(
+    path: Path, limit: int = TEXT_LIMIT, encoding: str = "utf-8", allowed: str = "a file"
+) -> str:
     """The text of a regular file.
 
     Args:
         path: The file, or a link to it.
         limit: The largest size that is read [bytes].
         encoding: Its encoding.
+        allowed: What messages say is allowed in the place of another file.
 
     Raises:
-        FileNotFoundError, NotADirectoryError: If there is no such file.
+        Missing: If there is no such file.
         InputError: If it is no regular file, too large, not text, or cannot be read.
     """
     try:
-        return read_bytes(path, limit).decode(encoding)
+        return read_bytes(path, limit, allowed).decode(encoding)
     except UnicodeDecodeError:
         raise InputError(f"{path}: cannot be read: it is not text; allowed: UTF-8") from None
 
 
-def read_bytes(path: Path, limit: int = TEXT_LIMIT) -> bytes:
+def read_bytes(path: Path, limit: int = TEXT_LIMIT, allowed: str = "a file") -> bytes:
     """The content of a regular file; arguments and errors are those of ``read_text``."""
-    with _opened(path, limit) as file:
+    with _opened(path, limit, allowed) as file:
         # A file of the system that waits for data gives None.
         pieces = islice(iter(lambda: file.read(_PIECE) or b"", b""), limit // _PIECE + 1)
         content = b"".join(pieces)  # reading up to the limit at once would allocate as much
@@ -52,14 +59,9 @@ def read_bytes(path: Path, limit: int = TEXT_LIMIT) -> bytes:
     return content
 
 
-def checked(path: Path, limit: int) -> Path:
-    """The path of a file that ``read_bytes`` would read, for a library that opens it itself.
-
-    Raises:
-        FileNotFoundError, NotADirectoryError: If there is no such file.
-        InputError: If it is no regular file, too large, or cannot be read.
-    """
-    with _opened(path, limit):
+def checked(path: Path, limit: int, allowed: str = "a file") -> Path:
+    """The path of a file that ``read_bytes`` would read, for a library that opens it itself."""
+    with _opened(path, limit, allowed):
         return path
 
 
@@ -86,23 +88,25 @@ def kind_of(found: os.stat_result) -> str:
 
 
 @contextmanager
-def _opened(path: Path, limit: int) -> Iterator[BinaryIO]:
+def _opened(path: Path, limit: int, allowed: str) -> Iterator[BinaryIO]:
     """A regular file of at most ``limit`` bytes; nothing blocks, whatever is in its place."""
     try:
         with open(path, "rb", opener=_open_at_once) as file:
             found = os.fstat(file.fileno())
             if not stat.S_ISREG(found.st_mode):
-                raise InputError(f"{path}: cannot be read: it is {kind_of(found)}; allowed: a file")
+                raise OSError(None, f"it is {kind_of(found)}")
             if found.st_size > limit:
                 raise _too_large(path, limit)
             yield file
-    except (FileNotFoundError, NotADirectoryError, InputError):
+    except InputError:
         raise
+    except (FileNotFoundError, NotADirectoryError):
+        raise Missing(f"{path}: no such file; allowed: {allowed}") from None
     except IsADirectoryError:
-        raise InputError(f"{path}: cannot be read: it is a folder; allowed: a file") from None
+        raise InputError(f"{path}: cannot be read: it is a folder; allowed: {allowed}") from None
     except (OSError, ValueError) as error:  # a ValueError for a path with a null character
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: cannot be read: {reason}; allowed: a file") from None
+        raise InputError(f"{path}: cannot be read: {reason}; allowed: {allowed}") from None
 
 
 def _open_at_once(path: str, flags: int) -> int:

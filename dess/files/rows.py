@@ -47,7 +47,8 @@ def rows_in(path: Path) -> tuple[list[str], list[Row]]:
         InputError: If the file cannot be read, or is no CSV file.
     """
     try:
-        lines = csv.reader(io.StringIO(read_text(path, LIMIT, "utf-8-sig")), strict=True)
+        text = read_text(path, LIMIT, "utf-8-sig", "a CSV file")
+        lines = csv.reader(io.StringIO(text), strict=True)
         columns = [name.strip() for name in next(lines, [])]
         rows = []
         for row in lines:
@@ -55,8 +56,6 @@ def rows_in(path: Path) -> tuple[list[str], list[Row]]:
             if any(texts):
                 cells = dict.fromkeys(columns, "") | dict(zip(columns, texts, strict=False))
                 rows.append(Row(path, f"line {lines.line_num}", cells))
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; allowed: a CSV file") from None
     except csv.Error as error:
         raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
     return columns, rows

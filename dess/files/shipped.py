@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from dess.errors import InputError, one_of, shown
 from dess.files.parsing import is_text, parse_toml
-from dess.files.reading import read_text
+from dess.files.reading import Missing, read_text
 
 # The largest TOML file that is read [bytes].
 TOML_LIMIT = 4 * 2**20
@@ -74,6 +74,6 @@ class Shipped(NamedTuple):
             return where, parse_toml(file.read_text("utf-8"), where)
         try:
             return text, parse_toml(read_text(Path(text), TOML_LIMIT), text)
-        except (FileNotFoundError, NotADirectoryError):
+        except Missing:
             allowed = one_of(text, self.names(), "a TOML file")
             raise InputError(f"{text}: no such {self.kind}{allowed}") from None

@@ -1,10 +1,9 @@
 """Tables in parquet files."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from dess.code.memory import check_memory
@@ -13,14 +12,6 @@ from dess.files.reading import read_bytes
 from dess.files.writing import write_file
 
 LIMIT = 2**30  # bytes of the largest file
-# The types of columns in words, and the types of Arrow that they may have.
-_WORDS = {str: "text", bool: "truth values", int: "integers", float: "numbers"}
-_TYPES = {
-    str: (pa.types.is_string, pa.types.is_large_string),
-    bool: (pa.types.is_boolean,),
-    int: (pa.types.is_integer,),
-    float: (pa.types.is_integer, pa.types.is_floating),
-}
 
 
 def write_table(path: Path, table: pa.Table) -> None:
@@ -39,42 +30,40 @@ def parquet_of(table: pa.Table) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
-def read_table(path: Path, columns: Mapping[str, type] | None = None) -> pa.Table:
+def read_table(path: Path, schema: pa.Schema | None = None) -> pa.Table:
     """Read a table.
 
     Args:
         path: The file.
-        columns: The columns that are read, each of ``str``, ``bool``, ``int`` or ``float`` (finite
-            numbers, also integers); others are left out. By default all, of any type.
+        schema: The columns that are read, with their types; none of their values may be missing or
+            infinite. Other columns are left out. By default all columns are read as they are.
 
     Raises:
         InputError: If there is no such file, if it is no such table, or takes more memory than
             there is.
     """
+    place = ""
     try:
-        file = pq.ParquetFile(pa.BufferReader(read_bytes(path, LIMIT)))
-        wanted = [*columns] if columns else file.schema_arrow.names
-        if missing := [name for name in wanted if name not in file.schema_arrow.names]:
-            raise InputError(f"{path}: has no column {missing[0]}; allowed: {', '.join(wanted)}")
+        file = pq.ParquetFile(pa.BufferReader(read_bytes(path, LIMIT, "a parquet file")))
         check_size(path, file.metadata)
-        table = file.read(wanted, use_threads=False)
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; allowed: a parquet file") from None
+        table = file.read(use_threads=False)
+        if schema:
+            for place in schema.names:
+                if not _is_sound(table[place].cast(schema.field(place).type)):
+                    raise ValueError
+            table = table.select(schema.names).cast(schema)
+        return table
     except InputError:
         raise
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
-        raise InputError(f"{path}: damaged, or no parquet file; allowed: a parquet file") from None
-    for name, kind in (columns or {}).items():
-        if not len(table) or not _is_of(kind, table[name]):
-            raise InputError(f"{path}: {name} has other values; allowed: {_WORDS[kind]}")
-    return table
+        wrong = f"has no sound column {place}" if place else "damaged, or no parquet file"
+        raise InputError(f"{path}: {wrong}; allowed: a parquet file") from None
 
 
-def _is_of(kind: type, column: pa.ChunkedArray) -> bool:
-    """Whether all values of a column are there, of a type, and finite."""
-    if column.null_count or not any(of_kind(column.type) for of_kind in _TYPES[kind]):
-        return False
-    return kind is not float or bool(np.isfinite(column.to_numpy()).all())
+def _is_sound(column: pa.ChunkedArray) -> bool:
+    """Whether a column has values, and all of them, and finite ones."""
+    is_finite = not pa.types.is_floating(column.type) or pc.all(pc.is_finite(column)).as_py()
+    return len(column) > 0 and not column.null_count and is_finite
 
 
 def check_size(path: Path, metadata: pq.FileMetaData) -> None:

@@ -14,12 +14,12 @@ import torch
 from pydantic import Field, create_model
 
 from dess.errors import InputError
-from dess.files import parse_json
 from dess.files.documents import Document
+from dess.files.parsing import parse_json
 from dess.record import MISSION_RECORD
 from policies.ddqn import tensors
 from policies.ddqn.config import CHECKPOINT, TrainingConfig
-from policies.ddqn.description import Name, Number, Sha256, check_format
+from policies.ddqn.description import Name, Number, Sha256
 from policies.ddqn.ranges import check_finite, check_replay, check_state
 from policies.ddqn.tensors import Tensors, array_of, bytes_of, part
 from policies.ddqn.trained import require_version
@@ -151,9 +151,7 @@ def load_training(
     values, metadata = tensors.read(path, HEADER_LIMIT + (2**36 if limit is None else limit))
     if "dess" not in metadata:
         raise InputError(f"{path}: no checkpoint of a training; allowed: {CHECKPOINT} of one")
-    header = Header.parse(
-        metadata["dess"], str(path), first=lambda data: check_format(data, path, FORMAT)
-    )
+    header = Header.parse(metadata["dess"], str(path), fixed={"format": FORMAT})
     raw = parse_json(metadata["dess"], str(path))
     training = Training(config, device)
     settings = config.model_dump(mode="json") | {"scenario": training.space.model_dump(mode="json")}

@@ -22,7 +22,7 @@ from pydantic import (
 )
 
 from dess.errors import InputError, shown, validation_line
-from dess.files import Shipped
+from dess.files.shipped import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
 
 _CONFIGS = Shipped("config", "policies.ddqn", "configs")

@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from dess.errors import InputError, shown
 from dess.files.documents import Document
 from policies.ddqn.config import Name, TrainingConfig
 
@@ -69,26 +68,5 @@ def read_description(folder: Path) -> Description:
     Raises:
         InputError: If there is none, or it is damaged or of another version.
     """
-    path = folder / CONFIG
-
-    def check(data: dict) -> None:
-        check_format(data, path, FORMAT)
-
-    absent = "allowed: the folder of a trained policy"
-    return Description.load(path, absent=absent, first=check, limit=LIMIT)
-
-
-def check_format(data: dict, path: Path, version: int) -> None:
-    """Refuse a document of another version of its format.
-
-    Args:
-        data: The document as plain data; one without ``format`` is not refused.
-        path: Its file.
-        version: The version that it must have.
-
-    Raises:
-        InputError: If it has another version.
-    """
-    held = data.get("format", version)
-    if type(held) is not int or held != version:
-        raise InputError(f"{path}: format {shown(held)} is unknown; allowed: {version}")
+    absent, fixed = "the folder of a trained policy", {"format": FORMAT}
+    return Description.load(folder / CONFIG, "", absent, fixed, LIMIT)

@@ -19,8 +19,10 @@ import dess
 from dess.batch import BATCH_SIZE
 from dess.code.memory import check_memory
 from dess.errors import InputError, shown
-from dess.files import check_folder, locked, paths_in, writable
+from dess.files.locks import locked
+from dess.files.reading import paths_in
 from dess.files.tables import write_table
+from dess.files.writing import check_folder, writable
 from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV

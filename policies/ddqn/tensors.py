@@ -12,7 +12,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 
 from dess.errors import InputError, shown
-from dess.files import checked, replacing
+from dess.files.reading import checked
+from dess.files.writing import replacing
 
 Tensors = dict[str, torch.Tensor]
 
@@ -43,11 +44,9 @@ def read(path: Path, limit: int) -> tuple[Tensors, dict[str, str]]:
         InputError: If it does not exist, is too large or is no such file.
     """
     try:
-        with safe_open(checked(path, limit), "pt") as file:
+        with safe_open(checked(path, limit, "a file of a training"), "pt") as file:
             names = file.keys()
             return {name: file.get_tensor(name) for name in names}, file.metadata() or {}
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file") from None
     except InputError:
         raise
     except (OSError, SafetensorError, ValueError) as error:

@@ -8,6 +8,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 
 from dess.errors import InputError
-from dess.files import read_bytes, write_file
+from dess.files.reading import Missing, read_bytes
+from dess.files.writing import write_file
 from dess.observations.observer import ENCODERS
 from dess.observations.states import layout_of
 from dess.scenario import ScenarioSpace
@@ -75,9 +77,9 @@ def save_policy(
     values = {name: value.detach().cpu().contiguous() for name, value in weights.items()}
     content = save(values, {"format": str(FORMAT)})
     sums = [_sha256(content)]
-    held = _held(folder / MODEL)
-    if held is not None and _sha256(held) not in sums:
-        write_file(folder / CONFIG, _text(description, [*sums, _sha256(held)]))
+    with suppress(Missing):
+        held = _sha256(read_bytes(folder / MODEL, MODEL_LIMIT))
+        write_file(folder / CONFIG, _text(description, [*dict.fromkeys([*sums, held])]))
     write_file(folder / MODEL, content)
     write_file(folder / CONFIG, _text(description, sums))
 
@@ -106,8 +108,7 @@ def load_policy(folder: Path) -> DDQN:
     """
     path, description = folder / MODEL, read_description(folder)
     config, where = description.training, folder / CONFIG
-    if (content := _held(path)) is None:
-        raise InputError(f"{path}: no such file; allowed: the folder of a trained policy")
+    content = read_bytes(path, MODEL_LIMIT, "the folder of a trained policy")
     sums = description.model_sha256
     if sums is not None and _sha256(content) not in sums:
         if read_description(folder) != description:  # a training has just replaced both files
@@ -155,14 +156,6 @@ def _weights_in(content: bytes, path: Path) -> tensors.Tensors:
         return load(content)
     except (SafetensorError, ValueError) as error:
         raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
-
-
-def _held(path: Path) -> bytes | None:
-    """The content of a file of weights, if there is one."""
-    try:
-        return read_bytes(path, MODEL_LIMIT)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
 
 
 def _text(description: Description, sums: list[str]) -> str:

@@ -12,7 +12,8 @@ from tempfile import TemporaryDirectory
 from typing import Any, TextIO
 
 from dess.errors import InputError, cut, printable
-from dess.files import read_bytes, replacing_all
+from dess.files.reading import read_bytes
+from dess.files.writing import replacing_all
 
 LARGEST = 2**32  # bytes of a file for standard output
 MESSAGE = 300  # the longest line that says why a command fails

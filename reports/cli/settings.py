@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dess.errors import InputError, one_of, shown
-from dess.files import parse_toml
+from dess.files.parsing import parse_toml
 from reports.cli import completion
 
 if TYPE_CHECKING:

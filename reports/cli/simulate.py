@@ -94,7 +94,7 @@ def simulate(
     """Simulate one mission with the SimPy model."""
     from analysis.execution.effort import check_missions
     from dess import simulate
-    from dess.files import writable
+    from dess.files.writing import writable
     from dess.state import check_seed, sample_scenario
     from policies.registry import TypedByUser, load_team
 
@@ -241,8 +241,8 @@ class _Mission:
 def _write_log(mission: _Mission, path: Path, kind: str) -> None:
     import pyarrow as pa
 
-    from dess.files import fill
     from dess.files.tables import parquet_of
+    from dess.files.writing import fill
 
     fill(path, parquet_of(pa.table(mission.log)))
 
@@ -254,7 +254,7 @@ def _draw(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
-    from dess.files import fill
+    from dess.files.writing import fill
     from reports.pages.mission import mission_page
     from reports.player.animation import write_animation
 

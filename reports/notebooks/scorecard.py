@@ -28,7 +28,7 @@ from analysis import load_results
 from analysis.questions.learning.files import read_curves
 from analysis.questions.optimality import gap
 from analysis.replication.scorecard import PAPERS_NETWORK, departures, scorecard
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from policies.ddqn.description import read_description
 from reports.pages import html
 from reports.pages.scorecard import as_html

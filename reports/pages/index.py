@@ -14,7 +14,7 @@ from markupsafe import Markup
 
 from analysis.results.evidence import Evidence
 from dess import InputError
-from dess.files import paths_in, read_text
+from dess.files.reading import Missing, paths_in, read_text
 from reports.folders import INDEX, PREFIX
 from reports.pages import html
 from reports.pages.notebook import NAMES, SCORECARD, Report
@@ -97,9 +97,9 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
             if not is_sealed(content) or not _is_plain("".join(_SCORECARD.findall(content))):
                 raise InputError("altered")
             _evidence([content])
-        except FileNotFoundError:
+        except Missing:
             continue
-        except (OSError, InputError):
+        except InputError:
             log.warning("%s: altered, or of another version; the index leaves it out", path)
         else:
             pages[path.name] = content
@@ -115,10 +115,7 @@ def _is_plain(html: str) -> bool:
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
     """The evidence of all studies in the pages, without duplicates."""
     texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
-    return [
-        Evidence.parse(text, "page", "allowed: a page of dess report")
-        for text in dict.fromkeys(texts)
-    ]
+    return [Evidence.parse(text, "page", "a page of dess report") for text in dict.fromkeys(texts)]
 
 
 def _card_of_study(name: str, content: str) -> Card:

@@ -25,7 +25,7 @@ from nbconvert.filters import strip_ansi
 from nbformat import NotebookNode
 
 from dess import InputError
-from dess.files import temporary_folder
+from dess.files.locks import temporary_folder
 from reports.pages.notebook import Report
 
 # Called after every cell, with the number of cells run so far and of all cells, and the report.

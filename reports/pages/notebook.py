@@ -20,7 +20,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from dess.errors import InputError, one_of
-from dess.files import paths_in, read_text
+from dess.files.reading import paths_in, read_text
 from reports.pages.parameters import values_of, with_paths, with_values
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"

@@ -21,7 +21,8 @@ from pygments.lexers import PythonLexer
 from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
-from dess.files import delete, locked, making, write_files
+from dess.files.locks import locked
+from dess.files.writing import delete, making, write_files
 from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import missions
 from reports.pages.index import index_of, pages_in

@@ -27,7 +27,7 @@ from analysis.results.resimulate import difference
 from analysis.results.store import Store
 from analysis.results.tables import Results, results_of
 from dess import InputError, simulate
-from dess.files import paths_in, read_text
+from dess.files.reading import paths_in, read_text
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
 from policies.registry import load_team, permitted
@@ -38,7 +38,7 @@ BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each t
 
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
-_ALLOWED = "allowed: a page of dess report, or a results folder"
+_ALLOWED = "a page of dess report, or a results folder"
 
 
 @dataclass(frozen=True)
@@ -101,20 +101,6 @@ def is_sealed(html: str) -> bool:
     return _SEAL.search(html) is not None and sealed(html) == html
 
 
-def page_text(path: Path, allowed: str) -> str:
-    """The text of a page.
-
-    Raises:
-        InputError: If it cannot be read; the message says what is allowed.
-    """
-    try:
-        return read_text(path, LIMIT)
-    except (FileNotFoundError, NotADirectoryError):
-        raise InputError(f"{path}: no such file; {allowed}") from None
-    except InputError as error:
-        raise InputError(f"{str(error).partition('; allowed:')[0]}; {allowed}") from None
-
-
 def verify_page(
     path: Path, missions: int, seed: int, named: Collection[str] = (), yes: bool = False
 ) -> list[Check]:
@@ -131,9 +117,9 @@ def verify_page(
         InputError: If the file is not a page of dess, a policy cannot be loaded, or the missions
             may take more than an hour.
     """
-    html = page_text(path, _ALLOWED)
+    html = read_text(path, LIMIT, allowed=_ALLOWED)
     if not _SEAL.search(html):
-        raise InputError(f"{path}: is not a page of dess; {_ALLOWED}")
+        raise InputError(f"{path}: is not a page of dess; allowed: {_ALLOWED}")
     altered = [] if is_sealed(html) else ["the page has been altered"]
     files = [_check_files(text, path) for text in embedded(FILES, html)]
     studies = [Evidence.parse(text, str(path), _ALLOWED) for text in embedded(STUDY, html)]
@@ -164,7 +150,7 @@ def verify_results(
     """
     folders = [path.parent for path in paths_in(folder, f"**/{MANIFEST}")]
     if not folders:
-        raise InputError(f"{folder}: contains no results and is not a page; {_ALLOWED}")
+        raise InputError(f"{folder}: contains no results and is not a page; allowed: {_ALLOWED}")
     sampling = _Sampling(missions, seed, named, yes)
     if folders == [folder]:
         return _check_study(Store.read(folder), sampling)
@@ -286,7 +272,7 @@ def _check_files(text: str, path: Path) -> Check:
     try:
         files = TypeAdapter(dict[str, str]).validate_json(text)
     except ValidationError:
-        raise InputError(f"{path}: its list of files is not valid; {_ALLOWED}") from None
+        raise InputError(f"{path}: its list of files is not valid; allowed: {_ALLOWED}") from None
     shipped = learned_files()
     others = [name for name, digest in files.items() if shipped.get(name) != digest]
     return Check(

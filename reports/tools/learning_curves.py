@@ -22,7 +22,7 @@ import pyarrow as pa
 from analysis.names import METRICS, PRODUCT
 from analysis.questions.learning.files import read_curves
 from dess import simulate_batch
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of

@@ -19,7 +19,8 @@ from analysis.questions.learning.files import read_curve
 from analysis.replication import paper
 from analysis.stats.intervals import interval_of, mean_interval
 from dess import load_scenario, simulate_batch
-from dess.files import read_text, write_file
+from dess.files.reading import read_text
+from dess.files.writing import write_file
 from policies.about import CARD
 from policies.ddqn.config import MISSION_SEED, load_config
 from policies.ddqn.description import read_description

@@ -10,15 +10,11 @@ from pathlib import Path
 import pytest
 
 from dess.errors import InputError
-from dess.files import (
+from dess.files.parsing import parse_json, parse_toml
+from dess.files.reading import Missing, checked, paths_in, read_bytes, read_text
+from dess.files.writing import (
     check_folder,
     check_target,
-    checked,
-    parse_json,
-    parse_toml,
-    paths_in,
-    read_bytes,
-    read_text,
     replacing,
     replacing_all,
     write_file,
@@ -88,10 +84,9 @@ def test_a_file_of_the_system_has_no_size_but_a_limit():
 @pytest.mark.parametrize("read", [read_bytes, read_text])
 def test_callers_say_what_is_missing(tmp_path, read):
     (tmp_path / "file").touch()
-    with pytest.raises(FileNotFoundError):
-        read(tmp_path / "none")
-    with pytest.raises(NotADirectoryError):
-        read(tmp_path / "file" / "none")
+    for path in (tmp_path / "none", tmp_path / "file" / "none"):
+        with pytest.raises(Missing, match="none: no such file; allowed: a page"):
+            read(path, allowed="a page")
 
 
 DIGITS = "9" * 5000

@@ -7,7 +7,7 @@ import pytest
 from filelock import FileLock
 
 from dess import InputError
-from dess.files import locked, temporary_folder
+from dess.files.locks import locked, temporary_folder
 
 PREFIX = "dess-trial-"
 

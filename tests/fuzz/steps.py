@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analysis.results.chunks import name_of, short_hash
-from dess.files import read_bytes, read_text
+from dess.files.reading import read_bytes, read_text
 from policies.ddqn import tensors
 from policies.ddqn.session import CHECKPOINT
 from reports.pages.verify import sealed

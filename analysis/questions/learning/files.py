@@ -7,6 +7,7 @@ curve = read_curve(Path("policies/trained/ddqn/training.parquet"))
 from pathlib import Path
 
 import pandas as pd
+import pyarrow as pa
 
 from analysis.names import METRICS
 from analysis.questions.learning.ablation import BASELINE
@@ -14,11 +15,13 @@ from analysis.questions.learning.curves import PAIRS, PRODUCT, REWARD, last_phas
 from dess.errors import InputError
 from dess.files.tables import read_table
 
-COURSE: dict[str, type] = {"phase": str, "updates": int, "uav_slots": float}
-COURSE |= {REWARD: float, PRODUCT: float}
-CURVE = COURSE | {"tick": int, "seconds": float, "is_best": bool}
-CURVE |= {f"evaluation_{metric}": float for metric in METRICS}
-CURVES = COURSE | {"variant": str, "seed": int} | {f"final_{m}": float for m in METRICS}
+_COURSE = {"phase": pa.string(), "updates": pa.int64(), "uav_slots": pa.float64()}
+_COURSE |= dict.fromkeys((REWARD, PRODUCT), pa.float64())
+_EVALUATED = {f"evaluation_{metric}": pa.float64() for metric in METRICS}
+_FINAL = {f"final_{metric}": pa.float64() for metric in METRICS}
+_OF_TRAINING = {"tick": pa.int64(), "seconds": pa.float64(), "is_best": pa.bool_()}
+CURVE = pa.schema(_COURSE | _OF_TRAINING | _EVALUATED)
+CURVES = pa.schema(_COURSE | {"variant": pa.string(), "seed": pa.int64()} | _FINAL)
 
 
 def read_curve(path: Path) -> pd.DataFrame:
@@ -46,15 +49,11 @@ def read_curves(path: Path) -> pd.DataFrame:
         if any(part.to_numpy().tolist() != steps[0].to_numpy().tolist() for part in steps):
             raise InputError(f"{path}: seed has other updates; allowed: those of the variant")
         _check_steps(steps[0], path)
-    pairs = pairs_in(curves)
-    if BASELINE not in {*curves["variant"]} or not pairs:
-        known = " and ".join(PAIRS[next(iter(PAIRS))])
+    averages, pairs = curves.assign(value=0.0), pairs_in(curves).values()
+    ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
+    if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
+        known = " and ".join(next(iter(PAIRS.values())))
         raise InputError(f"{path}: variant has no pair of trainings; allowed: {known}")
-    averages = curves.assign(value=0.0)
-    for pair in pairs.values():
-        a, b = (last_phase(averages, variant).index for variant in pair)
-        if not len(a.intersection(b)):
-            raise InputError(f"{path}: updates of {' and '.join(pair)} have nothing in common")
     return curves
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from analysis import numbers
 from analysis.questions.learning.curves import PRODUCT, last_phase, settled, smoothed
 from analysis.questions.learning.files import read_curve
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from policies.ddqn.config import TrainingConfig, learner_of
 from policies.ddqn.description import read_description
 

@@ -30,7 +30,7 @@ from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
-from dess.files import paths_in
+from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
 from policies.registry import load_team, typed
 

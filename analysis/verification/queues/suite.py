@@ -24,7 +24,6 @@ from analysis.verification.queues import theory
 from analysis.verification.queues.pads import Station
 from analysis.verification.queues.server import Server, ages_of, mission_above, visited
 from analysis.verification.queues.sources import arrivals_of, integrated
-from dess.errors import InputError, shown
 from dess.scenario import ScenarioSpace
 
 CUSTOMERS = 1000  # in a batch
@@ -221,20 +220,15 @@ def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
     return measured
 
 
-def check_measured(measured: Measured, space: ScenarioSpace, where: str, allowed: str) -> None:
-    """Refuse values that were read from ``where``, and are not as many as ``simulate`` returns.
-
-    Raises:
-        InputError: If there are more or fewer; ``allowed`` is the end of the message.
-    """
+def fits(measured: Measured, space: ScenarioSpace) -> bool:
+    """Whether values may be those of ``simulate``: as many, and times that grow."""
     least = dict.fromkeys(_known(space), 2) | {_VISITED: AGES, _THINNED: 2}
-    if names := sorted(measured.keys() ^ least.keys()):
-        raise InputError(f"{where}: queues: {shown(names[0])} is missing or unknown; {allowed}")
-    for name, values in measured.items():
-        if len(values) < least[name] or (name == _VISITED and len(values) > AGES):
-            raise InputError(f"{where}: queues: {name}: has {len(values)} values; {allowed}")
-    if not all(0 <= a < b < END for a, b in pairwise(measured[_THINNED])):
-        raise InputError(f"{where}: queues: {_THINNED}: are no growing times; {allowed}")
+    return (
+        measured.keys() == least.keys()
+        and all(len(values) >= least[name] for name, values in measured.items())
+        and len(measured[_VISITED]) == AGES
+        and all(0 <= a < b < END for a, b in pairwise(measured[_THINNED]))
+    )
 
 
 def _known(space: ScenarioSpace) -> dict[str, float]:

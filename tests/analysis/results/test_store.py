@@ -16,7 +16,7 @@ from analysis.results.chunks import Chunk, Failure, Part, gaps, split
 from analysis.results.manifest import Cell
 from analysis.results.store import Store
 from dess import InputError, simulate_batch
-from dess.files import replacing
+from dess.files.writing import replacing
 from policies import load
 from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
 
@@ -94,9 +94,9 @@ FOREIGN = {
     "a list": (lambda out: (out / "manifest.json").write_text("[]"), "manifest.json"),
     "other version": (
         lambda out: _rewrite(out, version="0.0.9"),
-        r"made by dess 0\.0\.9 \(schema 3\), not",
+        r"has version '0\.0\.9', not",
     ),
-    "other schema": (lambda out: _rewrite(out, schema_version=99), r"\(schema 99\), not"),
+    "other schema": (lambda out: _rewrite(out, schema_version=99), "has schema_version 99, not"),
     "other keys": (lambda out: _rewrite(out, colour="blue"), "colour"),
     "no study": (lambda out: _rewrite(out, study={}), "study: has no description"),
 }

@@ -51,7 +51,7 @@ def test_missions_that_are_missing_damaged_or_of_other_results_are_refused(
     with pytest.raises(InputError, match="not valid JSON"):
         cross_check.read(tmp_path, results)
     cross_check.write(again.model_copy(update={"study": ANOTHER}), tmp_path)
-    with pytest.raises(InputError, match="other results"):
+    with pytest.raises(InputError, match="has study 'f+', not '.*'; allowed: what is made"):
         cross_check.read(tmp_path, results)
 
 
@@ -90,9 +90,9 @@ FORGED: dict[str, Callable[[dict[str, Any]], object]] = {
     "uavs.0.odd": lambda d: d["uavs"][0].update(odd=1),
     "rates": lambda d: d["rates"].pop(),
     "slots": lambda d: d.update(slots=[]),
-    "queues: 'Node visited": lambda d: d["queues"].pop("Node visited at fixed gaps"),
-    "queues: Node visited": lambda d: d["queues"]["Node visited at fixed gaps"].pop(),
-    "queues: Thinned": lambda d: d["queues"]["Thinned arrivals"].reverse(),
+    "queues": lambda d: d["queues"].pop("Node visited at fixed gaps"),
+    "queues:": lambda d: d["queues"]["Node visited at fixed gaps"].pop(),
+    "queues: ": lambda d: d["queues"]["Thinned arrivals"].reverse(),
 }
 
 

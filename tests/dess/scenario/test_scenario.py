@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from dess import InputError, streams
 from dess.channel import world_of
-from dess.files import parse_toml
+from dess.files.parsing import parse_toml
 from dess.scenario import (
     SAMPLED,
     Scenario,

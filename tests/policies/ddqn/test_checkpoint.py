@@ -95,7 +95,10 @@ def test_a_truncated_checkpoint_is_refused(share: float, training: Training, fil
 
 def test_no_checkpoint_is_named(training: Training, folder: Path) -> None:
     nothing = folder / CHECKPOINT
-    assert _refusal(load_training, nothing, training.config, CPU) == f"{nothing}: no such file"
+    assert (
+        _refusal(load_training, nothing, training.config, CPU)
+        == f"{nothing}: no such file; allowed: a file of a training"
+    )
     policy = folder / MODEL
     line = _refusal(load_training, policy, training.config, CPU)
     assert line.startswith(f"{policy}: no checkpoint of a training")
@@ -133,7 +136,7 @@ def test_the_checkpoint_of_another_version_is_refused(training: Training, file: 
     assert_same(load_training(file, training.config, CPU), training)  # nothing changed
     _forged(file, format=3, config="another form")
     line = _refusal(load_training, file, training.config, CPU)
-    assert line == f"{file}: format 3 is unknown; allowed: 2"
+    assert line == f"{file}: has format 3, not 2; allowed: 2"
 
 
 @pytest.mark.parametrize(

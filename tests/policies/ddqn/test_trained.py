@@ -186,9 +186,9 @@ CONTENTS: dict[str, str] = {
     "3": "is not an object; allowed: an object of JSON",
     "{}": "format: is missing; allowed: 1 (version of the file)",
     '{"format": 1}': "name: is missing; allowed: text in quotes of length 1..100 (name of",
-    '{"format": 2}': "format 2 is unknown; allowed: 1",
-    '{"format": "1"}': "format '1' is unknown; allowed: 1",
-    '{"format": true}': "format True is unknown; allowed: 1",
+    '{"format": 2}': "has format 2, not 1; allowed: 1",
+    '{"format": "1"}': "has format '1', not 1; allowed: 1",
+    '{"format": true}': "has format True, not 1; allowed: 1",
 }
 
 

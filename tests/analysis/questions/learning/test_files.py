@@ -22,24 +22,23 @@ Change = Callable[[pd.DataFrame], Any]
     ("path", "read", "columns"),
     [("curves.parquet", read_curves, CURVES), ("ddqn/training.parquet", read_curve, CURVE)],
 )
-def test_shipped_curves_are_read_as_they_are(path: str, read: Any, columns: dict) -> None:
-    assert read(TRAINED / path).equals(pd.read_parquet(TRAINED / path)[[*columns]])
+def test_shipped_curves_are_read_as_they_are(path: str, read: Any, columns: Any) -> None:
+    kept = pd.read_parquet(TRAINED / path)[columns.names]
+    pd.testing.assert_frame_equal(read(TRAINED / path), kept, check_dtype=False)
 
 
 # What a forger makes of sound curves, and what the line names.
 FORGED: dict[str, Change] = {
-    "has no column variant": lambda curves: curves.drop(columns="variant"),
-    "has no column final_success": lambda curves: curves.drop(columns="final_success"),
-    "seed has other values": lambda curves: curves.assign(seed="one"),
-    "evaluation_reward has other values": lambda c: c.assign(evaluation_reward=float("inf")),
-    "uav_slots has other values": lambda c: c.assign(uav_slots=c["uav_slots"].where(c.index > 0)),
-    "phase has other values": lambda curves: curves[:0],
+    "has no sound column variant": lambda curves: curves.drop(columns="variant"),
+    "has no sound column final_success": lambda curves: curves.drop(columns="final_success"),
+    "has no sound column seed": lambda curves: curves.assign(seed="one"),
+    "has no sound column evaluation_reward": lambda c: c.assign(evaluation_reward=float("inf")),
+    "has no sound column uav_slots": lambda c: c.assign(uav_slots=c["tick"].where(c.index > 0)),
+    "has no sound column phase": lambda curves: curves[:0],
     "updates do not grow": lambda curves: curves.assign(updates=1),
     "seed has other updates": lambda c: c.drop(index=c.index[c["variant"] == "quick"][0]),
     "variant has no pair of trainings": lambda curves: curves[curves["variant"] == "quick"],
-    "updates of quick and no transfer have nothing in common": lambda c: c.assign(
-        updates=c["updates"] + (c["variant"] == "quick")
-    ),
+    "variant has no pair": lambda c: c.assign(updates=c["updates"] + (c["variant"] == "quick")),
 }
 
 

@@ -36,7 +36,7 @@ def folder(tmp_path: Path) -> Path:
             "seconds": [60, 120, 180, 240],
         }
         curve |= {"uav_slots": [1e6, 2e6, 3e6, 4e6], trained.PRODUCT: product, "is_best": True}
-        same = dict.fromkeys(CURVE.keys() - curve.keys(), 1)
+        same = dict.fromkeys({*CURVE.names} - curve.keys(), 1)
         pd.DataFrame(curve | same).to_parquet(tmp_path / name / "training.parquet")
     return tmp_path
 
