@@ -66,13 +66,6 @@ def points(results: Results) -> pd.DataFrame:
     return pd.DataFrame(columns, index=range(len(manifest.points)))
 
 
-def labelled(results: Results) -> pd.DataFrame:
-    """The missions with a column per varied field, whose values are those of ``points``."""
-    table = points(results)
-    at_points = {field: results.missions["point"].map(table[field]) for field in table}
-    return results.missions.assign(**at_points)
-
-
 def in_words(results: Results) -> list[str]:
     """Every design point in words, as ``number of UAVs 3, arrival rate 0.02``."""
     rows = points(results).to_dict("records")

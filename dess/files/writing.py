@@ -9,7 +9,7 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -179,27 +179,6 @@ def make_folder(path: Path) -> None:
         check_folder(path)
         with writable(path):
             path.mkdir(parents=True, exist_ok=True)
-
-
-@contextmanager
-def making(folders: Iterable[Path]) -> Iterator[None]:
-    """Make folders; if the body of the ``with`` block fails, remove those that are still empty.
-
-    Raises:
-        InputError: If one cannot be made.
-    """
-    made: list[Path] = []
-    try:
-        for folder in folders:
-            new = [path for path in (folder, *folder.parents) if not path.exists()]
-            make_folder(folder)
-            made += new
-        yield
-    except BaseException:
-        for path in made:
-            with suppress(OSError):  # not empty
-                path.rmdir()
-        raise
 
 
 def delete(path: Path) -> None:

@@ -84,17 +84,6 @@ def save_policy(
     write_file(folder / CONFIG, _text(description, sums))
 
 
-def add_checksum(folder: Path) -> None:
-    """Add the checksum of the weights to the description of a policy that has none.
-
-    Raises:
-        InputError: If there is no such policy, or it is damaged.
-    """
-    load_policy(folder)
-    sums = [_sha256(read_bytes(folder / MODEL, MODEL_LIMIT))]
-    write_file(folder / CONFIG, _text(read_description(folder), sums))
-
-
 def load_policy(folder: Path) -> DDQN:
     """Load a policy that ``save_policy`` wrote.
 

@@ -22,7 +22,7 @@ from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
 from dess.files.locks import locked
-from dess.files.writing import delete, making, write_files
+from dess.files.writing import delete, write_files
 from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import missions
 from reports.pages.index import index_of, pages_in
@@ -136,20 +136,18 @@ def _write(
     left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
-    needed = [out] + [results for report in reports if "results" in report.parameters]
     check_pages(out, *(report.name for report in reports))
-    with making(needed):
-        missions.make([report.name for report in reports], results, values, progress)
-        Kernels(progress).run(reports)
-        files = {report.page: _page(report) for report in reports}
-        complete = [report for report in reports if not report.failure]
-        files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
-        shown = [read(name, notebooks) for name in names_in(notebooks)]
-        with locked(out / LOCK, _BUSY, PATIENCE):
-            files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
-            write_files({out / name: text for name, text in files.items()})
-            for report in complete:
-                delete(out / f"{report.name}.partial.html")
+    missions.make([report.name for report in reports], results, values, progress)
+    Kernels(progress).run(reports)
+    files = {report.page: _page(report) for report in reports}
+    complete = [report for report in reports if not report.failure]
+    files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
+    shown = [read(name, notebooks) for name in names_in(notebooks)]
+    with locked(out / LOCK, _BUSY, PATIENCE):
+        files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
+        write_files({out / name: text for name, text in files.items()})
+        for report in complete:
+            delete(out / f"{report.name}.partial.html")
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))

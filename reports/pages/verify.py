@@ -180,21 +180,6 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     return checks
 
 
-def check_records(evidence: Evidence, missions: int, seed: int) -> Check:
-    """Simulate a random part of the sample again, with the SimPy engine, and compare the records.
-
-    Args:
-        evidence: The evidence of the study.
-        missions: The largest number of missions.
-        seed: Seed of the random choice.
-
-    Raises:
-        InputError: If a policy does not exist or is a Python file, a scenario is not valid, or the
-            missions may take more than an hour.
-    """
-    return _compared(evidence, _drawn(evidence, _Sampling(missions, seed)))
-
-
 def _drawn(evidence: Evidence, sampling: _Sampling) -> list[tuple[Mission, ScenarioSpace]]:
     """The missions of a study that are simulated again, with their scenarios."""
     study = f"study {evidence.study['name']}"

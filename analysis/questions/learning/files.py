@@ -31,9 +31,10 @@ def read_curve(path: Path) -> pd.DataFrame:
         InputError: If the file is missing or damaged, or holds no such curve.
     """
     curve = read_table(path, CURVE).to_pandas()
-    _check_steps(curve, path)
+    if not curve["updates"].is_monotonic_increasing or curve["updates"].iloc[0] < 1:
+        raise InputError(f"{path}: updates: do not grow; allowed: the training step of each row")
     if not curve["is_best"].any():
-        raise InputError(f"{path}: is_best is never true; allowed: the selected weights")
+        raise InputError(f"{path}: is_best: is never true; allowed: the selected weights")
     return curve
 
 
@@ -44,21 +45,11 @@ def read_curves(path: Path) -> pd.DataFrame:
         InputError: If the file is missing or damaged, or holds no such curves.
     """
     curves = read_table(path, CURVES).to_pandas()
-    for _, of_variant in curves.groupby("variant"):
-        steps = [part[["phase", "updates"]] for _, part in of_variant.groupby("seed")]
-        if any(part.to_numpy().tolist() != steps[0].to_numpy().tolist() for part in steps):
-            raise InputError(f"{path}: seed has other updates; allowed: those of the variant")
-        _check_steps(steps[0], path)
+    if curves.duplicated(["variant", "seed", "phase", "updates"]).any():
+        raise InputError(f"{path}: updates: are there twice; allowed: once in a phase")
     averages, pairs = curves.assign(value=0.0), pairs_in(curves).values()
     ends = [{*last_phase(averages, a).index} & {*last_phase(averages, b).index} for a, b in pairs]
     if BASELINE not in {*curves["variant"]} or not ends or not all(ends):
         known = " and ".join(next(iter(PAIRS.values())))
-        raise InputError(f"{path}: variant has no pair of trainings; allowed: {known}")
+        raise InputError(f"{path}: variant: has no pair of trainings; allowed: {known}")
     return curves
-
-
-def _check_steps(curve: pd.DataFrame, path: Path) -> None:
-    """Refuse a curve whose training steps do not grow."""
-    steps = curve["updates"]
-    if steps.iloc[0] < 1 or not (steps.diff().iloc[1:] > 0).all():
-        raise InputError(f"{path}: updates do not grow; allowed: the training step of each row")

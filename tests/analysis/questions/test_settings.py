@@ -41,13 +41,6 @@ def test_varied_fields_have_their_values_in_order(results):
     assert settings.in_words(results)[1] == "number of UAVs 3, initial data per node 10–20"
 
 
-def test_missions_are_labelled_with_hashable_values(results):
-    table = settings.labelled(results)
-    assert len(table) == len(results.missions)
-    assert {*table["initial_data"]} == {"5–7.5", "10–20"}
-    assert (table["uavs"] == results.missions["uavs"]).all()
-
-
 def test_long_and_unset_values_are_short_texts(tmp_path):
     rows = [
         {"pads": 2},

@@ -19,7 +19,7 @@ from dess.batch import simulate_batch
 from dess.scenario import load_scenario
 from policies.ddqn import trained
 from policies.ddqn.description import CONFIG, MODEL
-from policies.ddqn.trained import add_checksum, load_policy, save_policy
+from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training
 from tests.analysis.small import files_of, write_scenario
 from tests.policies.ddqn.tiny import CPU, PHASES, tiny
@@ -301,15 +301,6 @@ def test_only_regular_files_are_read(name: str, kind: str, folder: Path) -> None
         with path.open("wb") as file:
             file.truncate(2**32)
     assert _refusal(folder).startswith(f"{path}: ")
-
-
-def test_a_policy_without_a_checksum_gets_one(folder: Path) -> None:
-    described = (folder / CONFIG).read_text("utf-8")
-    _described(folder, model_sha256=None)
-    before = load_policy(folder).weights
-    add_checksum(folder)
-    assert (folder / CONFIG).read_text("utf-8") == described
-    assert load_policy(folder).weights == before
 
 
 class _Killed(BaseException):

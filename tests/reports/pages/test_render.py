@@ -559,6 +559,7 @@ def test_a_signal_ends_the_kernels_and_leaves_nothing(
     assert name == "SIGKILL" or b"KeyboardInterrupt" in error
     if name == "SIGKILL":
         assert os.listdir(tmp_path / "tmp")
+        (tmp_path / "out").mkdir()
         (tmp_path / "out" / f".dess-{running.pid}-0123abcd.tmp").write_text("half a page")
         monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
         notebooks = write_notebooks(tmp_path / "others", scorecard=SCORECARD)

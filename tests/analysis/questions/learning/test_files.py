@@ -35,10 +35,9 @@ FORGED: dict[str, Change] = {
     "has no sound column evaluation_reward": lambda c: c.assign(evaluation_reward=float("inf")),
     "has no sound column uav_slots": lambda c: c.assign(uav_slots=c["tick"].where(c.index > 0)),
     "has no sound column phase": lambda curves: curves[:0],
-    "updates do not grow": lambda curves: curves.assign(updates=1),
-    "seed has other updates": lambda c: c.drop(index=c.index[c["variant"] == "quick"][0]),
-    "variant has no pair of trainings": lambda curves: curves[curves["variant"] == "quick"],
-    "variant has no pair": lambda c: c.assign(updates=c["updates"] + (c["variant"] == "quick")),
+    "updates: are there twice": lambda curves: curves.assign(updates=1),
+    "variant: has no pair of trainings": lambda curves: curves[curves["variant"] == "quick"],
+    "variant: has no pair": lambda c: c.assign(updates=c["updates"] + (c["variant"] == "quick")),
 }
 
 
@@ -60,11 +59,11 @@ def test_what_is_no_table_is_a_line(content: bytes, tmp_path: Path) -> None:
         read_curves(path)
 
 
-def test_a_curve_without_selected_weights_is_a_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("wrong", [{"is_best": False}, {"updates": range(75, 0, -1)}])
+def test_a_forged_curve_is_a_line(wrong: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "training.parquet"
-    curve = pd.read_parquet(TRAINED / "ddqn" / "training.parquet")
-    curve.assign(is_best=False).to_parquet(path)
-    with pytest.raises(InputError, match=f"^{path}: is_best is never true"):
+    pd.read_parquet(TRAINED / "ddqn" / "training.parquet").assign(**wrong).to_parquet(path)
+    with pytest.raises(InputError, match=f"^{path}: {next(iter(wrong))}: .*; allowed: "):
         read_curve(path)
 
 
