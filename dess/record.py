@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.scenario.constants import Constants
 from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
@@ -69,6 +70,22 @@ OPERATIONS = np.dtype(
         ("slots_grounded", np.float64),  # of UAVs under repair
     ]
 )
+
+
+def measures_of(space: Constants) -> list[str]:
+    """The fields of ``OPERATIONS`` that a scenario measures.
+
+    In some missions one may still be nan, such as the latency where no packet was delivered.
+    """
+    measured = {
+        ("age", "peak_age", "age_p99"): space.age.measured,
+        ("latency", "latency_p99", "generated", "delivered", "lost_packets"): space.needs_events,
+        ("lost",): space.needs_events or space.failures.is_on,
+        ("queue", "waiting", "pad_requests", "utilisation"): space.charging.is_on,
+        ("failures", "slots_grounded"): space.failures.is_on,
+    }
+    return [name for names, is_measured in measured.items() if is_measured for name in names]
+
 
 # Columns of the event log, and the types of their arrays.
 _EVENT_COLUMNS = {

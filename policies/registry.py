@@ -47,6 +47,7 @@ TRAINED, CONFIG = Path(__file__).with_name("trained"), "config.json"
 
 # A class of a Python file.
 FILE = re.compile(r"(?P<path>.+\.py):(?P<kind>\w+)")
+_ALLOWED = "allowed: a class whose objects have a name and act(view)"
 _OTHERS = (
     "the folder of a trained policy, FILE.py:CLASS, or what an installed package registers under "
     f"the entry point {GROUP}"
@@ -134,7 +135,7 @@ def _check_untrained(folder: Path) -> None:
 
     if os.path.exists(folder / CHECKPOINT):  # False for a name that no folder can have
         raise InputError(
-            f"policy: {folder} is a training that has no weights yet; continue it with "
+            f"policy: {folder} is a training that has no weights yet; allowed: after "
             f"dess train CONFIG --out {folder} --resume"
         )
 
@@ -152,10 +153,10 @@ def _made(name: str, where: str, load_class: Callable[[], Callable[[], Any]]) ->
     except InputError:
         raise
     except Exception as error:  # code of others may raise anything; name it
-        reason = f"{type(error).__name__}: {error}"
-        raise InputError(f"policy: {name} of {where} cannot be loaded: {reason}") from error
+        line = f"policy: {name} of {where} cannot be loaded: {type(error).__name__}: {error}"
+        raise InputError(f"{line}; {_ALLOWED}") from error
     if not isinstance(policy, Policy):
-        raise InputError(f"policy: {name} of {where} has no name and act(view)")
+        raise InputError(f"policy: {name} of {where} has no name and act(view); {_ALLOWED}")
     return policy
 
 
@@ -254,7 +255,8 @@ def _outside_description(point: EntryPoint) -> str:
     try:
         words = inspect.getdoc(type(load(point.name))) or ""
     except InputError as error:
-        return f"{str(error).partition(point.value)[2].strip()} ({origin})"
+        problem = str(error).partition(point.value)[2].partition("; allowed:")[0]
+        return f"{problem.strip()} ({origin})"
     return f"{words.partition(chr(10))[0].rstrip('.')} ({origin})" if words else origin
 
 

@@ -1,11 +1,13 @@
 """What any model refuses is told in one line: where, what, and what is allowed."""
 
+import ast
 import json
 import re
 from collections.abc import Iterator
 from copy import deepcopy
 from functools import reduce
 from operator import getitem
+from pathlib import Path
 from typing import Any, get_args
 
 import pytest
@@ -16,7 +18,7 @@ from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.study.study import Study
 from analysis.verification.cross_check import CrossCheck
-from dess import InputError
+from dess import InputError, sea
 from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.scenario import Scenario, ScenarioSpace
@@ -78,6 +80,8 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield Evidence, origin | drawn
     cost = {"policy": "greedy", "calls": 1, "median": 1e-6, "slow": 1e-6}
     yield Times, {"processor": "x", "costs": [cost]}
+    point = {"type": "Point", "coordinates": [1.0, 2.0]}
+    yield sea._Collection, {"features": [{"geometry": point}]}
 
 
 def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
@@ -110,12 +114,20 @@ def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     yield CrossCheck, {"study": "0" * 16, "queues": {"batches": [0.5]}, "uavs": [of_uav]} | lists
 
 
+FLOORS = ("dess", "policies", "analysis", "reports")
 EXAMPLES = [*documents(), *tables()]
 ODD: list[Any] = [
     *(None, True, -1, 0, 1.5, 10**30, float("inf"), "", "?", "\x1b", "x" * 5000),
     *([], [1], [[1, "x"]], ["x"], [1] * 12_000, {}, {"x": 1}, {"uavs": "x"}),
 ]
 LIMITS = {"ge": max, "gt": max, "min_length": max, "le": min, "lt": min, "max_length": min}
+ROOT = Path(__file__).parents[1]
+SOURCES = [p for floor in FLOORS for p in sorted((ROOT / floor).rglob("*.py"))]
+# What a message is made of that says itself what is allowed.
+PASSED_ON = {
+    *("one_of", "validation_line", "error", "line", "busy", "end", "known", "altered"),
+    *("_refusal", "_incomplete"),
+}
 LINE = re.compile(r"input: \S.*; allowed: \S.*")
 LONGEST = 400
 # How pydantic's own messages begin.
@@ -123,7 +135,6 @@ FOREIGN = re.compile("Input should|Value error|Extra inputs|Field required|(List
 
 # Parts of documents that are among the examples themselves.
 OWN = ("scenario", "constants", "study", "training", "config")
-FLOORS = ("dess", "policies", "analysis", "reports")
 Place = tuple[str | int, ...]
 
 
@@ -177,6 +188,14 @@ def test_every_refusal_says_where_what_and_what_is_allowed(
         assert LINE.fullmatch(line)
         assert not FOREIGN.search(line)
         assert len(line) < LONGEST
+
+
+def test_every_error_of_input_says_what_is_allowed() -> None:
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == "InputError":
+                call = ast.unparse(node).lower()
+                assert "allowed" in call or {*re.findall(r"\w+", call)} & PASSED_ON, (path, call)
 
 
 def test_every_model_is_among_the_examples() -> None:

@@ -120,6 +120,26 @@ def plan_study(
     return Plan(tuple(rows), study.size, at_most, seconds, bounds)
 
 
+def check_run(
+    study: Study,
+    out: str | Path,
+    workers: int = 1,
+    accept_code: bool = False,
+    reuse: Sequence[Path] = (),
+    yes: bool = False,
+) -> None:
+    """Refuse a run that could not come to its end, before its first mission.
+
+    The arguments are those of ``check_effort``.
+
+    Raises:
+        InputError: As from ``check_effort``; or if a policy cannot act in a scenario of the study,
+            such as a learned policy on a layout that differs from that of its training.
+    """
+    if check_effort(study, out, workers, accept_code=accept_code, reuse=reuse, yes=yes):
+        _check_policies(study)
+
+
 def check_effort(
     study: Study,
     out: str | Path,
@@ -184,14 +204,10 @@ def check_effort(
     return sum(missing)
 
 
-def check_policies(study: Study) -> None:
+def _check_policies(study: Study) -> None:
     """Check that every policy can act on every layout of the design (grid, zone and nodes).
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
-
-    Raises:
-        InputError: If a policy cannot act on a layout, such as a learned policy on a layout that
-            differs from that of its training.
     """
     spaces = (point.scenario for point in study.points)
     places = [*{(space.grid, space.zone, space.nodes): space for space in spaces}.values()]

@@ -14,7 +14,7 @@ from analysis.execution.effort import (
     check_workers_memory,
     seconds_per_mission,
 )
-from analysis.execution.engines import CHUNK
+from analysis.execution.engines import CHUNK, simulate_missions
 from analysis.execution.jobs import Job, MissionsJob, Problem, Progress
 from analysis.execution.workers import Here, Pool
 from analysis.names import MEANS, SHARES
@@ -157,7 +157,7 @@ def check_evaluation(
     yes: bool = False,
     clock: Clock = time.perf_counter,
 ) -> None:
-    """Refuse ``means`` of several teams that are not valid, or that would take too much.
+    """Refuse ``means`` of several teams that could not come to their end, before the first mission.
 
     Args:
         scenario: The scenario space.
@@ -170,22 +170,24 @@ def check_evaluation(
         clock: Returns the time [s].
 
     Raises:
-        InputError: If a team is unknown or a number is out of range; if it would take long, or more
-            memory than is available.
+        InputError: If a team is unknown or cannot act in the scenario, or a number is out of range;
+            if it would take long, or more memory than is available.
     """
     for team in teams:
         _check(scenario, team, missions, seed, workers)
-    if yes:
-        return
     asked = missions * len(teams)
     what = f"evaluate: {asked:,} missions (policies: {len(teams)}, workers: {workers:,})"
-    if not are_few(asked, scenario):
-        each = [
-            seconds_per_mission(lambda n: [scenario] * n, load_team(team), engine, clock)
-            for team in teams
-        ]
-        check_time(what, missions * sum(each) / workers)
-    check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
+    if not yes:
+        check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
+    if yes or are_few(asked, scenario):
+        for team in teams[1:]:  # the first one is refused at its first mission
+            simulate_missions(engine, [scenario], load_team(team), seed, [0])
+        return
+    each = [
+        seconds_per_mission(lambda n: [scenario] * n, load_team(team), engine, clock)
+        for team in teams
+    ]
+    check_time(what, missions * sum(each) / workers)
 
 
 def _check(scenario: ScenarioSpace, team: str, missions: int, seed: int, workers: int) -> None:

@@ -18,13 +18,16 @@ from pydantic import (
 )
 
 from analysis.bound import check_scenario
+from analysis.names import BOUND, COST, GAP, metrics_in
 from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
 from analysis.study.engine import Engine, engine_of
+from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
-from dess.errors import InputError, cut, one_of, validation_line
+from dess.errors import InputError, cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
+from dess.record import measures_of
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.streams import MAX_SEED
 from policies.registry import TypedByUser, load_team, typed
@@ -167,6 +170,7 @@ class Study(StudyData):
             self.points  # noqa: B018 - they are checked when they are made
         else:
             self.point(0)
+        self._check_metrics()
         self._choose_engine()
         if self.logged > self.first:
             raise ValueError(
@@ -178,6 +182,13 @@ class Study(StudyData):
             for space in self._spaces:
                 check_scenario(space)
         return self
+
+    @property
+    def metrics(self) -> list[str]:
+        """The metrics that missions of the study have, be it only at some design points."""
+        measured = {name for space in self._spaces for name in measures_of(space)}
+        of_bounds = {BOUND, GAP} if self.bounds else set()
+        return [*metrics_in(measured | of_bounds), *([COST] if self.costs else [])]
 
     @property
     def _spaces(self) -> list[ScenarioSpace]:
@@ -206,6 +217,22 @@ class Study(StudyData):
             raise ValueError(
                 "missions: every point of a saltelli design is one mission; allowed: missions = 1"
             )
+
+    def _check_metrics(self) -> None:
+        """Check that every design point measures what the rule decides by."""
+        if self.precision:
+            key, asked = "precision.targets", {*self.precision.targets}
+        elif isinstance(self.selection, Selection):
+            key, asked = "selection.metric", {self.selection.metric}
+        else:
+            return
+        for space in self._spaces:
+            known = metrics_in(measures_of(space))
+            if absent := sorted(asked - {*known}):
+                raise ValueError(
+                    f"{key}: {absent[0]} is not measured at every design point; allowed: "
+                    f"{listed(known)}"
+                )
 
     def _check_budget(self) -> None:
         """Check that the budget of a selection is enough for its first round."""

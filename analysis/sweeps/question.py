@@ -20,7 +20,7 @@ import tomli_w
 from pydantic import ValidationError
 
 import dess
-from analysis.execution.dry_run import check_effort, check_policies
+from analysis.execution.dry_run import check_run
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import Round, run_study
 from analysis.names import ALIASES, METRICS, SWEEP, SWEEPS
@@ -161,8 +161,7 @@ def ask(
     out = folder_of(study, folder)
     others = [path.parent for path in paths_in(out.parent, f"*/{MANIFEST}") if path.parent != out]
     _check_name(study, out)
-    if check_effort(study, out, workers, reuse=others, yes=yes):
-        check_policies(study)
+    check_run(study, out, workers, reuse=others, yes=yes)
     write(study, folder)
     return run_study(study, out, workers, None, progress, announce, reuse=others)
 

@@ -162,7 +162,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         if not self.agents and not actions:
             return {}, {}, {}, {}, {}
         if not self._flying:
-            raise InputError("step: no episode is in progress; call reset() first")
+            raise InputError("step: no episode is in progress; allowed: reset() first")
         if not self._flying.keys() <= actions.keys() <= self._here.keys():
             pilots = list(self._flying)
             raise InputError(f"actions: of {sorted(actions)}; allowed: one of each of {pilots}")

@@ -148,7 +148,7 @@ class HarvestVectorEnv(VectorEnv):
         """
         state, fleet = self.state, self.state.uavs.shape[1]
         if not self._stepper.replication:  # none has been launched
-            raise InputError("step: no mission is in progress; call reset() first")
+            raise InputError("step: no mission is in progress; allowed: reset() first")
         checked = checked_actions(actions, (self.num_envs,))
         starting = np.flatnonzero(state.missions["active"] == 0)  # only with NextStep
         outcome = self._stepper.step(checked.reshape(state.uavs.shape))

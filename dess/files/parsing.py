@@ -29,7 +29,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         data = tomllib.loads(text)
         _check_depth(data)
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not valid TOML: {_reason(error)}") from None
+        raise InputError(f"{where}: not valid TOML: {_reason(error)}; allowed: TOML") from None
     return data
 
 
@@ -46,7 +46,7 @@ def parse_json(text: str | bytes, where: str) -> Any:
         if _SURROGATE.search(decoded):
             json.dumps(data, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{where}: not valid JSON: {_reason(error)}") from None
+        raise InputError(f"{where}: not valid JSON: {_reason(error)}; allowed: JSON") from None
     return data
 
 

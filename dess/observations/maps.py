@@ -46,9 +46,9 @@ class Maps:
         """
         centred = 2 * layout.grid - 1
         if not (1 <= crop <= centred and crop % 2):
-            raise InputError(f"crop: must be an odd number of 1 to {centred}, not {crop}")
+            raise InputError(f"crop: {crop} is no such number; allowed: an odd one 1..{centred}")
         if not 1 <= pool <= centred:
-            raise InputError(f"pool: must be 1 to {centred}, not {pool}")
+            raise InputError(f"pool: {pool} is out of range; allowed: 1..{centred}")
         self.layout = layout
         self.crop = crop
         self.pool = pool

@@ -29,6 +29,8 @@ FORMAT = 2
 # Room for the header of a checkpoint; safetensors allows 100 MB.
 HEADER_LIMIT = 10**8
 
+_WHOLE = "a checkpoint as dess train has written it"
+
 Amount = Annotated[float, Field(ge=0.0)]
 Word = Annotated[int, Field(ge=0, lt=2**32)]
 Words = Annotated[int, Field(ge=0, lt=2**128)]
@@ -167,11 +169,16 @@ def load_training(
     finished = len(values.get("finished", ())) // MISSION_RECORD.itemsize
     tensors.require_forms(values, _forms(training, finished), str(path))
     if tensors.digest({k: v for k, v in raw.items() if k != "sha256"}, values) != header.sha256:
-        raise InputError(f"{path}: damaged: its content has not the checksum of its header")
+        raise InputError(
+            f"{path}: damaged: its content has not the checksum of its header; allowed: {_WHOLE}"
+        )
     try:
         _restore(training, values, raw)
     except (LookupError, ValueError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged, or of another scenario: {error}") from None
+        problem = str(error).partition("; allowed:")[0]
+        raise InputError(
+            f"{path}: damaged, or of another scenario: {problem}; allowed: {_WHOLE}"
+        ) from None
     return training
 
 

@@ -50,7 +50,12 @@ def read(path: Path, limit: int) -> tuple[Tensors, dict[str, str]]:
     except InputError:
         raise
     except (OSError, SafetensorError, ValueError) as error:
-        raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
+        raise damaged(path, error) from None
+
+
+def damaged(path: Path, error: Exception) -> InputError:
+    """What is said about a file that cannot be read."""
+    return InputError(f"{path}: damaged: {error}; allowed: a safetensors file")
 
 
 def digest(content: Any, tensors: Mapping[str, torch.Tensor]) -> str:

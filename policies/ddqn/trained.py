@@ -102,7 +102,10 @@ def load_policy(folder: Path) -> DDQN:
     if sums is not None and _sha256(content) not in sums:
         if read_description(folder) != description:  # a training has just replaced both files
             return load_policy(folder)
-        raise InputError(f"{path}: damaged: it has not the checksum in {CONFIG}")
+        raise InputError(
+            f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
+            "with"
+        )
     values = description.layout.model_dump()
     try:
         layout = layout_of(ScenarioSpace.of(uavs=1, **values))
@@ -144,7 +147,7 @@ def _weights_in(content: bytes, path: Path) -> tensors.Tensors:
     try:
         return load(content)
     except (SafetensorError, ValueError) as error:
-        raise InputError(f"{path}: damaged, or no safetensors file: {error}") from None
+        raise tensors.damaged(path, error) from None
 
 
 def _text(description: Description, sums: list[str]) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dess.code.libraries import missing
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
 from reports.cli.ranges import all_settings, all_values
 from reports.cli.report import rendering
@@ -99,15 +99,10 @@ def sweep(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate every combination of values, write a page, and print the ranked settings."""
-    from analysis.names import ALIASES, COST, MEANS, MEASURES, PRODUCT, SHARES
-    from analysis.questions import settings as settings_of
+    from analysis.names import ALIASES, PRODUCT
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep
 
-    ranking, known = ALIASES.get(metric or PRODUCT, metric or PRODUCT), [*SHARES, *MEANS, COST]
-    if ranking not in (*known, *MEASURES):
-        allowed = one_of(metric, [*ALIASES, *known, *MEASURES])
-        raise InputError(f"--metric: {metric!r} is unknown{allowed}")
     study = question.question(
         all_values(settings or []),
         scenario,
@@ -118,6 +113,10 @@ def sweep(
         all_settings(require or [], "--require", SHARE),
         name,
     )
+    ranking = ALIASES.get(metric or PRODUCT, metric or PRODUCT)
+    if ranking not in study.metrics:
+        allowed = one_of(metric, [*ALIASES, *study.metrics])
+        raise InputError(f"--metric: {shown(metric)} is not measured{allowed}")
     check_pages(out, f"{PREFIX}{study.name}")
     folder, file = question.folder_of(study, results), question.file_of(study, results)
     found = complete(
@@ -126,7 +125,6 @@ def sweep(
         f"dess study run {file} --out {folder}",
     )
     answer = Sweep(study, folder, found)
-    settings_of.check_metric(found, ranking)
     if not as_json:  # the answer comes before the page, which takes longer
         _print(answer, ranking)
         console.say(f"study: {file}")

@@ -168,7 +168,7 @@ def _check_results(folder: Path) -> None:
     if not (folder / MANIFEST).exists():
         raise InputError(
             f"results: {folder} holds no results of study {folder.name}; "
-            f"they are made by: dess study run {folder.name} --out {folder}"
+            f"allowed: what is made by: dess study run {folder.name} --out {folder}"
         )
     manifest = Manifest.read(folder / MANIFEST)
     study = manifest.study["name"]

@@ -7,10 +7,22 @@ import pytest
 from hypothesis import given
 
 from dess.mission import simulate
-from dess.record import EVENT_NAMES, MISSION_RECORD, MissionRecord
+from dess.record import EVENT_NAMES, MISSION_RECORD, MissionRecord, measures_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import sample_scenario
-from tests.drawn import Commuter, Fidget, policies, replications, seeds, spaces
+from tests.drawn import (
+    Commuter,
+    Fidget,
+    continuous_spaces,
+    extended_spaces,
+    policies,
+    replications,
+    seeds,
+    spaces,
+)
+
+# Nothing was delivered, or no age has come to its end.
+NOT_ALWAYS = {"latency", "latency_p99", "peak_age"}
 
 
 def _logged(
@@ -207,3 +219,11 @@ def test_every_row_of_a_uav_has_its_battery(
     for i in range(len(record.uavs)):
         battery = log["battery"][(log["uav"] == i) & (log["event"] != "move")]
         assert battery[-1] == record.uavs["battery"][i]
+
+
+@given(extended_spaces() | continuous_spaces(), policies, seeds, replications)
+def test_a_record_has_what_the_scenario_measures(
+    space: ScenarioSpace, policy: object, seed: int, replication: int
+) -> None:
+    measured, known = {*simulate(space, policy, seed, replication).measured}, {*measures_of(space)}
+    assert known - NOT_ALWAYS <= measured <= known

@@ -20,8 +20,7 @@ import tomli_w
 from pydantic import ValidationError
 
 from analysis import numbers
-from analysis.execution.dry_run import check_effort
-from analysis.execution.engines import simulate_missions
+from analysis.execution.dry_run import check_run
 from analysis.execution.jobs import Progress
 from analysis.execution.runner import run_study
 from analysis.results.chunks import short_hash
@@ -32,7 +31,7 @@ from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, ScenarioSpace, dotted, fields_of, load_scenario
-from policies.registry import load_team, typed
+from policies.registry import typed
 
 NAME = "what-if"
 BASELINE, VARIATION = 0, 1  # the design points
@@ -138,13 +137,9 @@ def ask(
             question would take long; or if the folder cannot be written or is in use.
         ChunkError: As for ``run_study``.
     """
-    for policy in study.policies:
-        for point in study.points:
-            team = load_team(policy, point.scenario.uavs[1])
-            simulate_missions(study.engine, [point.scenario], team, study.seed, [0])
     out = Path(folder) / NAME / key_of(study)
     others = [p.parent for p in paths_in(out.parent, f"*/{MANIFEST}") if p.parent != out]
-    check_effort(study, out, workers, reuse=others, yes=yes)
+    check_run(study, out, workers, reuse=others, yes=yes)
     return run_study(study, out, workers, progress=progress, reuse=others)
 
 

@@ -63,7 +63,7 @@ def run(
     yes: YesOption = False,
 ) -> None:
     """Run a study into a results folder; run it again to resume it or to add missions."""
-    from analysis.execution.dry_run import check_effort, check_policies, plan_study
+    from analysis.execution.dry_run import check_run, plan_study
     from analysis.execution.runner import run_study
     from analysis.study.study import load_study
     from reports.cli.study.tables import print_summary
@@ -80,8 +80,7 @@ def run(
         needs("reports", "--report")
         check_pages(PAGES, f"{PREFIX}{study.name}")
     with console.compile_notice():
-        if check_effort(study, out, workers, accept_code=accept_code, yes=yes):
-            check_policies(study)
+        check_run(study, out, workers, accept_code=accept_code, yes=yes)
     results = complete(
         study.name,
         lambda progress, announce: run_study(

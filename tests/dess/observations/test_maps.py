@@ -136,11 +136,11 @@ def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
 @pytest.mark.parametrize(
     ("settings", "line"),
     [
-        ({"crop": 16}, "crop: must be an odd number of 1 to 63, not 16"),
-        ({"crop": 65}, "crop: must be an odd number of 1 to 63, not 65"),
-        ({"crop": -1}, "crop: must be an odd number of 1 to 63, not -1"),
-        ({"pool": 0}, "pool: must be 1 to 63, not 0"),
-        ({"pool": 64}, "pool: must be 1 to 63, not 64"),
+        ({"crop": 16}, "crop: 16 is no such number; allowed: an odd one 1..63"),
+        ({"crop": 65}, "crop: 65 is no such number; allowed: an odd one 1..63"),
+        ({"crop": -1}, "crop: -1 is no such number; allowed: an odd one 1..63"),
+        ({"pool": 0}, "pool: 0 is out of range; allowed: 1..63"),
+        ({"pool": 64}, "pool: 64 is out of range; allowed: 1..63"),
     ],
 )
 def test_refuses_maps_that_do_not_fit(settings: dict[str, int], line: str) -> None:

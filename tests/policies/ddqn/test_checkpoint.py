@@ -90,7 +90,7 @@ def test_a_truncated_checkpoint_is_refused(share: float, training: Training, fil
     content = file.read_bytes()
     file.write_bytes(content[: int(share * len(content))])
     line = _refusal(load_training, file, training.config, CPU)
-    assert line.startswith(f"{file}: damaged, or no safetensors file")
+    assert line.startswith(f"{file}: damaged: ")
 
 
 def test_no_checkpoint_is_named(training: Training, folder: Path) -> None:
@@ -327,7 +327,7 @@ def test_truth_values_of_missions_are_checked(training: Training, file: Path) ->
     records[UAV.fields["latch"][1]] = 7  # type: ignore[index]
     _forged(file, {"stepper.uavs": torch.from_numpy(records)})
     line = _refusal(load_training, file, training.config, CPU)
-    assert line.endswith("latch is out of range; allowed: 0..1")
+    assert ": latch is out of range; allowed: a checkpoint" in line
 
 
 def test_a_flipped_byte_changes_nothing_that_is_used(training: Training, file: Path) -> None:
