@@ -175,21 +175,8 @@ def _software(crate: ROCrate, results: Results) -> ContextEntity:
 
 
 def _library(crate: ROCrate, name: str, version: str) -> ContextEntity:
-    about = {"name": name, "version": version, "url": _homepage(name)}
-    return crate.add_jsonld({"@id": f"#{name}", "@type": "SoftwareApplication", **about})
-
-
-def _homepage(library: str) -> str:
-    """The address of a library, as its package names it."""
-    if library == "python":
-        return "https://www.python.org/"
-    try:
-        about = metadata.metadata(library)
-    except metadata.PackageNotFoundError:  # it was installed where the results were made
-        return ""
-    pairs = (text.split(", ", 1) for text in about.get_all("Project-URL") or [])
-    urls = {label.lower(): url for label, url in pairs}
-    return urls.get("homepage") or about["Home-page"] or next(iter(urls.values()), "")
+    about = {"@type": "SoftwareApplication", "name": name, "version": version}
+    return crate.add_jsonld({"@id": f"#{name}", **about})
 
 
 def _results(crate: ROCrate, results: Results) -> Dataset:

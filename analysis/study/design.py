@@ -19,6 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from analysis.study.stopping import StrictTable, of_its_kind
 from dess.errors import InputError, shown
 from dess.scenario import Integer, Scenario, dotted, fields_of
+from dess.sections.section import tuples
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
@@ -42,18 +43,11 @@ class DesignPoint:
 
 def by_field(value: Any) -> Any:
     """The values of a design by field: tables of sections become fields, lists tuples."""
-    return as_tuples(dotted(value)) if isinstance(value, dict) else value
+    return tuples(dotted(value)) if isinstance(value, dict) else value
 
 
 def _rows_by_field(value: Any) -> Any:
     return tuple(map(by_field, value)) if isinstance(value, list | tuple) else value
-
-
-def as_tuples(value: Any) -> Any:
-    """Convert the lists that TOML gives to tuples, nested lists included."""
-    if isinstance(value, dict):
-        return {key: as_tuples(item) for key, item in value.items()}
-    return tuple(as_tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 def _have_values(fields: dict[str, tuple[Any, ...]]) -> dict[str, tuple[Any, ...]]:

@@ -21,7 +21,7 @@ from analysis.bound import check_scenario
 from analysis.names import BOUND, COST, GAP, metrics_in
 from analysis.study.cheapest import AnySelection, Cheapest
 from analysis.study.costs import Costs
-from analysis.study.design import Design, DesignPoint, Saltelli, as_tuples
+from analysis.study.design import Design, DesignPoint, Saltelli
 from analysis.study.engine import Engine, engine_of
 from analysis.study.selection import Selection
 from analysis.study.stopping import MOST, Precision, StrictTable, Text
@@ -29,6 +29,7 @@ from dess.errors import InputError, cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
 from dess.record import measures_of
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
+from dess.sections.section import tuples
 from dess.streams import MAX_SEED
 from policies.registry import TypedByUser, load_team, typed
 
@@ -93,7 +94,7 @@ class StudyData(StrictTable):
         description="the design points: a table with the kind of the design; without one, the "
         "scenario is the only point",
     )
-    policies: Annotated[tuple[_Team, ...], BeforeValidator(as_tuples)] = Field(
+    policies: Annotated[tuple[_Team, ...], BeforeValidator(tuples)] = Field(
         min_length=1, description='teams: "P" or "P,P,..."'
     )
     missions: Integer = Field(

@@ -17,7 +17,9 @@ Slots = Annotated[Number, Field(ge=0, le=1_000_000)]
 
 
 def tuples(value: Any) -> Any:
-    """Convert the lists that TOML gives to tuples, nested lists included."""
+    """Convert the lists that TOML gives to tuples, nested ones and those of tables included."""
+    if isinstance(value, dict):
+        return {key: tuples(item) for key, item in value.items()}
     return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
@@ -29,9 +31,7 @@ class Section(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _lists_to_tuples(cls, values: Any) -> Any:
-        if not isinstance(values, dict):
-            return values
-        return {name: tuples(value) for name, value in values.items()}
+        return tuples(values)
 
     @property
     def is_on(self) -> bool:

@@ -201,9 +201,3 @@ def test_a_crate_has_nothing_that_links_in_the_results_lead_to(tmp_path):
         (place / f"{'a' * 16}-{'2' * 16}.parquet").symlink_to(secret)
         (place / "note.txt").symlink_to(secret)
     assert exported(tmp_path, load_results(tmp_path / "out")).read_bytes() == expected
-
-
-def test_a_library_that_is_not_here_has_no_homepage(tmp_path):
-    results = results_of(tmp_path)
-    results.store.manifest.libraries["not-here"] = "2.0"
-    assert graph_of(exported(tmp_path, results))["#not-here"]["version"] == "2.0"
