@@ -30,10 +30,10 @@ class Ticks:
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("times")
-    (folder / "mine.py").write_text(
+    (folder / "timed_here.py").write_text(
         "from policies.heuristics import Greedy\nclass Mine(Greedy):\n    pass\n"
     )
-    policies = ["greedy", f"{folder / 'mine.py'}:Mine", "random,greedy"]
+    policies = ["greedy", f"{folder / 'timed_here.py'}:Mine", "random,greedy"]
     return run_study(small_study(folder, policies=policies, missions=2), folder / "trial")
 
 

@@ -75,8 +75,7 @@ def test_the_front_has_the_policies_that_were_timed(results):
     table = planner.front(results, times)
     assert {*table["policy"]} == {"greedy", "tour", "random"}
     assert table["seconds"].is_monotonic_increasing
-    best = table.loc[table["mean"].idxmax()]
-    assert best["policy"] == "greedy" and best["on_front"]
+    assert table.loc[table["mean"].idxmax(), "on_front"]
     seconds = {cost.policy: cost.median for cost in times.costs}
     assert table.set_index("policy")["seconds"].to_dict() == seconds
 
