@@ -33,7 +33,7 @@ from tests.reports.browser import Visit
 # others end; quotas that are filled at once; nothing to serve, in a mission that is truncated.
 CASES: dict[str, dict[str, Any]] = {
     "alone": {"uavs": 1},
-    "queue": {"uavs": 3, "pads": 1, "zone": [26, 2, 4, 1]},
+    "queue": {"uavs": 3, "pads": 1, "zone": [26, 2, 4, 1], "charging": {"plan_waits": False}},
     "short": {"uavs": 2, "quota": 4},
     "empty": {"uavs": 2, "initial_data": 0, "arrival_rate": 0, "max_slots": 9},
 }

@@ -24,7 +24,8 @@ from dess.state import sample_scenario
 @pytest.fixture(scope="module")
 def mission() -> tuple[Any, pd.DataFrame, dess.Scenario]:
     """A mission with moves, hovering, charging and a queue for the one pad."""
-    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1])
+    unplanned = {"plan_waits": False}
+    space = dess.load_scenario("fig4", uavs=3, pads=1, zone=[26, 2, 4, 1], charging=unplanned)
     record = dess.simulate(space, policies.load("greedy"), 1, 0, events=True)
     return record, pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
 

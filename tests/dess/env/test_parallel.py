@@ -223,7 +223,7 @@ def test_who_stays_observes_zeros_and_changes_nothing(
 
 def test_bad_input_is_refused_with_one_line() -> None:
     env = dess.parallel_env(small())
-    with pytest.raises(InputError, match="call reset"):
+    with pytest.raises(InputError, match=r"allowed: reset\(\) first"):
         env.step({"uav_0": 0})
     assert env.step({}) == ({}, {}, {}, {}, {})  # as PettingZoo has it
     env.reset()

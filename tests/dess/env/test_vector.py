@@ -338,7 +338,7 @@ def test_arrays_become_tensors() -> None:
 
 def test_bad_input_is_refused_with_one_line() -> None:
     env = dess.vector_env(small(), 2)
-    with pytest.raises(InputError, match="call reset"):
+    with pytest.raises(InputError, match=r"allowed: reset\(\) first"):
         env.step(np.zeros(2, int))
     env.reset()
     for action in (5, -1):

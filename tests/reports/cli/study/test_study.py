@@ -88,7 +88,7 @@ def test_results_of_another_version_are_refused(dess, tmp_path):
     before = files_of(tmp_path)
     code, out, err = dess("study", "run", "trial.toml", "--out", "out")
     assert (code, out) == (2, "")
-    assert "out/manifest.json: made by dess 9." in err
+    assert "out/manifest.json: has version '9." in err
     assert "allowed: another --out" in err
     assert err.count("\n") == 1
     assert files_of(tmp_path) == before
