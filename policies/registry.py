@@ -10,7 +10,7 @@ import inspect
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module, invalidate_caches
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -110,7 +110,10 @@ def load(name: str | Path) -> Policy:
         return policy
     if file := FILE.fullmatch(name):
         if not is_typed:
-            raise _unnamed("data", name)
+            raise InputError(
+                f"policy: {shown(name)} is a Python file, which is run only if you name it; "
+                "allowed: --policy FILE.py:CLASS, if you trust the file"
+            )
         path, kind = Path(file["path"]), file["kind"]
         if not os.path.isfile(path):  # False for a name that no file can have
             raise InputError(f"policy: {path}: no such file; allowed: FILE.py:CLASS")
@@ -214,8 +217,10 @@ def files_of(team: str) -> list[str]:
     return [name for name in names if FILE.fullmatch(name) and not folder_of(name)]
 
 
-def typed(teams: Iterable[Any]) -> list[Any]:
-    """The teams that a user has typed; what is no text is left as it is, to be refused later."""
+def typed(teams: Any) -> Any:
+    """The teams that a user has typed; what is no list of text is left as it is, to be refused."""
+    if isinstance(teams, str | Mapping) or not isinstance(teams, Iterable):
+        return teams
     return [TypedByUser(team) if isinstance(team, str) else team for team in teams]
 
 
@@ -224,29 +229,15 @@ def is_path(name: str) -> bool:
     return name not in names() and bool(FILE.fullmatch(name) or folder_of(name))
 
 
-def permitted(team: str, typed: Iterable[str], where: object) -> TypedByUser:
-    """A team that data name, if the user has typed all Python files in it, too.
+def confirmed(team: str, named: Iterable[str]) -> str:
+    """A team that data name, as typed by the user if all Python files in it were.
 
     Args:
         team: The team.
-        typed: The teams that the user has typed.
-        where: The file, page or folder with the data, for the message.
-
-    Raises:
-        InputError: If there is another Python file in it.
+        named: The teams that the user has typed.
     """
-    known = {file for text in typed for file in files_of(text)}
-    for file in files_of(team):
-        if file not in known:
-            raise _unnamed(where, file)
-    return TypedByUser(team)
-
-
-def _unnamed(where: object, file: str) -> InputError:
-    return InputError(
-        f"{where}: policy {shown(file)} is a Python file, which is run only if you name it; "
-        "allowed: --policy FILE.py:CLASS, if you trust the file"
-    )
+    known = {file for text in named for file in files_of(text)}
+    return TypedByUser(team) if known.issuperset(files_of(team)) else team
 
 
 def _outside_description(point: EntryPoint) -> str:

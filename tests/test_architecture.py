@@ -47,14 +47,28 @@ LIGHT = {
 }
 
 
-# Where a user's own words arrive, so that a policy in them may be a Python file, which is code.
+# What makes a name that may be a Python file, which is code that runs, and the modules that use it.
+# These are the types and functions of the registry, and the functions to which users give names.
 MAY_RUN_FILES = {
-    *("policies", "policies.registry", "policies.about"),
-    *("analysis.study.study", "analysis.sweeps.question", "analysis.questions.what_if.question"),
-    *("analysis.execution.evaluation", "analysis.results.provenance"),
-    *("reports.cli.evaluate", "reports.cli.simulate", "reports.pages.verify"),
+    "policies.registry.TypedByUser": {
+        *("policies", "policies.about", "analysis.execution.evaluation"),
+        *("analysis.results.provenance", "reports.cli.simulate"),
+    },
+    "policies.registry.typed": {
+        *("analysis.study.study", "analysis.sweeps.question"),
+        *("analysis.questions.what_if.question", "reports.cli.evaluate"),
+    },
+    "policies.registry.confirmed": {"analysis.results.provenance", "reports.pages.verify"},
+    "policies.load": set(),
+    "policies.load_team": set(),
+    "policies.about.about": {"reports.cli.lists"},
+    "analysis.execution.evaluation.evaluate": {"analysis"},
+    "analysis.sweeps.question.question": {"analysis.sweeps.sweep", "reports.cli.sweep"},
+    "analysis.sweeps.sweep.sweep": {"analysis"},
+    "analysis.questions.what_if.question.question": {"analysis.sweeps.what_if"},
+    "analysis.sweeps.what_if.what_if": {"analysis"},
+    **{f"analysis.{name}": set() for name in ("evaluate", "sweep", "what_if")},
 }
-PERMITS = {"TypedByUser", "typed", "permitted"}
 
 
 def module_name(path: Path) -> str:
@@ -159,25 +173,66 @@ def users_of(libraries: set[str]) -> set[str]:
     return {n for n in SOURCES if libraries & {module.split(".")[0] for module in imports_of(n)}}
 
 
-def test_only_words_of_the_user_can_name_a_python_file() -> None:
+def users_of_name(module: str, name: str) -> set[str]:
+    """The modules that take a name from a module, beside that module itself."""
+    return {user for user in LIBRARY if user != module and _takes(LIBRARY[user], module, name)}
+
+
+def _takes(tree: ast.Module, module: str, name: str) -> bool:
+    """Whether a source imports a name of a module, or takes it as an attribute of the module."""
+    of_module = {module}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            imported = {f"{node.module}.{alias.name}": alias for alias in node.names}
+            if {f"{module}.{name}", f"{module}.*"} & imported.keys():
+                return True
+        elif isinstance(node, ast.Import):
+            imported = {alias.name: alias for alias in node.names if alias.asname}
+        else:
+            continue
+        if module in imported:
+            of_module.add(imported[module].asname or imported[module].name)
+    taken = (node for node in ast.walk(tree) if isinstance(node, ast.Attribute))
+    return any(node.attr == name and ast.unparse(node.value) in of_module for node in taken)
+
+
+@pytest.mark.parametrize("door", MAY_RUN_FILES)
+def test_only_words_of_the_user_can_name_a_python_file(door: str) -> None:
     """All other modules load policies by plain names, for which no file is run.
 
-    They import the loader from ``policies.registry``; that of ``policies`` is for users. The cells
-    of notebooks are the user's own words.
+    The cells of notebooks are the user's own words.
     """
-    names = {
-        module: {alias.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
-                 for alias in node.names if node.module in ("policies", "policies.registry")}
-        for module, tree in LIBRARY.items()
-    }  # fmt: skip
-    permitting = {module for module, imported in names.items() if imported & PERMITS}
-    assert permitting | {"policies.registry"} == MAY_RUN_FILES
-    for module, tree in LIBRARY.items():
-        direct = [n for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
-        of_users = {a.name for n in direct if n.module == "policies" for a in n.names}
-        assert not of_users & {"load", "load_team"}, module
-        used = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute)}
-        assert module in MAY_RUN_FILES or not used & PERMITS, module
+    module, _, name = door.rpartition(".")
+    assert users_of_name(module, name) == MAY_RUN_FILES[door]
+
+
+def test_the_policies_of_a_study_are_replaced_by_the_words_of_a_user_alone() -> None:
+    replacing = {
+        user
+        for user in users_of_name("analysis.study.study", "load_study")
+        for node in ast.walk(LIBRARY[user])
+        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("load_study")
+        if any(keyword.arg in (None, "policies") for keyword in node.keywords)
+    }
+    assert replacing == {"reports.cli.study.run"}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from policies.registry import typed",
+        "from policies.registry import typed as plain",
+        "from policies.registry import *",
+        "from policies import registry\nregistry.typed([])",
+        "from policies import registry as r\nr.typed([])",
+        "import policies.registry\npolicies.registry.typed([])",
+        "import policies.registry as r\nr.typed([])",
+    ],
+)
+def test_every_way_to_take_a_name_is_seen(source: str) -> None:
+    assert _takes(ast.parse(source), "policies.registry", "typed")
+    assert not _takes(ast.parse(source.replace("typed", "names").replace("*", "names")),
+                      "policies.registry", "typed")  # fmt: skip
 
 
 def test_only_the_learner_imports_torch() -> None:

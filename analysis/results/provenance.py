@@ -36,7 +36,7 @@ from dess.errors import InputError, validation_line
 from dess.files.documents import Document
 from dess.scenario import ScenarioSpace, fields_of, merged
 from policies.base import Policy
-from policies.registry import TypedByUser, files_of, load_team
+from policies.registry import TypedByUser, confirmed, load_team
 
 ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("analysis.bound",)
@@ -156,9 +156,9 @@ class Origin(Document):
         Raises:
             InputError: If a policy cannot be loaded.
         """
-        known = {file for team in named for file in files_of(team)}
-        closed = [t.policy for t in self.policies if not known.issuperset(files_of(t.policy))]
-        teams = {TypedByUser(t.policy): t for t in self.policies if t.policy not in closed}
+        teams = {confirmed(team.policy, named): team for team in self.policies}
+        closed = [name for name in teams if not isinstance(name, TypedByUser)]
+        teams = {name: team for name, team in teams.items() if name not in closed}
         here = code_behind(teams, self.study["bounds"])
         changes = []
         code = {name: code for name, code in self.code.items() if name in here or not closed}

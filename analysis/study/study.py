@@ -11,7 +11,6 @@ from pydantic import (
     Field,
     PrivateAttr,
     ValidationError,
-    ValidatorFunctionWrapHandler,
     WrapValidator,
     field_validator,
     model_validator,
@@ -31,7 +30,7 @@ from dess.record import measures_of
 from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
-from policies.registry import TypedByUser, load_team, typed
+from policies.registry import load_team, typed
 
 _STUDIES = Shipped("study", "analysis.study", "shipped")
 
@@ -63,11 +62,8 @@ def _by_field(values: Any) -> Any:
     return dotted(values) if isinstance(values, dict) else values
 
 
-def _still_typed(team: Any, validated: ValidatorFunctionWrapHandler) -> str:
-    return type(team)(validated(team)) if isinstance(team, TypedByUser) else validated(team)
-
-
-_Team = Annotated[Text, WrapValidator(_still_typed)]
+# A team keeps its type, ``TypedByUser`` or plain text.
+_Team = Annotated[Text, WrapValidator(lambda team, validated: type(team)(validated(team)))]
 
 
 class StudyData(StrictTable):
@@ -338,8 +334,8 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     scenario = values.get("scenario")
     if isinstance(scenario, str) and scenario not in scenario_names():
         values["scenario"] = str(Path(text).parent / scenario)
-    if isinstance(teams := overrides.get("policies"), list | tuple):
-        overrides["policies"] = typed(teams)
+    if "policies" in overrides:
+        overrides["policies"] = typed(overrides["policies"])
     values |= _with_fewer_logs(values, overrides)
     if unknown := sorted(values.keys() - Study.model_fields.keys()):
         raise InputError(

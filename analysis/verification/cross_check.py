@@ -71,8 +71,8 @@ class CrossCheck(Document):
     """
 
     study: Key
-    missions: list[Mission] = Field(min_length=1)
-    uavs: list[Uav] = Field(min_length=1)
+    missions: list[Mission]
+    uavs: list[Uav]
     rates: list[Data]
     slots: list[Data] = Field(min_length=2)
     queues: queues.Measured
@@ -88,17 +88,9 @@ def simulate_missions(
         count: Missions of every policy to simulate again, all of them if there are fewer; and
             batches of each queue, at least 2.
         progress: Called after every mission.
-
-    Raises:
-        InputError: If there is no other policy.
     """
     space, seed = results.scenario(), results.store.manifest.seed
     teams = {name: load_team(name) for name in results.policies if not files_of(name)}
-    if not teams:
-        raise InputError(
-            f"{results.store.folder}: has only policies of Python files, which are not simulated "
-            "again; allowed: a study with another policy"
-        )
     missions, uavs, chosen = [], [], [*_chosen(results, teams, count)]
     for done, (policy, replication) in enumerate(chosen, 1):
         record = simulate(space, teams[policy], seed, replication)

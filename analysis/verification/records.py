@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.numbers import words
 from analysis.results import event_log
 from analysis.results.tables import Results
 from analysis.verification.checks import ENGINES, REALISATIONS, RECORDS, Check
@@ -98,6 +99,9 @@ def engine_check(results: Results, again: CrossCheck) -> Check:
     n = len(again.missions)
     seen = f"{n - len(differing):,} of {n:,} missions"
     test = f"Record of the {results.manifest['study']['engine']} engine, simulated again with SimPy"
+    simulated = {mission.policy for mission in again.missions}
+    if left_out := [policy for policy in results.policies if policy not in simulated]:
+        test += f"; not simulated again: {words(left_out)}"
     return Check.exact(ENGINES, test, "equal, bit for bit", seen, n, len(differing))
 
 
@@ -107,6 +111,8 @@ def _table(records: Sequence[Document]) -> pd.DataFrame:
 
 def _differing(kept: pd.DataFrame, again: pd.DataFrame, keys: list[str]) -> set[tuple[str, int]]:
     """The missions (policy and replication) whose rows differ in any field."""
+    if again.empty:
+        return set()
     mission = ["policy", "replication"]
     rows = again[[*mission, *keys]].merge(kept[kept["point"] == 0], "left", [*mission, *keys])
     equal = (rows[[*again]].to_numpy(object) == again.to_numpy(object)).all(axis=1)

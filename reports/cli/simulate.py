@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from dess.record import MissionRecord
     from dess.scenario import Scenario, ScenarioSpace
+    from policies.base import Policy
 
 FIGURES = (".png", ".pdf", ".svg")
 ANIMATIONS = (".gif", ".mp4", ".html")
@@ -105,10 +106,10 @@ def simulate(
         raise InputError("--point: belongs to a study; allowed: with --of DIR")
     else:
         space = load_space(scenario, settings)
-        asked = _Asked(space, TypedByUser(policy or "greedy"), seed, replication or 0, scenario)
+        policy = TypedByUser(policy or "greedy")
+        asked = _Asked(space, policy, load_team(policy), seed, replication or 0, scenario)
     if not yes:
         check_missions("simulate", [asked.space])
-    team = load_team(asked.policy, asked.space.uavs[1] if of else None)
     check_seed(asked.seed, asked.replication)
     _check_suffix("--figure", figure, FIGURES, "a picture")
     _check_suffix("--animation", animation, ANIMATIONS, "an animation")
@@ -126,7 +127,7 @@ def simulate(
     with console.outputs(paths) as temporaries:
         with console.compile_notice():
             which = asked.seed, asked.replication
-            record = simulate(asked.space, team, *which, events=bool(paths))
+            record = simulate(asked.space, asked.team, *which, events=bool(paths))
         mission = _Mission(record, sample_scenario(asked.space, *which), asked.title)
         for path, temporary in zip(paths, temporaries, strict=True):
             with writable(path):
@@ -145,6 +146,7 @@ class _Asked:
 
     space: "ScenarioSpace"
     policy: str
+    team: "list[Policy]"
     seed: int
     replication: int
     scenario: str
@@ -171,20 +173,23 @@ def _of_study(
     """What a results folder says of a mission; a line on stderr if it may be another one now."""
     from analysis.results.files import MANIFEST
     from analysis.results.manifest import Manifest
-    from policies.registry import permitted
+    from policies.registry import TypedByUser, load_team
 
     manifest = Manifest.read(folder / MANIFEST)
     policies, named = [team.policy for team in manifest.policies], [policy] if policy else []
-    policy = permitted(_chosen("policy", policy, policies, ", ".join(policies)), named, folder)
+    typed = TypedByUser(policy) if policy else None
+    policy = _chosen("policy", typed, policies, ", ".join(policies))
     points = range(len(manifest.points))
     point = _chosen("point", point, points, f"0..{len(points) - 1}")
+    space = manifest.scenarios[point]
+    team = load_team(policy, space.uavs[1])
     if changes := manifest.changes_here(named):
         line = f"note: {folder}: {'; '.join(changes)}: the mission may be another one now"
         console.say(line, sys.stderr)
     if replication is None:
         replication = manifest.points[point].replication
     names = manifest.study["scenario"], manifest.study["name"]
-    return _Asked(manifest.scenarios[point], policy, manifest.seed, replication, *names, point)
+    return _Asked(space, policy, team, manifest.seed, replication, *names, point)
 
 
 def _chosen(option: str, given: T | None, there: Sequence[T], allowed: str) -> T:

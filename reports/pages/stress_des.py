@@ -110,7 +110,7 @@ def _policies(manifests: Iterable[Manifest]) -> list[tuple[str, str]]:
         for team in manifest["study"]["policies"]
         for name in team.split(",")
     )
-    return [(name, known.get(name, "of another package")) for name in names]
+    return [(name, known.get(name, "not shipped with dess")) for name in names]
 
 
 def _parameters(space: ScenarioSpace) -> pd.DataFrame:

@@ -30,7 +30,8 @@ from dess import InputError, simulate
 from dess.files.reading import paths_in, read_text
 from dess.record import PARAMETER_EVENTS
 from dess.scenario import ScenarioSpace
-from policies.registry import load_team, permitted
+from policies.base import Policy
+from policies.registry import confirmed, load_team
 from reports.pages.html import FILES, STUDY, embedded
 
 LIMIT = 64 * 2**20  # bytes of the largest page
@@ -39,6 +40,8 @@ BOUNDS_CHECKED = 3  # upper bounds that are computed again at most, since each t
 # The place in a page that contains the checksum of the rest of the page.
 _SEAL = re.compile(r'(<meta name="dess-checksum" content=")([0-9a-f]*)(">)')
 _ALLOWED = "a page of dess report, or a results folder"
+
+_Drawn = Sequence[tuple[Mission, ScenarioSpace, list[Policy]]]
 
 
 @dataclass(frozen=True)
@@ -180,27 +183,25 @@ def _check_study(store: Store, sampling: _Sampling) -> list[Check]:
     return checks
 
 
-def _drawn(evidence: Evidence, sampling: _Sampling) -> list[tuple[Mission, ScenarioSpace]]:
-    """The missions of a study that are simulated again, with their scenarios."""
+def _drawn(evidence: Evidence, sampling: _Sampling) -> _Drawn:
+    """The missions of a study that are simulated again, with their scenarios and teams."""
     study = f"study {evidence.study['name']}"
-    for team in evidence.policies:
-        permitted(team.policy, sampling.named, study)
+    names = (team.policy for team in evidence.policies)
+    teams = {name: load_team(confirmed(name, sampling.named)) for name in names}
     sample = [evidence.sample[number] for number in sampling.drawn(len(evidence.sample))]
     spaces = [evidence.space(mission.values) for mission in sample]
     sampling.admit(study, spaces)
-    return [*zip(sample, spaces, strict=True)]
+    return [
+        (mission, space, teams[mission.policy][: space.uavs[1]])
+        for mission, space in zip(sample, spaces, strict=True)
+    ]
 
 
-def _compared(
-    evidence: Evidence,
-    drawn: Sequence[tuple[Mission, ScenarioSpace]],
-    named: Collection[str] = (),
-) -> Check:
+def _compared(evidence: Evidence, drawn: _Drawn, named: Collection[str] = ()) -> Check:
     """Simulate missions again, and compare their records."""
     lines = []
-    for mission, space in drawn:
+    for mission, space, team in drawn:
         policy, values, replication = mission.policy, mission.values, mission.replication
-        team = load_team(permitted(policy, named, evidence.study["name"]), space.uavs[1])
         record = simulate(space, team, evidence.seed, replication)
         if changed := difference(record, mission.record):
             command = commands.of_fields(evidence, policy, values, replication)
@@ -217,7 +218,7 @@ def _check_logs(store: Store, sampling: _Sampling) -> Check:
     sampling.admit(what, [manifest.scenarios[cell.point] for cell, _ in logged])
     for cell, replication in logged:
         space = manifest.scenarios[cell.point]
-        policy = permitted(manifest.policies[cell.team].policy, sampling.named, what)
+        policy = confirmed(manifest.policies[cell.team].policy, sampling.named)
         team = load_team(policy, space.uavs[1])
         log = simulate(space, team, manifest.seed, replication, events=True).events
         stored = store.load_log(cell, replication)

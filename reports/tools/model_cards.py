@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-import policies
 from analysis import load_study, numbers
 from analysis.names import METRICS, PRODUCT
 from analysis.questions.learning.files import read_curve
@@ -24,7 +23,7 @@ from dess.files.writing import write_file
 from policies.about import CARD
 from policies.ddqn.config import MISSION_SEED, load_config
 from policies.ddqn.description import read_description
-from policies.registry import HEURISTICS
+from policies.registry import HEURISTICS, load
 
 BEGIN, END = (
     "<!-- computed by reports/tools/model_cards.py -->",
@@ -52,7 +51,7 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
     curve = read_curve(folder / "training.parquet")
     if load_config(config.name, seed=config.seed) != config:
         raise SystemExit(f"{folder}: was not trained by the config of its name")
-    space, policy = load_config(config.name).space, policies.load(folder)
+    space, policy = load_config(config.name).space, load(folder)
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
 
     yield "## Training"
@@ -95,7 +94,7 @@ def card(folder: Path, command: str, missions: int) -> Iterator[str]:
         f"--seed {EVALUATION_SEED}`."
     )
     others = {
-        name: simulate_batch(space, policies.load(name), EVALUATION_SEED, missions).missions
+        name: simulate_batch(space, load(name), EVALUATION_SEED, missions).missions
         for name in load_study(STUDY).policies
         if name in HEURISTICS
     }

@@ -283,11 +283,10 @@ def test_which_policies_are_python_files_is_known_without_running_them(
     _trained(tmp_path / "data.py:Trap")  # a folder, whatever its name: it holds only data
     for team in ("trap.py:Trap", "greedy, trap.py:Trap", "no_such_file.py:X"):
         assert registry.files_of(team) == [team.rpartition(" ")[2]]
-        with pytest.raises(InputError, match=r"page: policy .* is a Python file.*: --policy"):
-            registry.permitted(team, ["another.py:X", "greedy"], "page")
-        assert isinstance(registry.permitted(team, [f"greedy, {team}"], "page"), TypedByUser)
-        with pytest.raises(InputError, match=r"policy .* is a Python file, which is run only if"):
-            registry.load_team(team)
+        for named in (["another.py:X", "greedy"], []):
+            with pytest.raises(InputError, match=r"is a Python file.*; allowed: --policy"):
+                registry.load_team(registry.confirmed(team, named))
+        assert isinstance(registry.confirmed(team, [f"greedy, {team}"]), TypedByUser)
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.files_of(team) == []
     assert "trap" not in sys.modules

@@ -80,7 +80,9 @@ def test_logs_of_other_results_and_of_other_records_are_not_shown(
 
 def test_a_folder_that_cannot_be_written_is_named(results: Results, tmp_path: Path) -> None:
     (tmp_path / missions.FOLDER).write_text("a file")
-    with pytest.raises(InputError, match="cross-check: cannot be written: Not a directory; allowed"):
+    with pytest.raises(
+        InputError, match="cross-check: cannot be written: Not a directory; allowed"
+    ):
         missions.keep_logs(results, WANTED, tmp_path)
 
 

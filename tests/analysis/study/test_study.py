@@ -1,11 +1,14 @@
+import pickle
+
 import pytest
 import tomli_w
+from pydantic import ValidationError
 
 from analysis import load_study, study_names
-from analysis.study.study import budget_of
+from analysis.study.study import Study, budget_of
 from dess import InputError, load_scenario
 from dess.scenario import SAMPLED
-from policies.registry import HEURISTICS, trained_names
+from policies.registry import HEURISTICS, TypedByUser, load_team, trained_names
 from tests.analysis.small import grid, small_study, write_scenario
 
 # Trainings of ddqn that tell how much chance there is in one.
@@ -243,3 +246,17 @@ def test_bounds_of_extended_scenarios_are_refused_before_the_run(tmp_path):
     with pytest.raises(InputError, match="trial.toml: bound: the scenario has sections") as error:
         small_study(tmp_path, bounds=True, set={"age.measured": True})
     assert "\n" not in str(error.value)
+
+
+def test_a_study_takes_what_was_typed_to_its_workers_and_leaves_it_out_of_its_data(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "typed_words.py").write_text("from policies.heuristics import Greedy")
+    study = small_study(tmp_path, policies=["greedy", "greedy , typed_words.py:Greedy"])
+    sent = pickle.loads(pickle.dumps(study))
+    assert sent.policies == ("greedy", "greedy,typed_words.py:Greedy")
+    assert {type(team) for team in sent.policies} == {TypedByUser}
+    assert [policy.name for policy in load_team(sent.policies[1])] == ["greedy", "greedy"]
+    with pytest.raises(ValidationError, match="is a Python file, which is run only if you name it"):
+        Study.model_validate_json(study.model_dump_json())

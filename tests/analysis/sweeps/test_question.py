@@ -174,6 +174,7 @@ REFUSED = {
     "uavs=2 is listed twice; allowed: once": {"fields": {"uavs": [2, 3, 2]}},
     "greedy is listed twice": {"policies": ["greedy", "greedy"]},
     "policies: .. is too short": {"policies": []},
+    "policies: 3 has the wrong form; allowed: ": {"policies": 3},
     "missions: 0 is out of range; allowed: an integer 1..": {"missions": 0},
     "name: '../mine' has the wrong form": {"name": "../mine"},
     "costs.uav: -1 is out of range; allowed: a number 0..1,000,000,000": {"prices": {"uav": -1}},

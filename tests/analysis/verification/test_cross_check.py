@@ -85,7 +85,6 @@ FORGED: dict[str, Callable[[dict[str, Any]], object]] = {
     "missions.0.policy": _without("policy"),
     "missions.0.reward": lambda d: d["missions"][0].update(reward="much"),
     "missions.0.slots": lambda d: d["missions"][0].update(slots=1.5),
-    "missions": lambda d: d.update(missions=[]),
     "uavs.0.uav": lambda d: d["uavs"][0].pop("uav"),
     "uavs.0.odd": lambda d: d["uavs"][0].update(odd=1),
     "rates": lambda d: d["rates"].pop(),

@@ -2,24 +2,27 @@
 
 import json
 import shutil
+from functools import partial
 from pathlib import Path
 
 import pytest
 
-from analysis import run_study
+from analysis import load_study, run_study
 from analysis.execution.jobs import MissionsJob
 from analysis.questions.diff import at_hand
 from analysis.results.chunks import parts_of, split
 from analysis.results.evidence import Evidence
 from analysis.results.resimulate import resimulate
 from analysis.results.tables import Results, load_results
-from analysis.verification.cross_check import simulate_missions
+from analysis.verification import cross_check
+from analysis.verification.records import engine_check
 from dess import InputError
 from reports.cli import main
 from reports.pages import html
 from reports.pages.verify import sealed
 from tests.analysis.hostile import hostile_folder
 from tests.analysis.small import small_study
+from tests.reports.small import words_of
 
 HOVER = """
 class Evil0:
@@ -106,12 +109,48 @@ def test_results_of_a_python_file_are_shown_without_running_it(
 def test_no_mission_of_a_python_file_that_only_results_name_is_simulated() -> None:
     results = load_results("results")
     for simulated in (
-        lambda: simulate_missions(results, 2),  # what dess report verification does
         lambda: resimulate(results, results.policies[0], 0, 0),
         lambda: MissionsJob(*_first_chunk(results)).run(),
     ):
         with pytest.raises(InputError, match=r"Python file"):
             simulated()
+    assert not Path("trace").exists()
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fewer missions of the cross-check than a page has."""
+    simulated = partial(cross_check.simulate_missions, count=2)
+    monkeypatch.setattr(cross_check, "simulate_missions", simulated)
+
+
+@pytest.mark.usefixtures("few")
+def test_the_page_of_the_verification_leaves_out_a_python_file_that_only_results_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    note = "    def __init__(self):\n        open('trace', 'w').close()\n"
+    Path("noted_policy.py").write_text(HOVER.replace('"hover"\n', f'"hover"\n\n{note}'))
+    policies = ["greedy", "noted_policy.py:Evil0"]
+    study = load_study("verification", policies=policies, missions=40, logged=4)
+    run_study(study, "results/verification")
+    Path("trace").unlink()  # its owner has named it
+    assert main(["report", "verification", "--out", "pages"]) == 0
+    assert not Path("trace").exists()
+    page = Path("pages/verification.html").read_text("utf-8")
+    words = words_of(page)
+    assert "with SimPy; not simulated again: noted_policy.py:Evil0" in words
+    assert "not shipped with dess" in page and "of another package" not in page
+
+
+@pytest.mark.usefixtures("stranger", "few")
+def test_a_study_of_python_files_alone_has_no_missions_to_simulate_again() -> None:
+    results = load_results("results")
+    cross_check.make(".", results)
+    again = cross_check.read(".", results)
+    check = engine_check(results, again)
+    assert (check.n, check.error, again.uavs) == (0, None, [])
+    assert "not simulated again: evil_policy.py:Evil0 and evil_policy.py:Evil1" in check.test
     assert not Path("trace").exists()
 
 

@@ -2,6 +2,7 @@
 
 import os
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -66,3 +67,19 @@ def test_paths_are_written_another_way_and_words_are_not(value: Any, moved: Any)
     assert with_paths(value, os.path.abspath) == moved
     relative = partial(os.path.relpath, start=os.getcwd())
     assert with_paths(moved, relative) == with_paths(value, os.path.normpath)
+
+
+def test_policies_of_the_working_folder_are_paths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A notebook runs in another folder; the folder of a trained policy may be named without ./."""
+    monkeypatch.chdir(tmp_path)
+    Path("mine").mkdir()
+    Path("mine/config.json").write_text("{}")
+    moved = with_paths(["mine", "greedy,mine", "own.py:Own", "others"], os.path.abspath)
+    assert moved == [
+        f"{tmp_path}/mine",
+        f"greedy,{tmp_path}/mine",
+        f"{tmp_path}/own.py:Own",
+        "others",
+    ]

@@ -126,7 +126,7 @@ def test_studies_say_what_they_are_about() -> None:
         assert f"{len(data['points'])} design points ({study['design']['kind']})" in texts["1.3"]
     assert "by `kn-bounded`" in texts["1.3"]
     assert "`initial_data`" in texts["2.3"] and "`uavs`" in texts["2.3"]
-    assert "`ddqn`" in texts["2.4"] and "another package" not in texts["2.4"]
+    assert "`ddqn`" in texts["2.4"] and "not shipped" not in texts["2.4"]
     assert "as decided by a stopping rule, in `sweet-spot`" in texts["4.3"]
 
 

@@ -79,6 +79,8 @@ def test_both_sides_measure_what_belongs_to_a_section(settings, baseline, measur
             r"question: policies: .*'gredy' is unknown .did you mean greedy",
         ),
         ({"policies": []}, r"question: policies: .*is too short"),
+        ({"policies": 3}, r"question: policies: 3 has the wrong form"),
+        ({"policies": "greedy"}, r"question: policies: 'greedy' has the wrong form"),
         ({"missions": 1}, r"missions: 1 is too few; allowed: 2 or more"),
         ({"missions": "many"}, r"question: missions: .*'many'"),
         ({"seed": -1}, r"question: seed: .*-1"),
