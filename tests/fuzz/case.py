@@ -7,6 +7,8 @@ from typing import Literal, Protocol
 # Folders of a case. Commands run in CWD, so that ``../in`` is where their inputs are.
 IN, OUT, CWD, HOME, TEMPORARY, LOG = "in", "out", "cwd", "home", "tmp", "log"
 FOLDERS = (IN, OUT, CWD, HOME, TEMPORARY, LOG)
+# A file of the user that no command line names, and what is in it: no command may print it.
+SECRET_FILE, SECRET = f"{HOME}/secret.csv", "Kq7wXz"
 
 
 class Step(Protocol):
@@ -35,6 +37,8 @@ class Case:
         signals: Signals that are sent to the command, each after a number of seconds.
         again: Whether the same command has to complete the work afterwards.
         file_size: The largest size of a file that can be written, as on a full disk, in bytes.
+        code: The exit code that the command must have; 0, 1, 2 or 130 if it is not known.
+        kernels: Whether notebooks run in kernels, and not in the process of the case.
         stdout: What standard output is: a file, a full device, or a pipe that nobody reads.
     """
 
@@ -46,6 +50,8 @@ class Case:
     signals: tuple[tuple[float, int], ...] = ()
     again: bool = False
     file_size: int | None = None
+    code: int | None = None
+    kernels: bool = False
     stdout: Literal["file", "full", "closed"] = "file"
 
     @property

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib
 
+from tests.fuzz import kernel
 from tests.fuzz.case import CWD, HOME, LOG, TEMPORARY, Case
 
 STDOUT, STDERR, STARTED = "stdout", "stderr", "started"  # files in the folder ``log`` of the case
@@ -21,11 +22,15 @@ FILE = 2**30  # bytes of a file, if the case does not say
 
 def run(case: Case, box: Path, command: Callable[[], int]) -> None:
     """Run the command of a case, in a session of its own, and exit with its code."""
+    if "tests.fuzz.preload" not in sys.modules:  # multiprocessing does not say why
+        raise RuntimeError("tests.fuzz.preload was not loaded: import it to see why")
     os.setsid()
     os.chdir(box / CWD)
     os.environ |= {"HOME": str(box / HOME), "TMPDIR": str(box / TEMPORARY)}
     os.environ["MPLCONFIGDIR"] = matplotlib.get_cachedir()  # fonts are not listed again
     tempfile.tempdir = None
+    if not case.kernels:
+        kernel.run_here()
     sys.argv = ["dess", *case.arguments]
     _redirect(case, box / LOG)
     _limit(resource.RLIMIT_DATA, _data_now() + DATA)

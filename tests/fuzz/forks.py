@@ -20,11 +20,16 @@ import pyarrow as pa
 
 from reports.cli import main
 from tests.fuzz import child
-from tests.fuzz.case import FOLDERS, HOME, LOG, Case
+from tests.fuzz.case import FOLDERS, HOME, LOG, SECRET, SECRET_FILE, Case
 from tests.fuzz.snapshot import Snapshot, taken
+from tests.fuzz.steps import plant_evil
 
 AT_ONCE = 3  # of two cores: some cases wait for a time limit or a lock
-_GRACE = 5  # seconds in which the helpers of a command, such as its workers, have to end after it
+# Seconds in which the helpers of a command, such as its workers, have to end after it: 2, and what
+# a loaded machine needs.
+_GRACE = 4
+_START = 300  # seconds that the parent of all cases may need before its first one
+_WATCH = 1  # seconds before a command is interrupted in which it has to do something
 # Errors of a step that does not fit what an earlier step has left; it does nothing then.
 _UNFIT = (OSError, ValueError, LookupError, TypeError, AttributeError, ZeroDivisionError)
 _UNFIT += (RecursionError, pa.ArrowException)
@@ -44,6 +49,8 @@ class Outcome:
         code: The exit code; that of the second run, if the case has one.
         seconds: How long it took.
         late: Whether the command had to be killed because it did not end in its time.
+        waited: Whether it did nothing in the second before a command that may last was interrupted.
+        ending: The CPU time that it took after its first signal, in seconds.
         left: The processes that it left behind.
     """
 
@@ -54,6 +61,8 @@ class Outcome:
     code: int
     seconds: float
     late: bool
+    waited: bool
+    ending: float
     left: list[str]
 
     def text(self, name: str) -> str:
@@ -102,6 +111,8 @@ class Forks:
         shutil.rmtree(box, ignore_errors=True)
         for name in FOLDERS:
             (box / name).mkdir(parents=True)
+        (box / SECRET_FILE).write_text(f"{SECRET},{SECRET}\n")
+        plant_evil(box)
         for step in case.steps:
             with suppress(*_UNFIT):
                 step.do(box, self.ready)
@@ -125,6 +136,9 @@ class _Running:
         self.process = self._process_of(replace(case, steps=()), self.box)
         self.process.start()
         self._started, self._begins = 0.0, time.monotonic()
+        self._watched: float | None = None  # CPU time when a command that lasts was looked at
+        self._signalled: float | None = None  # CPU time at the first signal
+        self._is_idle, self.waited, self.ending = True, False, 0.0
 
     def has_ended(self) -> bool:
         """Send the signals that are due; the result says whether the case has ended."""
@@ -143,12 +157,35 @@ class _Running:
         now = time.monotonic()
         if not self._started and (self.box / LOG / child.STARTED).exists():
             self._started = now
-        while self._signals and self._started and now - self._started > self._signals[0][0]:
-            with suppress(ProcessLookupError):
-                os.kill(self.process.pid, self._signals.pop(0)[1])
-        if now - self._begins > self.case.seconds:
+        if now - (self._started or self._begins + _START) > self.case.seconds:
             self.late = True
             self.kill()
+            return
+        if not self._started:
+            return
+        age, used = now - self._started, self._used()
+        if self.case.lasting and age > self.case.lasting - _WATCH:
+            self._watched = used if self._watched is None else self._watched
+            self._is_idle &= self._is_asleep()
+        if self._signalled is not None:
+            self.ending = max(self.ending, used - self._signalled)
+        while self._signals and age > self._signals[0][0]:
+            self.waited |= self._watched == used and self._is_idle
+            self._signalled = used if self._signalled is None else self._signalled
+            with suppress(ProcessLookupError):
+                os.kill(self.process.pid, self._signals.pop(0)[1])
+
+    def _is_asleep(self) -> bool:
+        with suppress(psutil.NoSuchProcess):
+            return psutil.Process(self.process.pid).status() == psutil.STATUS_SLEEPING
+        return False
+
+    def _used(self) -> float:
+        """The CPU time of the command so far, in seconds."""
+        with suppress(psutil.NoSuchProcess):
+            times = psutil.Process(self.process.pid).cpu_times()
+            return times.user + times.system + times.children_user
+        return 0.0
 
     def kill(self) -> None:
         """Kill the command and all its processes."""
@@ -170,7 +207,8 @@ class _Running:
         code, after = self.process.exitcode, taken(self.box)
         assert code is not None
         self.process.close()
-        return Outcome(self.case, self.box, self.before, after, code, seconds, self.late, names)
+        how = (code, seconds, self.late, self.waited, self.ending)
+        return Outcome(self.case, self.box, self.before, after, *how, names)
 
     def _left(self) -> list[psutil.Process]:
         """The processes in the session of the case, and all others with its home."""

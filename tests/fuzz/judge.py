@@ -12,11 +12,20 @@ from pathlib import Path
 import pyarrow.parquet as pq
 from PIL import Image
 
+from tests.fuzz.case import SECRET
 from tests.fuzz.child import STDERR, STDOUT
 from tests.fuzz.forks import Outcome
 
 CODES = {0: "done", 1: "failed", 2: "bad input", 130: "interrupted"}
 LINE = 300  # characters
+ENDING = 2  # seconds of CPU time after a signal
+# Words of Python or of a library in a line for a user.
+_INNER = re.compile(
+    r"\b(?!InputError)[A-Z]\w*(Error|Exception|Warning)\b|Input should be|validation error"
+)
+# What is allowed, or the words where there is no choice: of typer, of parsers, of damaged files.
+_CHOICE = re.compile(r"allowed|\(see dess|not valid (TOML|JSON)|(are|is) made by|damaged")
+_COUNT = re.compile(r"\b([\d,]+) of ([\d,]+)\b")
 _BIDI = {*map(chr, range(0x202A, 0x202F)), *map(chr, range(0x2066, 0x206A))}
 _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach a terminal
 # Lines on standard error that say what a command does, and no error.
@@ -41,6 +50,12 @@ def _ending(outcome: Outcome) -> Iterator[str]:
         yield f"it did not end within {outcome.case.seconds:g} seconds"
     elif outcome.code not in (CODES if outcome.case.again else {*CODES, *killed}):
         yield f"exit code {outcome.code}"
+    elif outcome.case.code not in (None, outcome.code):
+        yield f"exit code {outcome.code} in place of {outcome.case.code}"
+    if outcome.waited and outcome.code == 130:
+        yield "it waited for something until it was interrupted"
+    if outcome.ending > ENDING:
+        yield f"it took {outcome.ending:.1f} seconds of CPU time to end after a signal"
     for name in outcome.left:
         yield f"left a process: {name}"
 
@@ -52,6 +67,8 @@ def _output(outcome: Outcome) -> Iterator[str]:
             yield f"a traceback on {stream}: {text.strip().splitlines()[-1][:LINE]}"
         elif _WARNING.search(text):
             yield f"a warning of Python on {stream}"
+        if SECRET in text:
+            yield f"the content of a file that the user has not named on {stream}"
         if raw := sorted({c for c in text if _is_raw(c)} - {"\n", "\r", "\t"}):
             yield f"raw characters on {stream}: {ascii(raw)[:LINE]}"
 
@@ -67,11 +84,26 @@ def _errors(outcome: Outcome) -> Iterator[str]:
             yield "the memory did not suffice; a refusal has to come first"
         if len(line) > LINE:
             yield f"a line of {len(line)} characters on stderr: {line[:60]}"
+        if any(int(f[1].replace(",", "")) > int(f[2].replace(",", "")) for f in _counts(line)):
+            yield f"more than there are: {line[:LINE]}"
     errors = [line for line in lines if not _NEWS.fullmatch(line.strip())]
     if outcome.code in (2, 130) and len(errors) != 1:
         yield f"{len(errors)} lines in place of one error: {' | '.join(errors)[:LINE]}"
     if outcome.code == 1 and not errors:
         yield "exit code 1 without a line that says why"
+    if outcome.case.file_size and len(errors) > 1:
+        yield f"{len(errors)} lines in place of one error: {' | '.join(errors)[:LINE]}"
+    if outcome.code == 2 and errors and not _CHOICE.search(errors[-1]):
+        yield f"a line without what is allowed: {errors[-1]}"
+    for line in errors:
+        if "Traceback" in line or "(see dess" in line:
+            return
+        if found := _INNER.search(line):
+            yield f"a word of a library, {found[0]}: {line}"
+
+
+def _counts(line: str) -> Iterator[re.Match[str]]:
+    return (found for found in _COUNT.finditer(line) if found[1].strip(",") and found[2].strip(","))
 
 
 def _files(outcome: Outcome) -> Iterator[str]:
@@ -80,6 +112,16 @@ def _files(outcome: Outcome) -> Iterator[str]:
         is_allowed = any(_is_in(path, folder) for folder in outcome.case.allowed)
         if before == after or path.startswith(_CACHES):
             continue
+        if path.endswith((".ran", ".pyc")):
+            yield f"{path}: code of the input was run"
+            continue
+        if (
+            outcome.code == 2
+            and before is None
+            and _is_of_missions(path)
+            and not outcome.case.again
+        ):
+            yield f"{path}: missions were simulated before the input was refused"
         if not is_allowed:
             yield f"{path}: was {before or 'not there'}, is {after or 'not there'}"
         elif after is not None and _is_temporary(path):
@@ -93,6 +135,11 @@ def _files(outcome: Outcome) -> Iterator[str]:
 def _is_in(path: str, folder: str) -> bool:
     """Whether it is below a folder, or one of the folders above it, which may be made."""
     return path.startswith(f"{folder}/") or folder.startswith(f"{path}/") or path == folder
+
+
+def _is_of_missions(path: str) -> bool:
+    """Whether it is a file of results."""
+    return "/missions/" in path and path.endswith(".parquet")
 
 
 def _is_temporary(path: str) -> bool:

@@ -1,11 +1,15 @@
 """Commands that break the contract, each in one way, so that the judge has something to find."""
 
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 
 def _traceback() -> int:
@@ -17,7 +21,7 @@ def _strange_code() -> int:
 
 
 def _two_lines() -> int:
-    print("one\ntwo", file=sys.stderr)
+    print("one\nallowed: two", file=sys.stderr)
     return 2
 
 
@@ -26,7 +30,7 @@ def _silent_failure() -> int:
 
 
 def _long_line() -> int:
-    print("x" * 301, file=sys.stderr)
+    print(f"allowed: {'x' * 292}", file=sys.stderr)
     return 2
 
 
@@ -36,7 +40,7 @@ def _escape() -> int:
 
 
 def _direction() -> int:
-    print("a name with \u202e in it", file=sys.stderr)
+    print("a name with \u202e in it; allowed: others", file=sys.stderr)
     return 2
 
 
@@ -96,6 +100,57 @@ def _warning() -> int:
     return 0
 
 
+def _library() -> int:
+    print("report verification: KeyError: 'missions'", file=sys.stderr)
+    return 1
+
+
+def _no_choice() -> int:
+    print("this is not possible", file=sys.stderr)
+    return 2
+
+
+def _too_many() -> int:
+    print("1 of 0 differ", file=sys.stderr)
+    return 1
+
+
+def _secret() -> int:
+    print(Path("~/secret.csv").expanduser().read_text())
+    return 0
+
+
+def _code_that_runs() -> int:
+    Path("../out/evil.py.ran").touch()
+    return 0
+
+
+def _late_refusal() -> int:
+    folder = Path("../out/a/missions")
+    folder.mkdir(parents=True)
+    pq.write_table(pa.table({"a": [1]}), folder / "a.parquet")
+    print("unknown; allowed: others", file=sys.stderr)
+    return 2
+
+
+def _wait() -> int:
+    with suppress(KeyboardInterrupt):
+        time.sleep(100)
+    print("interrupted", file=sys.stderr)
+    return 130
+
+
+def _slow_end() -> int:
+    with suppress(KeyboardInterrupt):
+        while True:
+            pass
+    begun = time.process_time()
+    while time.process_time() < begun + 3:
+        pass
+    print("interrupted", file=sys.stderr)
+    return 130
+
+
 # Each fault, with what the judge says about it.
 FAULTS: dict[Callable[[], int], str] = {
     _traceback: "a traceback on stderr: ValueError: planted",
@@ -116,9 +171,19 @@ FAULTS: dict[Callable[[], int], str] = {
     _removed_device: "out/device: was node",
     _memory: "a traceback on stderr: MemoryError",
     _warning: "a warning of Python",
+    _library: "a word of a library, KeyError",
+    _no_choice: "a line without what is allowed",
+    _too_many: "more than there are: 1 of 0 differ",
+    _secret: "the content of a file that the user has not named",
+    _code_that_runs: "code of the input was run",
+    _late_refusal: "missions were simulated before the input was refused",
+    _wait: "it waited for something",
+    _slow_end: "seconds of CPU time to end after a signal",
 }
+LASTING = (_wait, _slow_end)  # those that are interrupted
 
 
 def main() -> int:
     """Break the contract as the first argument of the process says."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     return {fault.__name__: fault for fault in FAULTS}[sys.argv[1]]()

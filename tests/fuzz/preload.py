@@ -23,6 +23,8 @@ _MISSIONS = ("evaluate", *_POLICIES, "--missions", "2")
 
 
 # What libraries import only when they are used.
+# Notebooks run in kernels; integrations need libraries that are not installed.
+_UNUSED = {"notebooks", "integrations"}
 _LATER = ("torch._dynamo", "torch.utils.tensorboard", "PIL.Image", "matplotlib.pyplot")
 
 
@@ -31,7 +33,7 @@ def _import_all() -> None:
         import_module(name)
     for package in (dess, policies, analysis, reports):
         for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if not module.name.endswith(".__main__") and ".notebooks" not in module.name:
+            if not module.name.endswith(".__main__") and not _UNUSED & {*module.name.split(".")}:
                 import_module(module.name)
 
 

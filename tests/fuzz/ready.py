@@ -4,18 +4,39 @@ import shutil
 from importlib import resources
 from pathlib import Path
 
+from analysis import load_study, run_study
+from analysis.questions.missions import FOLDER
+from analysis.verification import cross_check
+from policies import registry
+from reports.pages import missions
+from reports.pages.notebook import NAMES
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks
 from tests.fuzz.steps import Copy
+from tests.reports.small import STUDIES, quick
 
 # The names of the ready inputs.
 SCENARIO, STUDY, SELECTION, TRAINING = "sea.toml", "study.toml", "selection.toml", "training.toml"
 RESULTS, SELECTED, PAGE, POLICY = "results", "selected", "page.html", "policy"
 # A scenario with all sections, a table that it reads, a study of it, and the results of the study.
 SECTIONS, STORM, STUDIED, EXTENDED = "sections.toml", "storm.csv", "studied.toml", "extended"
-SHIPPED = ("paper.toml", "bay.toml", "sweet-spot.toml", "sensitivity.toml", "ddqn-paper.toml")
-
+# Small results of the shipped studies with what reports keep beside them, the trained policies,
+# and the results that reports and sweeps keep of questions.
+REPORTS, TRAINED, ASKED, SWEPT = "reports", "trained", "asked", "swept"
+SWEEP = (f"--scenario=../in/{SCENARIO}", "--set=uavs=1..2", "--missions=2", "--name=kept")
+KEPT = FOLDER  # the folder of what pages need beside results
+ASKED_WITH = {
+    "missions": "2",
+    "policies": '["greedy"]',
+    "scenario": f'"../in/{SCENARIO}"',
+    "fields": "{uavs=[1, 2]}",
+    "settings": "{uavs=2}",
+    "baseline": "{uavs=1}",
+    "example": "{uavs=2}",
+    "requirements": "{success=0.1}",
+    "prices": "{uav=1000}",
+}
 _SEA = """
 description = "a small sea"
 grid = 8
@@ -165,7 +186,24 @@ def make(forks: Forks) -> None:
     _run(forks, EXTENDED, "study", "run", f"../in/{STUDIED}")
     _run(forks, POLICY, "train", f"../in/{TRAINING}")
     _run(forks, "pages", "report", f"../in/{RESULTS}")
+    _make_reports(ready / REPORTS)
+    shutil.copytree(registry.TRAINED, ready / TRAINED)
+    given = [f"--parameter={name}={value}" for name, value in ASKED_WITH.items()]
+    pages = ("--out", "../out/pages", "--results")
+    _run(forks, ASKED, "report", "what-if", "sweep", "own-sea", *given, *pages)
+    _run(forks, SWEPT, "sweep", *SWEEP, *pages)
     shutil.copyfile(ready / "pages" / f"study-{Path(STUDY).stem}.html", ready / PAGE)
+
+
+def _make_reports(folder: Path) -> None:
+    """Results of all shipped studies, of fewer missions than the tests of the reports have."""
+    with quick():
+        for name, changes in STUDIES.items():
+            fewer = {key: min(value, 8) for key, value in changes.items() if key == "missions"}
+            study = run_study(load_study(name, **changes | fewer), folder / name)
+            if name == cross_check.STUDY:
+                cross_check.write(cross_check.simulate_missions(study, 2), folder)
+        missions.make(NAMES, folder, {})
 
 
 def write_texts(ready: Path) -> None:
@@ -183,8 +221,8 @@ def write_texts(ready: Path) -> None:
 
 def _run(forks: Forks, name: str, *arguments: str) -> None:
     steps = [Copy(path.name, f"in/{path.name}") for path in forks.ready.iterdir()]
-    out = ("--out", f"../out/{name}")
-    case = Case("ready", (*arguments, *out), tuple(steps), seconds=600)
+    out = () if arguments[-1] == "--results" else ("--out",)
+    case = Case("ready", (*arguments, *out, f"../out/{name}"), tuple(steps), seconds=600)
     for _, outcome in forks.outcomes([(0, case)]):
         if outcome.code != 0:
             raise RuntimeError(f"dess {' '.join(arguments)} fails: {outcome.text(STDERR)}")

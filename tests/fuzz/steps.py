@@ -19,16 +19,23 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from analysis.results.chunks import name_of, short_hash
-from dess.files.reading import read_bytes, read_text
 from policies.ddqn import tensors
 from policies.ddqn.session import CHECKPOINT
 from reports.pages.verify import sealed
+from tests.analysis.hostile import hostile_folder
+from tests.fuzz.case import CWD, SECRET_FILE
 
 # A place in a document that is replaced by text which need not be JSON.
 _HOLE = "the text of this value is replaced"
 _BLOCK = re.compile(r'<script class="[^"]*" type="application/json">(.*?)</script>')
 # Code that leaves a trace if anything imports or runs it.
 PLANTED = "import pathlib; pathlib.Path(__file__).with_name('{name}.ran').touch()\n"
+# A file of a policy, and the names of its classes: a number is added.
+EVIL = "../in/evil.py"
+_CLASSES = (
+    "class Evil0:\n    name = 'e'\n    def act(self, view):\n        return [4] * len(view)\n"
+)
+_CLASSES += "Evil1 = Evil2 = Evil3 = Evil0\n"
 
 Edit = tuple[int, Literal["replace", "remove", "rename", "insert"], str]
 
@@ -62,15 +69,24 @@ class Write:
 
 @dataclass(frozen=True)
 class Lines:
-    """Change lines of a text, such as TOML: replace a value or a line, remove or repeat a line."""
+    """Change lines of a text, such as TOML: replace a value or a line, remove or repeat a line.
+
+    A place is a number, or the key of a line; without such a line it is before the first one.
+    """
 
     path: str
-    edits: tuple[tuple[int, Literal["value", "line", "remove", "repeat"], str], ...]
+    edits: tuple[tuple[int | str, Literal["value", "line", "remove", "repeat"], str], ...]
 
     def do(self, box: Path, ready: Path) -> None:
         lines = read_text(box / self.path).splitlines()
-        for position, action, text in self.edits:
-            at = position % max(len(lines), 1)
+        for place, action, text in self.edits:
+            if isinstance(place, str):
+                keys = [line.partition("=")[0].strip() for line in lines]
+                if place not in keys:
+                    lines.insert(0, f"{place} = 0")
+                    keys.insert(0, place)
+                place = keys.index(place)
+            at = place % max(len(lines), 1)
             key = lines[at].partition("=")[0] if lines else "key "
             new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
             lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
@@ -95,14 +111,20 @@ class Bytes:
 
 @dataclass(frozen=True)
 class Json:
-    """Change a document by edits: places are counted in its text from the outside inwards."""
+    """Change a document by edits: places are counted in its text from the outside inwards.
+
+    In a folder, the place of the first edit also says which of its documents is changed.
+    """
 
     path: str
     edits: tuple[Edit, ...]
 
     def do(self, box: Path, ready: Path) -> None:
-        text = edited(read_text(box / self.path), self.edits)
-        _write(box / self.path, text.encode("utf-8", "surrogateescape"))
+        path = box / self.path
+        if path.is_dir() and (documents := sorted(path.rglob("*.json"))):
+            path = documents[self.edits[0][0] % len(documents)]
+        text = edited(read_text(path), self.edits)
+        _write(path, text.encode("utf-8", "surrogateescape"))
 
 
 @dataclass(frozen=True)
@@ -144,7 +166,7 @@ class Header:
 
 
 @dataclass(frozen=True)
-class Sealed:
+class Seal:
     """Write the checksums that fit into the files of a training, as a forger would."""
 
     folder: str
@@ -219,7 +241,7 @@ class Node:
     """Put something that is no regular file in the place of a path, or beside it."""
 
     path: str
-    kind: Literal["fifo", "zero", "full", "null", "folder", "loop", "dangling", "socket", "locked"]
+    kind: str  # of strategies.changes.NODES, or locked
 
     def do(self, box: Path, ready: Path) -> None:
         path = box / self.path
@@ -231,7 +253,7 @@ class Node:
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         path.unlink(missing_ok=True)
-        links = {"loop": path.name, "dangling": "nowhere"}
+        links = {"loop": path.name, "dangling": "nowhere", "secret": str(box / SECRET_FILE)}
         if self.kind == "fifo":
             os.mkfifo(path)
         elif self.kind == "folder":
@@ -240,6 +262,55 @@ class Node:
             path.symlink_to(links[self.kind])
         else:
             _device(path, self.kind)
+
+
+@dataclass(frozen=True)
+class Odd:
+    """Put something that is no regular file in the place of a file of a folder, or beside them."""
+
+    folder: str
+    position: int
+    other: str | None  # a file that need not be there
+    kind: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        folder = box / self.folder
+        paths = sorted(folder.rglob("*"))
+        path = folder / self.other if self.other else paths[self.position % len(paths)]
+        Node(str(path.relative_to(box)), self.kind).do(box, ready)
+
+
+@dataclass(frozen=True)
+class Hostile:
+    """Put a text, such as the class of a Python file, into the free strings of results."""
+
+    folder: str
+    text: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        sound = box / f"{self.folder}-sound"
+        (box / self.folder).rename(sound)
+        try:
+            hostile_folder(sound, box / self.folder, self.text)
+        finally:
+            shutil.rmtree(sound)
+
+
+@dataclass(frozen=True)
+class Evil:
+    """Let data name the policy of a Python file, wherever they name ``greedy``."""
+
+    path: str
+
+    def do(self, box: Path, ready: Path) -> None:
+        path = box / self.path
+        results = [manifest.parent for manifest in path.rglob("manifest.json")]
+        for file in [path] if path.is_file() else path.rglob("*"):
+            if file.suffix in (".json", ".toml", ".html") and not {*results} & {*file.parents}:
+                text = read_text(file).replace('"greedy"', f'"{EVIL}:Evil0"')
+                _write(file, (sealed(text) if file.suffix == ".html" else text).encode())
+        for folder in results:
+            Hostile(str(folder.relative_to(box)), f"{EVIL}:Evil").do(box, ready)
 
 
 @dataclass(frozen=True)
@@ -271,6 +342,12 @@ class Plant:
             path = box / self.folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             _write(path, PLANTED.format(name=path.name).encode())
+
+
+def plant_evil(box: Path) -> None:
+    """The Python file that data may name; a command that imports it leaves a file."""
+    path = box / CWD / EVIL
+    path.write_text(PLANTED.format(name=path.name) + _CLASSES)
 
 
 def _device(path: Path, kind: str) -> None:
@@ -322,6 +399,18 @@ def _places(document: Any) -> list[tuple[Any, Any]]:
             places += [(holder, key) for key in keys]
             level += [holder[key] for key in keys]
     return places
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a regular file; a pipe would block."""
+    if not path.is_file():
+        raise ValueError(f"{path} is no regular file")
+    return path.read_bytes()
+
+
+def read_text(path: Path) -> str:
+    """The text of a regular file."""
+    return read_bytes(path).decode()
 
 
 def _write(path: Path, content: bytes) -> None:

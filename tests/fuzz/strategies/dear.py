@@ -1,40 +1,44 @@
-"""Cases that start further processes: pages, workers, and a scheduler that is not there."""
+"""Cases that start further processes: kernels, workers, and a scheduler that is not there."""
+
+import signal
+from dataclasses import replace
 
 from hypothesis import strategies as st
 
+from reports.pages.notebook import NAMES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
 from tests.fuzz.steps import Copy
-from tests.fuzz.strategies.folders import renderings
+from tests.fuzz.strategies.commands import READING, line
+from tests.fuzz.strategies.forged import forged
+from tests.fuzz.strategies.reports import reports
 
 _RUN = ("study", "run", f"../in/{ready.STUDY}", "--out", "../out/a")
+_WORKING = ((*_RUN, "--workers", "2"), (*_RUN, "--workers", "2", "--missions", "5000"))
 _COMMANDS = (
-    (*_RUN, "--workers", "2"),
     ("evaluate", "--policy", "greedy", "--missions", "20", "--workers", "2"),
     (*_RUN, "--scheduler", "tcp://127.0.0.1:1"),
     (*_RUN, "--scheduler", "tls://127.0.0.1:1"),
-    (
-        "sweep",
-        "--set",
-        "uavs=1..2",
-        "--missions",
-        "2",
-        "--results",
-        "../out/r",
-        "--out",
-        "../out/p",
-    ),
+    line(("sweep",)),
+    line(("report",)),
 )
+_PAGES = [(words, p) for words, p in READING if words in (("report",), ("study", "export"))]
 
 
 @st.composite
 def dear(draw: st.DrawFn) -> Case:
-    """A page of changed results, or one of a few commands that may get a signal."""
-    if draw(st.integers(0, 2)):
-        rendered = draw(renderings)
-        return Case("dear", rendered.arguments, rendered.steps, seconds=240)
-    moments = st.floats(0.5, 8).map(lambda seconds: round(seconds, 2))
-    sent = draw(st.lists(st.tuples(moments, st.sampled_from([2, 15, 1])), max_size=1))
-    steps = tuple(Copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.STUDY))
-    words = draw(st.sampled_from(_COMMANDS))
-    return Case("dear", words, steps, seconds=240, signals=tuple(sent))
+    """A page of changed results, workers that are killed, or a command that may get a signal."""
+    steps = tuple(Copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.STUDY, ready.RESULTS))
+    what = draw(st.sampled_from(["page", "report", "killed", "signal"]))
+    if what == "page":
+        case = draw(forged(*draw(st.sampled_from(_PAGES))))
+        return replace(case, kind="dear", seconds=240, kernels=True)
+    if what == "report":
+        case = draw(reports(draw(st.sampled_from(NAMES))))
+        return replace(case, kind="dear", seconds=240, kernels=True)
+    moments = st.floats(0.5, 10).map(lambda seconds: round(seconds, 2))
+    numbers = [signal.SIGKILL] if what == "killed" else [2, 15, 1]
+    sent = draw(st.lists(st.tuples(moments, st.sampled_from([*map(int, numbers)])), max_size=1))
+    words = draw(st.sampled_from(_WORKING if what == "killed" else (*_WORKING, *_COMMANDS)))
+    again = what == "killed"
+    return Case("dear", words, steps, 240, signals=tuple(sent), again=again, kernels=True)

@@ -5,25 +5,16 @@ from hypothesis import strategies as st
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
 from tests.fuzz.steps import Copy, Node, Write
-from tests.fuzz.strategies.folders import NODES
+from tests.fuzz.strategies import commands
+from tests.fuzz.strategies.changes import NODES
 
-_FLY = ("simulate", "--scenario", f"../in/{ready.SCENARIO}")
-# Commands and the file or folder that they write, ``{}``.
-_FILES = (
-    ((*_FLY, "--events", "{}"), ".parquet"),
-    ((*_FLY, "--events", "{}"), ".parquet"),
-    ((*_FLY, "--figure", "{}"), ".png"),
-    ((*_FLY, "--animation", "{}"), ".gif"),
-    ((*_FLY, "--animation", "{}"), ".html"),
-    (
-        ("study", "export", f"../in/{ready.RESULTS}", "--crate", "{}", "--page", "../in/page.html"),
-        ".zip",
-    ),
-)
-_FOLDERS = (
-    ("study", "run", f"../in/{ready.STUDY}", "--out", "{}"),
-    ("train", f"../in/{ready.TRAINING}", "--out", "{}"),
-)
+# Every parameter that writes, and sweeps, which keep results.
+_WRITING = [
+    (words, name)
+    for words, parameters in commands.COMMANDS
+    for name in (commands.name_of(words, parameter) for parameter in parameters)
+    if name in commands.OUTPUTS or (*words, name) == ("sweep", "--results")
+]
 _PRINTING = (
     ("studies",),
     ("scenarios", "show", "paper", "--json"),
@@ -43,8 +34,8 @@ _NAMES = (
     " ",
     "a/b/c",
 )
-
-_INSIDE = ("manifest.json", ".lock", "missions", "checkpoint.safetensors", "decisions.json")
+_INSIDE = ("manifest.json", ".lock", ".index.lock", "index.html", "missions", "sweeps")
+_INSIDE += ("checkpoint.safetensors", "sweeps/kept.toml", "sweeps/kept")
 
 
 @st.composite
@@ -55,11 +46,8 @@ def outputs(draw: st.DrawFn) -> Case:
     if draw(st.integers(0, 4)) == 0:
         stdout = draw(st.sampled_from(["full", "closed"]))
         return Case("output", draw(st.sampled_from(_PRINTING)), tuple(steps), stdout=stdout)
-    is_folder = draw(st.booleans())
-    if is_folder:
-        words, ending = draw(st.sampled_from(_FOLDERS)), ""
-    else:
-        words, ending = draw(st.sampled_from(_FILES))
+    words, option = draw(st.sampled_from(_WRITING))
+    ending = draw(st.sampled_from(commands.ENDINGS.get(option, ("",))))
     trouble = draw(st.sampled_from(["node", "node", "disk", "name", "inside", "above", "old"]))
     name, file_size = f"a{ending}", None
     if trouble == "node":
@@ -69,14 +57,12 @@ def outputs(draw: st.DrawFn) -> Case:
     elif trouble == "name":
         name = draw(st.sampled_from(_NAMES)) + ending
     elif trouble == "inside":
-        inside = ("manifest.json", ".lock", "missions", "checkpoint.safetensors", "decisions.json")
-        steps.append(
-            Node(f"out/{name}/{draw(st.sampled_from(inside))}", draw(st.sampled_from(NODES)))
-        )
+        inside = draw(st.sampled_from(_INSIDE))
+        steps.append(Node(f"out/{name}/{inside}", draw(st.sampled_from(NODES))))
     elif trouble == "above":
         steps.append(Node("out/above", draw(st.sampled_from((*NODES, "locked")))))
         name = f"above/{name}"
     else:
         steps.append(Write(f"out/{name}", b"an old file"))
-    arguments = tuple(word.replace("{}", f"../out/{name}") for word in words)
+    arguments = commands.line(words, {option: f"../out/{name}"})
     return Case("output", arguments, tuple(steps), file_size=file_size, lasting=10)

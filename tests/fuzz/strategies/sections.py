@@ -1,4 +1,4 @@
-"""Settings of the fields of scenarios, those of sections above all: plain, odd, and of no field."""
+"""Settings of the fields of scenarios: plain ones, odd ones, and some of no field."""
 
 from hypothesis import strategies as st
 
@@ -45,3 +45,11 @@ _names = st.sampled_from(FIELDS) | st.sampled_from(EXTENSIONS).flatmap(
     lambda section: texts.map(lambda name: f"{section}.{name}")
 )
 odd_settings = st.tuples(_names, _ENDS | toml_values).map("=".join)
+
+# Numbers at the ends of what a computer can hold, and the forms in which a field may take them.
+_ODD = ("-0.0", "5e-324", "-5e-324", "1e-308", "1e308", "-1e308", "inf", "-inf", "nan", "1e19")
+_FORMS = ("{}", "[{}, {}]", "[{}, {}, {}]", "[[0, {}]]", "[[{}, 1]]", "[[0, 0.0], [5, {}]]")
+_odd_numbers = st.tuples(st.sampled_from(_FORMS), st.sampled_from(_ODD)).map(
+    lambda drawn: drawn[0].replace("{}", drawn[1])
+)
+odd_numbers = st.tuples(st.sampled_from(FIELDS), _odd_numbers).map("=".join)

@@ -58,3 +58,45 @@ def _training(field: str, value: str) -> str:
     ticks = value if field == "ticks" else "100"
     head = "" if field == "ticks" else f"{field} = {value}\n"
     return f'name = "big"\n{head}[[phases]]\nname = "only"\nticks = {ticks}\nbattery = true\n'
+
+
+_MANY = st.integers(1, 3).map(lambda power: 10**power)
+# Fields that make work, with values that a scenario may have.
+_WORK = {
+    "max_slots": st.integers(2, 5).map(lambda power: 10**power),
+    "uavs": st.sampled_from([8, 32, 64]),
+    "arrival_rate": st.sampled_from([0.0, 1e-9, 1.0, 100.0]),
+    "arrivals.schedule": st.sampled_from(
+        ["[[0, 100]]", "[[0, 0], [99, 100]]", "[[0, 0], [99999, 100]]", "[[0, 1e6]]", "[[5, 0.0]]"]
+    ),
+    "arrivals.service": st.sampled_from(['"newest"', '"oldest"']),
+    "arrivals.buffer": st.sampled_from([1, 1000, 10**6]),
+    "age.measured": st.just("true"),
+    "communication_slots": st.sampled_from([1, 20, 64]),
+    "initial_data": st.sampled_from([0, 10**3, 10**6]),
+    "quota": st.sampled_from([1, 10**6]),
+    "grid": st.sampled_from([16, 64, 256]),
+    "nodes": _MANY.map(lambda n: str([[1 + i % 15, 1 + i // 15 % 15] for i in range(n)])),
+    "charging.measured": st.just("true"),
+    "failures": st.just("{uav_rate=0.5, uav_repair=1, node_rate=0.5, node_repair=1}"),
+}
+
+
+@st.composite
+def work(draw: st.DrawFn) -> Case:
+    """A scenario that may be valid and makes much work: it ends, or it is refused."""
+    fields = draw(st.lists(st.sampled_from([*_WORK]), min_size=2, max_size=5, unique=True))
+    settings = [f"--set={field}={draw(_WORK[field])}" for field in fields]
+    if draw(st.booleans()):
+        settings.append('--set=arrivals.process="continuous"')
+    missions = ("--missions", str(draw(st.integers(0, 4).map(lambda power: 10**power))))
+    policy = ("--policy", draw(st.sampled_from(["greedy", "random", "age", "planner"])))
+    commands = (
+        ("simulate", *policy),
+        ("simulate", *policy, "--figure", "../out/a.png"),
+        ("simulate", *policy, "--events", "../out/a.parquet"),
+        ("evaluate", *policy, *missions),
+        ("evaluate", *policy, *missions, "--engine", "events"),
+        ("sweep", *policy, *missions, "--results", "../out/r", "--out", "../out/p"),
+    )
+    return Case("work", (*draw(st.sampled_from(commands)), *settings), lasting=4)

@@ -1,0 +1,52 @@
+"""Runs the notebooks of reports in the process of a case: the start of a kernel takes seconds.
+
+Errors end as those of a kernel do. A share of the cases has real kernels.
+"""
+
+import ast
+import io
+from collections.abc import Sequence
+from contextlib import chdir, redirect_stderr
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import IPython.display
+from nbformat.v4 import new_output
+
+from dess import InputError
+from reports.pages import html
+from reports.pages.kernels import Kernels
+from reports.pages.notebook import Report
+
+
+def run_here() -> None:
+    """Let the commands of this process run notebooks without kernels."""
+    Kernels.run = _run  # type: ignore[method-assign]
+    html.svg = lambda drawing: b""
+
+
+def _run(kernels: Kernels, reports: Sequence[Report]) -> None:
+    for report in reports:
+        try:
+            # As a kernel, not among the files of the case, and without bars and drawings.
+            with TemporaryDirectory() as folder, chdir(folder), redirect_stderr(io.StringIO()):
+                _execute(report)
+        except InputError as error:
+            raise InputError(f"report {report.name}: {error}") from error
+        except Exception as error:  # of a cell, which may raise anything
+            report.failure = f"report {report.name}: {type(error).__name__}: {error}"
+
+
+def _execute(report: Report) -> None:
+    shown: list[Any] = []
+    IPython.display.display = lambda *pieces: shown.extend(pieces)
+    scope: dict[str, Any] = {}
+    for cell in report.cells:
+        tree = ast.parse(cell.source)
+        last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, report.name, "exec"), scope)
+        if isinstance(last, ast.Expr):
+            shown.append(eval(compile(ast.Expression(last.value), report.name, "eval"), scope))
+        texts = [piece.data for piece in shown if isinstance(piece, IPython.display.DisplayObject)]
+        cell.outputs = [new_output("display_data", {"text/html": text}) for text in texts]
+        shown.clear()

@@ -1,0 +1,56 @@
+"""The shipped reports on forged folders: their studies, and what lies beside these."""
+
+from hypothesis import strategies as st
+
+from reports.pages.notebook import read
+from tests.fuzz import ready
+from tests.fuzz.case import Case, Step
+from tests.fuzz.steps import Copy
+from tests.fuzz.strategies import commands
+from tests.fuzz.strategies.changes import Changes, json_changes, odd, results_changes
+from tests.fuzz.strategies.values import texts, toml_values
+
+_RESULTS = "out/results"
+# Folders that a report reads beside those of its studies.
+_BESIDE = {
+    "verification": (ready.KEPT, "fig4"),
+    "comparison": (ready.KEPT,),
+    "planner": (ready.KEPT,),
+    "performance": ("gap",),
+    "scorecard": ("gap",),
+}
+_ASKING = ("what-if", "sweep", "own-sea")  # reports that keep the results of a question
+_TRAINED = "in/trained"
+
+
+@st.composite
+def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
+    """A shipped report, one of whose folders is changed, in a special way or any."""
+    studies, beside = read(name).studies, _BESIDE.get(name, ())
+    folders = [*studies, *beside]
+    steps: list[Step] = [Copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
+    changes = [
+        (json_changes if one == ready.KEPT else results_changes)(f"{_RESULTS}/{one}")
+        for one in folders
+    ]
+    known = read(name).parameters
+    parameters = {key: text for key, text in ready.ASKED_WITH.items() if key in known}
+    if name in _ASKING:
+        steps += [Copy(ready.ASKED, _RESULTS), Copy(ready.SCENARIO, f"in/{ready.SCENARIO}")]
+        changes.append(json_changes(_RESULTS))
+    if name == "learning":
+        steps.append(Copy(ready.TRAINED, _TRAINED))
+        changes.append(json_changes(_TRAINED))
+        parameters["trained"] = f'"../{_TRAINED}"'
+    if special:
+        whole = _TRAINED if name == "learning" else _RESULTS
+        parts = [f"{_RESULTS}/{one}" for one in beside if special is odd]
+        changes = [special(draw(st.sampled_from([whole, *parts])))]
+    steps += draw(st.lists(st.one_of(changes), min_size=1, max_size=1 if special else 2))
+    if not special and draw(st.integers(0, 5)) == 5:
+        some = st.sampled_from([*known, "policies"]) | texts
+        parameters[draw(some)] = draw(toml_values)
+    given = [f"--parameter={key}={value}" for key, value in parameters.items()]
+    values = {"report names": name, "--results": f"../{_RESULTS}"}
+    arguments = (*commands.line(("report",), values), *given)
+    return Case("report", arguments, tuple(steps), seconds=120)
