@@ -49,7 +49,10 @@ odd_settings = st.tuples(_names, _ENDS | toml_values).map("=".join)
 # Numbers at the ends of what a computer can hold, and the forms in which a field may take them.
 _ODD = ("-0.0", "5e-324", "-5e-324", "1e-308", "1e308", "-1e308", "inf", "-inf", "nan", "1e19")
 _FORMS = ("{}", "[{}, {}]", "[{}, {}, {}]", "[[0, {}]]", "[[{}, 1]]", "[[0, 0.0], [5, {}]]")
-_odd_numbers = st.tuples(st.sampled_from(_FORMS), st.sampled_from(_ODD)).map(
-    lambda drawn: drawn[0].replace("{}", drawn[1])
-)
-odd_numbers = st.tuples(st.sampled_from(FIELDS), _odd_numbers).map("=".join)
+_RATES = ("arrival_rate", "arrivals.rates", "arrivals.schedule")  # of which compiled loops are made
+_numbers = st.sampled_from(_ODD) | st.just("-0.0")
+_forms = st.sampled_from(_FORMS) | st.just("{}")
+odd_numbers = st.tuples(
+    st.sampled_from(FIELDS) | st.sampled_from(_RATES),
+    st.tuples(_forms, _numbers).map(lambda drawn: drawn[0].replace("{}", drawn[1])),
+).map("=".join)
