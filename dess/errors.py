@@ -126,7 +126,8 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     allowed = form_of(field) if field else f"a table of {listed(fields)}"
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
-        return line if "; allowed: " in line else f"{line}; allowed: {allowed}"
+        is_complete = isinstance(first["ctx"]["error"], InputError) or "; allowed: " in line
+        return line if is_complete else f"{line}; allowed: {allowed}"
     if kind == "missing" and field and is_whole:
         return f"{place}: is missing; allowed: {form_of(field, described=True)}"
     problem = "is too short" if is_short else _problem(kind)

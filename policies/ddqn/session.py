@@ -6,6 +6,7 @@ policy = policies.load("runs/quick")       # from the first evaluation or interr
 """
 
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -36,6 +37,7 @@ from policies.ddqn.training import Training, build
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
 CHECKPOINT_EVERY = 240.0  # seconds between checkpoints
+TICK_END = 1.0  # seconds that a tick has to end after a signal
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
@@ -154,7 +156,7 @@ def train(
 
 def _run(training: Training, out: Path, progress: Callable[[Training, int], None] | None) -> None:
     """Train until the end or a signal; save a checkpoint now and then, and every better policy."""
-    with _stop_signal() as stopped, _tensorboard(out / EVENTS, training) as show:
+    with _tensorboard(out / EVENTS, training) as show, _stop_signal() as stopped:
         saved = time.monotonic()
         while not training.done and not stopped():
             rows = len(training.curve)
@@ -167,7 +169,7 @@ def _run(training: Training, out: Path, progress: Callable[[Training, int], None
                 saved = time.monotonic()
             if progress:
                 progress(training, 1)
-        save_training(out / CHECKPOINT, training)
+    save_training(out / CHECKPOINT, training)
 
 
 def _check_folder(out: Path, resume: bool) -> None:
@@ -219,20 +221,31 @@ def _save_results(out: Path, training: Training) -> None:
 def _stop_signal() -> Iterator[Callable[[], bool]]:
     """Let a signal stop the session after the tick; a second signal stops it at once.
 
-    A signal that is ignored, as SIGHUP under ``nohup``, stays ignored.
+    A tick that compiles or evaluates may take long: then the first signal is sent once more. A
+    signal that is ignored, as SIGHUP under ``nohup``, stays ignored.
     """
     received: list[int] = []
+    again: list[threading.Timer] = []
 
     def receive(number: int, frame: Any) -> None:
         received.append(number)
         if len(received) > 1:
             raise KeyboardInterrupt
+        again.append(threading.Timer(TICK_END, signal.raise_signal, [number]))
+        again[0].daemon = True
+        again[0].start()
 
     numbers = [n for n in SIGNALS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     handlers = {number: signal.signal(number, receive) for number in numbers}
     try:
         yield lambda: bool(received)
+    except SystemError:  # as numba reports an interruption
+        if len(received) > 1:
+            raise KeyboardInterrupt from None
+        raise
     finally:
+        for timer in again:
+            timer.cancel()
         for number, handler in handlers.items():
             signal.signal(number, handler)
 

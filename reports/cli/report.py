@@ -72,7 +72,7 @@ def report(
     from reports.pages.notebook import NAMES
     from reports.pages.render import render, render_study
 
-    folders = [n for n in names or [] if os.sep in n or (n not in NAMES and Path(n).is_dir())]
+    folders = [n for n in names or [] if os.sep in n or (n not in NAMES and os.path.isdir(n))]
     reports = [name for name in names or [] if name not in folders]
     with rendering() as progress:
         if reports or not folders:

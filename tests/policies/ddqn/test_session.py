@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -150,6 +151,22 @@ def test_the_second_signal_ends_it_at_once(whole: Training, tmp_path: Path) -> N
     with pytest.raises(KeyboardInterrupt):
         train(SHORT, tmp_path, progress=_at(7, stop))
     assert signal.getsignal(signal.SIGINT) == before
+    assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
+
+
+def test_a_signal_ends_a_tick_that_takes_long(
+    whole: Training, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop() -> None:
+        signal.raise_signal(signal.SIGTERM)
+        end = time.monotonic() + 60
+        while time.monotonic() < end:
+            pass
+
+    monkeypatch.setattr(session, "TICK_END", 0.1)
+    with pytest.raises(KeyboardInterrupt):
+        train(SHORT, tmp_path, progress=_at(7, stop))
+    monkeypatch.undo()
     assert_same(train(SHORT, tmp_path, resume=True), whole)  # from the last checkpoint
 
 
