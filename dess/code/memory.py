@@ -1,5 +1,7 @@
 """The memory that is at hand, which large inputs are compared with before any of it is taken."""
 
+import sys
+
 import psutil
 
 from dess.errors import InputError
@@ -8,8 +10,14 @@ GIB = 2**30
 
 
 def available_memory() -> int:
-    """The memory [bytes] that processes can take without swapping."""
-    return psutil.virtual_memory().available
+    """The memory [bytes] that this process can take without swapping, within its own limit."""
+    available = psutil.virtual_memory().available
+    if sys.platform == "linux":
+        process = psutil.Process()
+        limit = process.rlimit(psutil.RLIMIT_DATA)[0]
+        if limit != psutil.RLIM_INFINITY:
+            return max(0, min(available, limit - process.memory_info().data))
+    return available
 
 
 def check_memory(what: str, needed: float, allowed: str) -> None:

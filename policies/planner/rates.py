@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dess.code.memory import check_memory
 from dess.sections.wind import surcharges
 from dess.view import View
 
@@ -67,6 +68,11 @@ def _candidates(
     mean_rate = _mean_rate(snr, length, deviation)
     parts, places = (snr.shape[1] - 1) // (grid - 1), snr.shape[1]
     kept = min(_RANKS, len(cells))
+    check_memory(
+        f"planner: a grid of {grid:,} cells",
+        2 * grid * places * kept * CANDIDATE.itemsize,
+        "a smaller grid, or fewer nodes or communication slots",
+    )
     table = np.empty((2, grid, places, kept), CANDIDATE)
     for axis in range(2):
         along, across = cells[:, axis], cells[:, 1 - axis]
@@ -82,6 +88,9 @@ def _candidates(
 def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:
     """The mean of the rate (eq. 9) over the shadowing, for mean SNRs [dB]."""
     points, weights = np.polynomial.hermite_e.hermegauss(_POINTS)
-    levels = snr[..., None] + deviation * points
-    rates = length * np.log2(1.0 + 10.0 ** (levels / 10.0))
-    return rates @ (weights / weights.sum())
+    weights /= weights.sum()
+    rates = np.empty_like(snr)
+    for row, levels in enumerate(snr):  # all rows at once would take gigabytes on a large grid
+        levels = levels[:, None] + deviation * points
+        rates[row] = length * np.log2(1.0 + 10.0 ** (levels / 10.0)) @ weights
+    return rates

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import pytest
 
 from dess import InputError
@@ -17,3 +20,14 @@ def test_what_needs_more_than_is_available_is_refused(monkeypatch: pytest.Monkey
         "a replay memory: about 3,000.0 GiB of memory, of which 2.0 are available; "
         "allowed: less, or --yes"
     )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="has no limit of the memory of a process")
+def test_a_limit_of_the_process_counts() -> None:
+    code = (
+        "import resource; from dess.code import memory; "
+        "resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30)); "
+        "print(memory.available_memory())"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert 0 < int(shown.stdout) < 2**30
