@@ -38,6 +38,8 @@ answer = sweep(scenario, policies, missions, seed, results, workers, yes=yes, **
 #
 # A *setting* is a policy together with one value of every swept field. All settings are simulated
 # with the same random numbers (common random numbers), so they are compared mission by mission.
+# Waits for a pad are planned, unless `charging.plan_waits` is false: the return guard sends a UAV
+# home earlier if it must expect to wait.
 
 # %%
 html.say("{simulated}", simulated=words.simulated(answer.results))

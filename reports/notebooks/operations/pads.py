@@ -46,8 +46,9 @@ html.say("{answer}", answer=html.composed(answers.pads(study, margin)))
 # The mission is that of the paper: UAVs start in a zone of 16 cells, collect data until their quota
 # is filled, and return to the zone to charge. Pads are given to UAVs in the order of their requests
 # (first come, first served). All numbers of pads meet the same random draws (common random
-# numbers). The return guard knows the number of pads, but no policy makes an appointment: a UAV
-# that finds all pads in use waits, and flying in place takes battery.
+# numbers). Waits are planned, which is the default of all scenarios (`charging.plan_waits`): the
+# return guard sends a UAV home earlier if it must expect to wait for a pad. A UAV that finds all
+# pads in use waits, and flying in place takes battery.
 
 # %% [markdown]
 # ## Success and product
