@@ -34,10 +34,9 @@ def main() -> int:
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, hard))
     os.environ["OMP_NUM_THREADS"] = "1"  # threads of a case would be in the way of the other
     print(f"seed {seed}: cases for {asked.minutes:g} minutes", flush=True)
-    cases, inputs = FOLDER.absolute() / "cases", FOLDER.absolute() / "ready"
-    for folder in (cases, inputs) if asked.case is not None else (FOLDER,):
+    forks = Forks(FOLDER.absolute())
+    for folder in (forks.cases, forks.ready) if asked.case is not None else (FOLDER,):
         shutil.rmtree(folder, ignore_errors=True)
-    forks = Forks(cases, inputs)
     ready.make(forks)
     drawn = drawing.cases(seed, asked.case or 0)
     if asked.case is not None:

@@ -7,6 +7,8 @@ from typing import Literal, Protocol
 # Folders of a case. Commands run in CWD, so that ``../in`` is where their inputs are.
 IN, OUT, CWD, HOME, TEMPORARY, LOG = "in", "out", "cwd", "home", "tmp", "log"
 FOLDERS = (IN, OUT, CWD, HOME, TEMPORARY, LOG)
+# The folder of the ready inputs, seen from that of a case; it is only read.
+READY = "../../ready"
 # A file of the user that no command line names, and what is in it: no command may print it.
 SECRET_FILE, SECRET = f"{HOME}/secret.csv", "Kq7wXz"
 
@@ -14,13 +16,8 @@ SECRET_FILE, SECRET = f"{HOME}/secret.csv", "Kq7wXz"
 class Step(Protocol):
     """Something that is done to the files of a case before its command runs."""
 
-    def do(self, box: Path, ready: Path) -> None:
-        """Do it.
-
-        Args:
-            box: The folder of the case.
-            ready: The folder with the ready inputs, which is only read.
-        """
+    def do(self, box: Path) -> None:
+        """Do it in the folder of the case."""
 
 
 @dataclass(frozen=True)

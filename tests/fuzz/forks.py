@@ -74,15 +74,14 @@ class Outcome:
 class Forks:
     """Runs cases, a few at a time, below a folder."""
 
-    def __init__(self, folder: Path, ready: Path, command: Command = main) -> None:
+    def __init__(self, folder: Path, command: Command = main) -> None:
         """Load everything that commands need, once.
 
         Args:
-            folder: The folder of all cases.
-            ready: The folder of the ready inputs.
+            folder: The folder of the cases and of the ready inputs.
             command: What is called, with the arguments of a case as those of the process.
         """
-        self.folder, self.ready, self._command = folder, ready, command
+        self.cases, self.ready, self._command = folder / "cases", folder / "ready", command
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(["tests.fuzz.preload", "tests.fuzz.child"])
 
@@ -107,7 +106,7 @@ class Forks:
         return self._context.Process(target=child.run, args=(case, box, self._command))
 
     def _start(self, number: int, case: Case) -> "_Running":
-        box = self.folder / str(number)
+        box = self.cases / str(number)
         shutil.rmtree(box, ignore_errors=True)
         for name in FOLDERS:
             (box / name).mkdir(parents=True)
@@ -115,7 +114,7 @@ class Forks:
         plant_evil(box)
         for step in case.steps:
             with suppress(*_UNFIT):
-                step.do(box, self.ready)
+                step.do(box)
         return _Running(number, case, box, self._process)
 
 

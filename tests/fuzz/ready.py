@@ -1,7 +1,7 @@
 """The ready inputs of the cases, made once by the project itself: results, a page, a training."""
 
 import shutil
-from importlib import resources
+from importlib.resources import files
 from pathlib import Path
 
 from analysis import load_study, run_study
@@ -13,7 +13,7 @@ from reports.pages.notebook import NAMES
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks
-from tests.fuzz.steps import Copy
+from tests.fuzz.steps import copy
 from tests.reports.small import STUDIES, quick
 
 # The names of the ready inputs.
@@ -37,140 +37,7 @@ ASKED_WITH = {
     "requirements": "{success=0.1}",
     "prices": "{uav=1000}",
 }
-_SEA = """
-description = "a small sea"
-grid = 8
-nodes = [[1, 1], [2, 6], [5, 4]]
-zone = [5, 0, 3, 2]
-uavs = [1, 3]
-flying_time = [20, 30]
-charge_start = [10, 15]
-charge_complete = [40, 60]
-quota = 60
-"""
-_SECTIONS = """
-[arrivals]
-process = "continuous"
-rates = [0.1, 0.0, 0.3]
-schedule = "storm.csv"
-buffer = 5
-service = "newest"
-
-[age]
-measured = true
-reward = -0.01
-
-[charging]
-order = "lowest-battery"
-power = 15
-measured = true
-plan_waits = true
-
-[failures]
-uav_rate = 0.01
-uav_repair = 5.0
-uav_data = "lost"
-pad_rate = 0.05
-pad_repair = 4.0
-node_rate = 0.02
-node_repair = 6.0
-node_data = "lost"
-
-[wind]
-strength = 0.4
-direction = 30.0
-gusts = 0.2
-seed = 3
-
-[[fleet]]
-slots_per_cell = 2
-rate = 1.5
-
-[[fleet]]
-flying_time = 28
-quota = 50
-"""
-_STORM = """slot,factor
-5,3.0
-20,0.5
-"""
-_STUDIED = """
-description = "a small study with all sections"
-scenario = "sections.toml"
-policies = ["greedy", "age"]
-missions = 4
-seed = 7
-logged = 2
-
-[design]
-kind = "grid"
-values."failures.uav_rate" = [0.0, 0.05]
-"""
-_STUDY = """
-description = "a small study"
-scenario = "sea.toml"
-policies = ["greedy", "random"]
-missions = 6
-seed = 7
-logged = 2
-
-[set]
-arrival_rate = 0.02
-
-[design]
-kind = "grid"
-values.uavs = [1, 2]
-"""
-_SELECTION = """
-description = "the cheapest of a few settings"
-scenario = "sea.toml"
-policies = ["greedy"]
-seed = 7
-
-[design]
-kind = "grid"
-values.uavs = [1, 2]
-
-[costs]
-uav = 1000
-hour = 5
-slot_seconds = 60
-currency = "EUR"
-
-[selection]
-procedure = "cheapest"
-first = 20
-budget = 2000
-confidence = 0.9
-indifference = 1
-check = 10
-requirements.success = 0.1
-"""
-_TRAINING = """
-name = "tiny"
-scenario = "../in/sea.toml"
-hidden = [16, 16]
-num_envs = 8
-learning_starts = 60
-replay = 80
-batch = 32
-n_step = 3
-average_rate = 0.01
-evaluate_every = 25
-evaluation_missions = 4
-window = 2
-
-[[phases]]
-name = "harvest"
-ticks = 60
-battery = false
-
-[[phases]]
-name = "battery"
-ticks = 60
-epsilon = [0.5, 0.01]
-epsilon_decay = 0.5
-"""
+TEXTS = Path(__file__).with_name("inputs")
 
 
 def make(forks: Forks) -> None:
@@ -209,18 +76,17 @@ def _make_reports(folder: Path) -> None:
 def write_texts(ready: Path) -> None:
     """Write the scenarios, studies and configs into a new folder: small ones, and the shipped."""
     ready.mkdir(parents=True)
-    texts = {SCENARIO: _SEA, STUDY: _STUDY, SELECTION: _SELECTION, TRAINING: _TRAINING}
-    texts |= {SECTIONS: _SEA + _SECTIONS, STORM: _STORM, STUDIED: _STUDIED}
-    for name, text in texts.items():
-        (ready / name).write_text(text, "utf-8")
-    folders = {"dess": "scenarios", "analysis": "study/shipped", "policies": "ddqn/configs"}
-    for package, folder in folders.items():
-        for file in resources.files(package).joinpath(folder).iterdir():
-            (ready / file.name).write_bytes(file.read_bytes())
+    shipped = (
+        files("dess") / "scenarios",
+        files("analysis") / "study/shipped",
+        files("policies") / "ddqn/configs",
+    )
+    for file in (file for folder in (TEXTS, *shipped) for file in folder.iterdir()):
+        (ready / file.name).write_bytes(file.read_bytes())
 
 
 def _run(forks: Forks, name: str, *arguments: str) -> None:
-    steps = [Copy(path.name, f"in/{path.name}") for path in forks.ready.iterdir()]
+    steps = [copy(path.name, f"in/{path.name}") for path in forks.ready.iterdir()]
     out = () if arguments[-1] == "--results" else ("--out",)
     case = Case("ready", (*arguments, *out, f"../out/{name}"), tuple(steps), seconds=600)
     for _, outcome in forks.outcomes([(0, case)]):

@@ -9,11 +9,12 @@ import os
 import re
 import shutil
 import stat
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -23,7 +24,7 @@ from policies.ddqn import tensors
 from policies.ddqn.session import CHECKPOINT
 from reports.pages.verify import sealed
 from tests.analysis.hostile import hostile_folder
-from tests.fuzz.case import CWD, SECRET_FILE
+from tests.fuzz.case import CWD, READY, SECRET_FILE
 
 # A place in a document that is replaced by text which need not be JSON.
 _HOLE = "the text of this value is replaced"
@@ -37,311 +38,244 @@ _CLASSES = (
 )
 _CLASSES += "Evil1 = Evil2 = Evil3 = Evil0\n"
 
-Edit = tuple[int, Literal["replace", "remove", "rename", "insert"], str]
+Edits = tuple[tuple[int, str, str], ...]  # a place, what is done there, and the new text
 
 
 @dataclass(frozen=True)
-class Copy:
+class Step:
+    """Something that is done to the files of a case: a function of this module, and what it takes.
+
+    Attributes:
+        function: Takes the folder of the case, then the arguments.
+        arguments: Plain values, so that equal steps can be told.
+    """
+
+    function: Callable[..., None]
+    arguments: tuple[Any, ...]
+
+    def do(self, box: Path) -> None:
+        """Do it in the folder of a case."""
+        self.function(box, *self.arguments)
+
+    def __repr__(self) -> str:
+        return f"{self.function.__name__}{self.arguments}"
+
+
+def _step(function: Callable[..., None]) -> Callable[..., Step]:
+    """Let a function return a step that calls it later."""
+    return lambda *arguments: Step(function, arguments)
+
+
+@_step
+def copy(box: Path, name: str, path: str) -> None:
     """Copy a ready input, a file or a folder."""
-
-    name: str
-    path: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        source = ready / self.name
-        if source.is_dir():
-            shutil.copytree(source, box / self.path, dirs_exist_ok=True)
-        else:
-            shutil.copyfile(source, box / self.path)
+    source = box / READY / name
+    if source.is_dir():
+        shutil.copytree(source, box / path, dirs_exist_ok=True)
+    else:
+        shutil.copyfile(source, box / path)
 
 
-@dataclass(frozen=True)
-class Write:
+@_step
+def write(box: Path, path: str, content: bytes) -> None:
     """Write a file."""
-
-    path: str
-    content: bytes
-
-    def do(self, box: Path, ready: Path) -> None:
-        (box / self.path).parent.mkdir(parents=True, exist_ok=True)
-        _write(box / self.path, self.content)
+    (box / path).parent.mkdir(parents=True, exist_ok=True)
+    _write(box / path, content)
 
 
-@dataclass(frozen=True)
-class Lines:
+@_step
+def change_lines(box: Path, path: str, edits: tuple[tuple[int | str, str, str], ...]) -> None:
     """Change lines of a text, such as TOML: replace a value or a line, remove or repeat a line.
 
     A place is a number, or the key of a line; without such a line it is before the first one.
     """
-
-    path: str
-    edits: tuple[tuple[int | str, Literal["value", "line", "remove", "repeat"], str], ...]
-
-    def do(self, box: Path, ready: Path) -> None:
-        lines = read_text(box / self.path).splitlines()
-        for place, action, text in self.edits:
-            if isinstance(place, str):
-                keys = [line.partition("=")[0].strip() for line in lines]
-                if place not in keys:
-                    lines.insert(0, f"{place} = 0")
-                    keys.insert(0, place)
-                place = keys.index(place)
-            at = place % max(len(lines), 1)
-            key = lines[at].partition("=")[0] if lines else "key "
-            new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
-            lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
-        text = "\n".join(lines) + "\n"
-        _write(box / self.path, text.encode("utf-8", "surrogateescape"))
+    lines = _read_text(box / path).splitlines()
+    for place, action, text in edits:
+        if isinstance(place, str):
+            keys = [line.partition("=")[0].strip() for line in lines]
+            if place not in keys:
+                lines.insert(0, f"{place} = 0")
+            place = keys.index(place) if place in keys else 0
+        at = place % max(len(lines), 1)
+        key = lines[at].partition("=")[0] if lines else "key "
+        new = {"value": [f"{key}= {text}"], "line": [text], "remove": []}
+        lines[at : at + 1] = new.get(action, lines[at : at + 1] * 2)
+    _write_text(box / path, "\n".join(lines) + "\n")
 
 
-@dataclass(frozen=True)
-class Bytes:
+@_step
+def change_bytes(box: Path, path: str, edits: tuple[tuple[int, bytes | None], ...]) -> None:
     """Change bytes of a file: each edit writes some at a place, or cuts the file there."""
-
-    path: str
-    edits: tuple[tuple[int, bytes | None], ...]
-
-    def do(self, box: Path, ready: Path) -> None:
-        content = read_bytes(box / self.path)
-        for position, new in self.edits:
-            at = position % max(len(content), 1)
-            content = content[:at] + (b"" if new is None else new + content[at + len(new) :])
-        _write(box / self.path, content)
+    content = _read(box / path)
+    for position, new in edits:
+        at = position % max(len(content), 1)
+        content = content[:at] + (b"" if new is None else new + content[at + len(new) :])
+    _write(box / path, content)
 
 
-@dataclass(frozen=True)
-class Json:
+@_step
+def change_json(box: Path, path: str, edits: Edits) -> None:
     """Change a document by edits: places are counted in its text from the outside inwards.
 
     In a folder, the place of the first edit also says which of its documents is changed.
     """
-
-    path: str
-    edits: tuple[Edit, ...]
-
-    def do(self, box: Path, ready: Path) -> None:
-        path = box / self.path
-        if path.is_dir() and (documents := sorted(path.rglob("*.json"))):
-            path = documents[self.edits[0][0] % len(documents)]
-        text = edited(read_text(path), self.edits)
-        _write(path, text.encode("utf-8", "surrogateescape"))
+    document = box / path
+    if document.is_dir() and (documents := sorted(document.rglob("*.json"))):
+        document = documents[edits[0][0] % len(documents)]
+    _write_text(document, edited(_read_text(document), edits))
 
 
-@dataclass(frozen=True)
-class Page:
+@_step
+def change_page(box: Path, path: str, block: int, edits: Edits, is_sealed: bool = True) -> None:
     """Change the evidence in a page, and its checksum with it."""
-
-    path: str
-    block: int
-    edits: tuple[Edit, ...]
-    is_sealed: bool = True
-
-    def do(self, box: Path, ready: Path) -> None:
-        html = read_text(box / self.path)
-        blocks = [
-            *re.finditer(r'<script class="[^"]*" type="application/json">(.*?)</script>', html)
-        ]
-        begin, end = blocks[self.block % len(blocks)].span(1)
-        html = html[:begin] + edited(html[begin:end], self.edits) + html[end:]
-        html = html.encode("utf-8", "replace").decode()
-        _write(box / self.path, (sealed(html) if self.is_sealed else html).encode())
+    html = _read_text(box / path)
+    blocks = [*_BLOCK.finditer(html)]
+    begin, end = blocks[block % len(blocks)].span(1)
+    html = html[:begin] + edited(html[begin:end], edits) + html[end:]
+    html = html.encode("utf-8", "replace").decode()
+    _write_text(box / path, sealed(html) if is_sealed else html)
 
 
-@dataclass(frozen=True)
-class Header:
+@_step
+def change_header(box: Path, path: str, edits: Edits, is_inner: bool) -> None:
     """Change the header of a safetensors file: the JSON in it, or that of its metadata."""
-
-    path: str
-    edits: tuple[Edit, ...]
-    is_inner: bool
-
-    def do(self, box: Path, ready: Path) -> None:
-        header, content = _split(box / self.path)
-        if self.is_inner and "dess" in header.get("__metadata__", {}):
-            header["__metadata__"]["dess"] = edited(header["__metadata__"]["dess"], self.edits)
-            text = json.dumps(header)
-        else:
-            text = edited(json.dumps(header), self.edits)
-        _join(box / self.path, text, content)
+    header, content = _split(box / path)
+    if is_inner and "dess" in header.get("__metadata__", {}):
+        header["__metadata__"]["dess"] = edited(header["__metadata__"]["dess"], edits)
+        _join(box / path, json.dumps(header), content)
+    else:
+        _join(box / path, edited(json.dumps(header), edits), content)
 
 
-@dataclass(frozen=True)
-class Seal:
+@_step
+def seal(box: Path, folder: str) -> None:
     """Write the checksums that fit into the files of a training, as a forger would."""
-
-    folder: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        description, path = box / self.folder / "config.json", box / self.folder / CHECKPOINT
-        model = read_bytes(box / self.folder / "model.safetensors")
-        content = json.loads(read_bytes(description))
-        content["model_sha256"] = [sha256(model).hexdigest()]
-        _write(description, json.dumps(content).encode())
-        header, data = _split(path)
-        inner = json.loads(header["__metadata__"]["dess"])
-        inner.pop("sha256", None)
-        values, _ = tensors.read(path, len(data) + 2**20)
-        inner["sha256"] = tensors.digest(inner, values)
-        header["__metadata__"]["dess"] = json.dumps(inner)
-        _join(path, json.dumps(header), data)
+    description, path = box / folder / "config.json", box / folder / CHECKPOINT
+    content = json.loads(_read(description))
+    model = _read(box / folder / "model.safetensors")
+    content["model_sha256"] = [sha256(model).hexdigest()]
+    _write_text(description, json.dumps(content))
+    header, data = _split(path)
+    inner = json.loads(header["__metadata__"]["dess"])
+    inner.pop("sha256", None)
+    values, _ = tensors.read(path, len(data) + 2**20)
+    inner["sha256"] = tensors.digest(inner, values)
+    header["__metadata__"]["dess"] = json.dumps(inner)
+    _join(path, json.dumps(header), data)
 
 
-@dataclass(frozen=True)
-class Forged:
+@_step
+def forge(box: Path, folder: str, position: int, change: str, text: str) -> None:
     """Change a parquet file below a folder and give it the name that fits: rows, cells, parts."""
-
-    folder: str
-    position: int
-    change: Literal["bytes", "parts", "rows", "values", "columns", "schema"]
-    text: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        files = sorted((box / self.folder).rglob("*.parquet"))
-        path = files[self.position % len(files)]
-        name = path.stem.rpartition("-")[0]
-        if self.change == "bytes":
-            content = bytearray(read_bytes(path))
-            content[self.position % len(content)] ^= 1 + self.position % 255
-        else:
-            table = pq.read_table(pa.BufferReader(read_bytes(path)))
-            table, name = self._changed(table, name)
-            sink = pa.BufferOutputStream()
-            pq.write_table(table, sink)
-            content = sink.getvalue().to_pybytes()
-        path.unlink()
-        (path.parent / f"{name}-{short_hash(bytes(content))}.parquet").write_bytes(content)
-
-    def _changed(self, table: pa.Table, name: str) -> tuple[pa.Table, str]:
-        if self.change == "parts":
+    files = sorted((box / folder).rglob("*.parquet"))
+    path = files[position % len(files)]
+    name = path.stem.rpartition("-")[0]
+    content = bytearray(_read(path))
+    if change == "bytes":
+        content[position % len(content)] ^= 1 + position % 255
+    else:
+        table = pq.read_table(pa.BufferReader(bytes(content)))
+        if change == "parts":
             with suppress(ValueError, TypeError, RecursionError):
-                name = name_of(json.loads(self.text))
-            parts = self.text.encode("utf-8", "surrogateescape")
-            return table.replace_schema_metadata({b"dess.parts": parts}), name
-        if self.change == "rows":
-            return pa.concat_tables([table] * (self.position % 3)) if self.position % 3 else table[
-                :0
-            ], name
-        if self.change == "schema":
-            return table.cast(pa.schema([(n, pa.string()) for n in table.schema.names])), name
-        at = self.position % table.num_columns
-        if self.change == "columns":
-            return table.remove_column(at), name
+                name = name_of(json.loads(text))
+        sink = pa.BufferOutputStream()
+        pq.write_table(_changed(table, position, change, text), sink)
+        content = bytearray(sink.getvalue())
+    path.unlink()
+    (path.parent / f"{name}-{short_hash(bytes(content))}.parquet").write_bytes(content)
+
+
+def _changed(table: pa.Table, position: int, change: str, text: str) -> pa.Table:
+    at = position % table.num_columns
+    if change == "parts":
+        parts = text.encode("utf-8", "surrogateescape")
+        return table.replace_schema_metadata({b"dess.parts": parts})
+    if change == "rows":
+        return pa.concat_tables([table] * (position % 3)) if position % 3 else table[:0]
+    if change == "schema":
+        return table.cast(pa.schema([(name, pa.string()) for name in table.schema.names]))
+    if change == "values":
         field = table.schema.field(at)
-        bad = {"f": float("nan"), "i": -(self.position % 2**31), "u": 2**31 - 1}
-        kind = "f" if pa.types.is_floating(field.type) else "i"
+        bad = float("nan") if pa.types.is_floating(field.type) else -(position % 2**31)
+        with suppress(pa.ArrowException, OverflowError):
+            return table.set_column(at, field, pa.array([bad] * len(table), field.type))
+    return table.remove_column(at)
+
+
+@_step
+def node(box: Path, path: str, kind: str) -> None:
+    """Put a node of a kind of ``strategies.changes.NODES``, or a locked folder, at a path."""
+    place = box / path
+    place.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "locked":  # a folder that cannot be written, nor read
+        place.mkdir(exist_ok=True)
+        place.chmod(0o500)
+        return
+    _remove(place)
+    links = {"loop": place.name, "dangling": "nowhere", "secret": str(box / SECRET_FILE)}
+    if kind == "fifo":
+        os.mkfifo(place)
+    elif kind == "folder":
+        place.mkdir()
+    elif kind == "socket":
+        os.mknod(place, stat.S_IFSOCK | 0o600)
+    elif kind in links:
+        place.symlink_to(links[kind])
+    else:  # a device of our own, as the machine's must survive; a link to it if that is refused
+        device = Path("/dev", kind)
         try:
-            column = pa.array([bad[kind]] * len(table), field.type)
-        except (pa.ArrowException, OverflowError):
-            return table.remove_column(at), name
-        return table.set_column(at, field, column), name
+            os.mknod(place, stat.S_IFCHR | 0o666, device.stat().st_rdev)
+        except PermissionError:
+            place.symlink_to(device)
 
 
-@dataclass(frozen=True)
-class Node:
-    """Put something that is no regular file in the place of a path, or beside it."""
-
-    path: str
-    kind: str  # of strategies.changes.NODES, or locked
-
-    def do(self, box: Path, ready: Path) -> None:
-        path = box / self.path
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if self.kind == "locked":  # a folder that cannot be written, nor read
-            path.mkdir(exist_ok=True)
-            path.chmod(0o500)
-            return
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        path.unlink(missing_ok=True)
-        links = {"loop": path.name, "dangling": "nowhere", "secret": str(box / SECRET_FILE)}
-        if self.kind == "fifo":
-            os.mkfifo(path)
-        elif self.kind == "folder":
-            path.mkdir()
-        elif self.kind in links:
-            path.symlink_to(links[self.kind])
-        else:
-            _device(path, self.kind)
+@_step
+def node_in(box: Path, folder: str, position: int, other: str | None, kind: str) -> None:
+    """Put a node in the place of a file of a folder, or of another that need not be there."""
+    paths = sorted((box / folder).rglob("*"))
+    path = box / folder / other if other else paths[position % len(paths)]
+    node(str(path.relative_to(box)), kind).do(box)
 
 
-@dataclass(frozen=True)
-class Odd:
-    """Put something that is no regular file in the place of a file of a folder, or beside them."""
-
-    folder: str
-    position: int
-    other: str | None  # a file that need not be there
-    kind: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        folder = box / self.folder
-        paths = sorted(folder.rglob("*"))
-        path = folder / self.other if self.other else paths[self.position % len(paths)]
-        Node(str(path.relative_to(box)), self.kind).do(box, ready)
-
-
-@dataclass(frozen=True)
-class Hostile:
+@_step
+def hostile(box: Path, folder: str, text: str) -> None:
     """Put a text, such as the class of a Python file, into the free strings of results."""
-
-    folder: str
-    text: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        sound = box / f"{self.folder}-sound"
-        (box / self.folder).rename(sound)
-        try:
-            hostile_folder(sound, box / self.folder, self.text)
-        finally:
-            shutil.rmtree(sound)
+    sound = box / f"{folder}-sound"
+    (box / folder).rename(sound)
+    try:
+        hostile_folder(sound, box / folder, text)
+    finally:
+        shutil.rmtree(sound)
 
 
-@dataclass(frozen=True)
-class Evil:
+@_step
+def name_evil(box: Path, path: str) -> None:
     """Let data name the policy of a Python file, wherever they name ``greedy``."""
-
-    path: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        path = box / self.path
-        results = [manifest.parent for manifest in path.rglob("manifest.json")]
-        for file in [path] if path.is_file() else path.rglob("*"):
-            if file.suffix in (".json", ".toml", ".html") and not {*results} & {*file.parents}:
-                text = read_text(file).replace('"greedy"', f'"{EVIL}:Evil0"')
-                _write(file, (sealed(text) if file.suffix == ".html" else text).encode())
-        for folder in results:
-            Hostile(str(folder.relative_to(box)), f"{EVIL}:Evil").do(box, ready)
+    results = [manifest.parent for manifest in (box / path).rglob("manifest.json")]
+    for file in [box / path] if (box / path).is_file() else (box / path).rglob("*"):
+        if file.suffix in (".json", ".toml", ".html") and not {*results} & {*file.parents}:
+            text = _read_text(file).replace('"greedy"', f'"{EVIL}:Evil0"')
+            _write_text(file, sealed(text) if file.suffix == ".html" else text)
+    for folder in results:
+        hostile(str(folder.relative_to(box)), f"{EVIL}:Evil").do(box)
 
 
-@dataclass(frozen=True)
-class Rename:
-    """Rename a file or folder, one of those below a folder."""
-
-    folder: str
-    position: int
-    name: str
-
-    def do(self, box: Path, ready: Path) -> None:
-        paths = sorted((box / self.folder).rglob("*"))
-        path = paths[self.position % len(paths)]
-        try:
-            path.rename(path.parent / self.name)
-        except (OSError, ValueError):  # no such name is possible
-            path.unlink() if path.is_file() else shutil.rmtree(path)
+@_step
+def rename(box: Path, folder: str, position: int, name: str) -> None:
+    """Rename a file or folder, one of those below a folder, or else remove it."""
+    paths = sorted((box / folder).rglob("*"))
+    path = paths[position % len(paths)]
+    try:
+        path.rename(path.parent / name)
+    except (OSError, ValueError):  # no such name is possible
+        _remove(path)
 
 
-@dataclass(frozen=True)
-class Plant:
+@_step
+def plant(box: Path, folder: str, names: tuple[str, ...]) -> None:
     """Put Python files into a folder; if one of them is run, it leaves a file."""
-
-    folder: str
-    names: tuple[str, ...]
-
-    def do(self, box: Path, ready: Path) -> None:
-        for name in self.names:
-            path = box / self.folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            _write(path, PLANTED.format(name=path.name).encode())
+    for name in names:
+        write(f"{folder}/{name}", PLANTED.format(name=Path(name).name).encode()).do(box)
 
 
 def plant_evil(box: Path) -> None:
@@ -350,19 +284,7 @@ def plant_evil(box: Path) -> None:
     path.write_text(PLANTED.format(name=path.name) + _CLASSES)
 
 
-def _device(path: Path, kind: str) -> None:
-    """A device node of our own, as the machine's must survive; a link to it if that is refused."""
-    if kind == "socket":
-        os.mknod(path, stat.S_IFSOCK | 0o600)
-        return
-    device = Path("/dev", kind)
-    try:
-        os.mknod(path, stat.S_IFCHR | 0o666, device.stat().st_rdev)
-    except PermissionError:
-        path.symlink_to(device)
-
-
-def edited(text: str, edits: tuple[Edit, ...]) -> str:
+def edited(text: str, edits: Edits) -> str:
     """A JSON text in which values are replaced, removed, renamed or added by any text."""
     document = json.loads(text)
     holes = []
@@ -401,28 +323,40 @@ def _places(document: Any) -> list[tuple[Any, Any]]:
     return places
 
 
-def read_bytes(path: Path) -> bytes:
-    """The content of a regular file; a pipe would block."""
-    if not path.is_file():
+def _regular(path: Path) -> Path:
+    """The path of a new or regular file; a pipe would block, a device is not ours."""
+    if path.exists() and not path.is_file():
         raise ValueError(f"{path} is no regular file")
-    return path.read_bytes()
+    return path
 
 
-def read_text(path: Path) -> str:
-    """The text of a regular file."""
-    return read_bytes(path).decode()
+def _read(path: Path) -> bytes:
+    return _regular(path).read_bytes()
+
+
+def _read_text(path: Path) -> str:
+    return _read(path).decode()
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Write a new or a regular file; a pipe would block, a device of the machine is not ours."""
-    if path.exists() and not path.is_file():
-        raise ValueError(f"{path} is no regular file")
-    path.write_bytes(content)
+    _regular(path).write_bytes(content)
+
+
+def _write_text(path: Path, text: str) -> None:
+    _write(path, text.encode("utf-8", "surrogateescape"))
+
+
+def _remove(path: Path) -> None:
+    """Remove whatever is there; ``shutil.rmtree`` opens what is no folder, and a pipe blocks it."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _split(path: Path) -> tuple[dict[str, Any], bytes]:
     """The header of a safetensors file, and the bytes after it."""
-    content = read_bytes(path)
+    content = _read(path)
     end = 8 + int.from_bytes(content[:8], "little")
     return json.loads(content[8:end]), content[end:]
 

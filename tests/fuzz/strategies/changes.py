@@ -5,23 +5,8 @@ from collections.abc import Callable
 
 from hypothesis import strategies as st
 
+from tests.fuzz import steps
 from tests.fuzz.case import Step
-from tests.fuzz.steps import (
-    EVIL,
-    Bytes,
-    Evil,
-    Forged,
-    Header,
-    Hostile,
-    Json,
-    Lines,
-    Node,
-    Odd,
-    Page,
-    Plant,
-    Rename,
-    Write,
-)
 from tests.fuzz.strategies.sections import odd_settings
 from tests.fuzz.strategies.values import (
     byte_edits,
@@ -48,23 +33,14 @@ _PLANTED = (
     *("model.py", "policy.py", "config.py", "safetensors.py", "__init__.py"),
 )
 # Lines that no TOML file may have, or only once.
-_LINES = (
-    "[",
-    "[[",
-    "a.b.c = 1",
-    "[design]",
-    "[[phases]]",
-    "= 1",
-    "\ufeff",
-    "a = '''",
-    "nodes = ''",
-)
+_LINES = ("[", "[[", "a.b.c = 1", "[design]", "[[phases]]", "= 1", "\ufeff")
+_LINES += ("a = '''", "nodes = ''")
 _BAD = [b"\x00\x00\xc0\x7f", b"\x00\x00\x80\x7f", b"\xff\xff\x7f\x7f"]  # NaN, infinity, huge
 _line = st.sampled_from(_LINES) | texts
 _nodes = st.sampled_from(NODES)
 # Code that a document names, and tables that lie elsewhere.
 _names = st.sampled_from(
-    [("policies", f'["{EVIL}:Evil0"]'), ("policies", f'["greedy", "{EVIL}:Evil1"]')]
+    [("policies", f'["{steps.EVIL}:Evil0"]'), ("policies", f'["greedy", "{steps.EVIL}:Evil1"]')]
     + [("schedule", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "../in")]
     + [("nodes", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "fifo.csv")]
     + [("scenario", f'"{path}"') for path in ("../home/secret.csv", "../in", "/dev/stdin")]
@@ -82,18 +58,18 @@ def _edits(draw: st.DrawFn, path: str) -> Step:
         action = draw(st.sampled_from(["value", "value", "value", "line", "remove", "repeat"]))
         new = draw(toml_values if action == "value" else _line | odd_settings)
         edits.append((draw(positions), action, new))
-    return Lines(path, tuple(edits))
+    return steps.change_lines(path, tuple(edits))
 
 
 def document_changes(path: str) -> st.SearchStrategy[Step]:
     """Changes of a TOML file."""
     return st.one_of(
         *(_edits(path), _edits(path), _edits(path)),
-        _names.map(lambda named: Lines(path, ((named[0], "value", named[1]),))),
-        byte_edits().map(lambda edits: Bytes(path, edits)),
-        st.binary(max_size=50).map(lambda content: Write(path, content)),
-        long_texts.map(lambda text: Write(path, text.encode())),
-        st.builds(Node, st.just(path), _nodes),
+        _names.map(lambda named: steps.change_lines(path, ((named[0], "value", named[1]),))),
+        byte_edits().map(lambda edits: steps.change_bytes(path, edits)),
+        st.binary(max_size=50).map(lambda content: steps.write(path, content)),
+        long_texts.map(lambda text: steps.write(path, text.encode())),
+        st.builds(steps.node, st.just(path), _nodes),
     )
 
 
@@ -102,10 +78,12 @@ def table_changes(path: str) -> st.SearchStrategy[Step]:
     rows = st.tuples(numbers, numbers).map(",".join)
     lines = st.tuples(positions, st.just("line"), texts | numbers | rows)
     return st.one_of(
-        byte_edits().map(lambda edits: Bytes(path, edits)),
-        lines.map(lambda edit: Lines(path, (edit,))),
-        st.sampled_from([10**4, 10**6]).map(lambda n: Write(path, b"slot,factor\n" + b"1,1\n" * n)),
-        st.builds(Node, st.just(path), _nodes),
+        byte_edits().map(lambda edits: steps.change_bytes(path, edits)),
+        lines.map(lambda edit: steps.change_lines(path, (edit,))),
+        st.sampled_from([10**4, 10**6]).map(
+            lambda n: steps.write(path, b"slot,factor\n" + b"1,1\n" * n)
+        ),
+        st.builds(steps.node, st.just(path), _nodes),
     )
 
 
@@ -115,27 +93,27 @@ def results_changes(folder: str) -> st.SearchStrategy[Step]:
     kinds = st.sampled_from(["bytes", "parts", "rows", "values", "columns", "schema"])
     parts = st.tuples(texts, st.integers(-5, 10), st.integers(-5, 2**40)).map(list)
     names = texts.map(lambda text: text.replace("/", "_"))
-    documents = st.builds(Json, manifest, json_edits())
+    documents = st.builds(steps.change_json, manifest, json_edits())
     of_parts = json_values | st.lists(parts, max_size=3).map(json.dumps)
-    records = st.builds(Forged, here, positions, kinds, of_parts)
-    hostile = st.sampled_from(["<b>x</b>", "../../ran", "~/x"])
+    records = st.builds(steps.forge, here, positions, kinds, of_parts)
+    scripts = st.sampled_from(["<b>x</b>", "../../ran", "~/x"])
     return st.one_of(
         *(documents, documents, documents, records, records),
-        st.builds(Bytes, manifest, byte_edits()),
-        st.builds(Write, manifest, json_values.map(_encoded)),
-        st.builds(Rename, here, positions, names),
+        st.builds(steps.change_bytes, manifest, byte_edits()),
+        st.builds(steps.write, manifest, json_values.map(_encoded)),
+        st.builds(steps.rename, here, positions, names),
         odd(folder),
-        st.builds(Hostile, here, hostile),
+        st.builds(steps.hostile, here, scripts),
     )
 
 
 def page_changes(path: str) -> st.SearchStrategy[Step]:
     """Changes of a page: other evidence with a checksum that fits, bytes, nodes."""
-    evidence = st.builds(Page, st.just(path), positions, json_edits(), st.booleans())
+    evidence = st.builds(steps.change_page, st.just(path), positions, json_edits(), st.booleans())
     return st.one_of(
         *(evidence, evidence, evidence),
-        st.builds(Bytes, st.just(path), byte_edits()),
-        st.builds(Node, st.just(path), _nodes),
+        st.builds(steps.change_bytes, st.just(path), byte_edits()),
+        st.builds(steps.node, st.just(path), _nodes),
     )
 
 
@@ -145,13 +123,15 @@ def training_changes(folder: str, tensors: str) -> st.SearchStrategy[Step]:
     files = (tensors, "config.json", "training.parquet")
     paths = st.sampled_from([f"{folder}/{name}" for name in files])
     values = st.tuples(st.tuples(st.integers(10**4, 10**7), st.sampled_from(_BAD)))
-    headers = st.builds(Header, main, json_edits(), st.sampled_from([True, True, False]))
+    headers = st.builds(
+        steps.change_header, main, json_edits(), st.sampled_from([True, True, False])
+    )
     return st.one_of(
         *(headers, headers),
-        st.builds(Json, config, json_edits()),
-        st.builds(Bytes, main, values),
-        st.builds(Bytes, paths, byte_edits()),
-        st.builds(Write, paths, json_values.map(_encoded)),
+        st.builds(steps.change_json, config, json_edits()),
+        st.builds(steps.change_bytes, main, values),
+        st.builds(steps.change_bytes, paths, byte_edits()),
+        st.builds(steps.write, paths, json_values.map(_encoded)),
         odd(folder),
     )
 
@@ -159,19 +139,21 @@ def training_changes(folder: str, tensors: str) -> st.SearchStrategy[Step]:
 def json_changes(folder: str) -> st.SearchStrategy[Step]:
     """Changes of the documents in a folder, whichever there are, and odd nodes among its files."""
     here = st.just(folder)
-    documents = st.builds(Json, here, json_edits())
-    return st.one_of(documents, documents, st.builds(Rename, here, positions, texts), odd(folder))
+    documents = st.builds(steps.change_json, here, json_edits())
+    return st.one_of(
+        documents, documents, st.builds(steps.rename, here, positions, texts), odd(folder)
+    )
 
 
 def odd(path: str) -> st.SearchStrategy[Step]:
     """What is no file in the place of a file, be it one of a folder; and Python files beside it."""
     if "." in path:
-        return st.builds(Node, st.just(path), _nodes)
+        return st.builds(steps.node, st.just(path), _nodes)
     others = st.none() | st.none() | st.sampled_from(_OTHERS)
-    nodes = st.builds(Odd, st.just(path), positions, others, _nodes)
-    return st.one_of(nodes, nodes, st.just(Plant(path, _PLANTED)))
+    nodes = st.builds(steps.node_in, st.just(path), positions, others, _nodes)
+    return st.one_of(nodes, nodes, st.just(steps.plant(path, _PLANTED)))
 
 
 def evil(path: str) -> st.SearchStrategy[Step]:
     """Data that name the policy of a Python file."""
-    return st.just(Evil(path))
+    return st.just(steps.name_evil(path))

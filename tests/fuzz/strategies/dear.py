@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from reports.pages.notebook import NAMES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
-from tests.fuzz.steps import Copy
+from tests.fuzz.steps import copy
 from tests.fuzz.strategies.commands import READING, line
 from tests.fuzz.strategies.forged import forged
 from tests.fuzz.strategies.reports import reports
@@ -28,7 +28,7 @@ _PAGES = [(words, p) for words, p in READING if words in (("report",), ("study",
 @st.composite
 def dear(draw: st.DrawFn) -> Case:
     """A page of changed results, workers that are killed, or a command that may get a signal."""
-    steps = tuple(Copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.STUDY, ready.RESULTS))
+    steps = tuple(copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.STUDY, ready.RESULTS))
     what = draw(st.sampled_from(["page", "report", "killed", "signal"]))
     if what == "page":
         case = draw(forged(*draw(st.sampled_from(_PAGES))))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import ready
 from tests.fuzz.case import IN, OUT, Case, Step
-from tests.fuzz.steps import Copy, Seal
+from tests.fuzz.steps import copy, seal
 from tests.fuzz.strategies import commands
 from tests.fuzz.strategies.changes import (
     Changes,
@@ -22,7 +22,7 @@ from tests.fuzz.strategies.changes import (
 _NAMES = (ready.SCENARIO, ready.SECTIONS, ready.STORM, "bay.csv", ready.STUDY, ready.SELECTION)
 _NAMES += (ready.STUDIED, ready.TRAINING, ready.RESULTS, ready.SELECTED, ready.EXTENDED)
 INPUTS: tuple[Step, ...] = tuple(
-    Copy(name, f"in/{name}") for name in (*_NAMES, ready.POLICY, ready.PAGE)
+    copy(name, f"in/{name}") for name in (*_NAMES, ready.POLICY, ready.PAGE)
 )
 _STUDY_OF = {  # of results
     ready.RESULTS: ready.STUDY,
@@ -62,10 +62,10 @@ def forged(
         values.setdefault(commands.name_of(words, flag), None)
     changed = special(path) if special else _changes(kind, path, place)
     changes = draw(st.lists(changed, min_size=1, max_size=1 if special else 2))
-    seal = draw(st.sampled_from([(), (Seal(path),)])) if kind == "policy" else ()
+    seals = draw(st.sampled_from([(), (seal(path),)])) if kind == "policy" else ()
     arguments = commands.line(words, values)
     is_long = kind in ("scenario", "study", "config", "policy")
-    steps = (*INPUTS, Copy(source, path), *changes, *seal)
+    steps = (*INPUTS, copy(source, path), *changes, *seals)
     return Case(f"forged {kind}", arguments, steps, lasting=4 if is_long else 0)
 
 

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
-from tests.fuzz.steps import Copy, Node, Write
+from tests.fuzz.steps import copy, node, write
 from tests.fuzz.strategies import commands
 from tests.fuzz.strategies.changes import NODES
 
@@ -22,18 +22,8 @@ _PRINTING = (
     ("evaluate", "--policy", "greedy", "--missions", "2", "--json"),
     ("--help",),
 )
-_NAMES = (
-    "a" * 244,
-    "a" * 256,
-    "é" * 130,
-    "a\x00b",
-    "a\nb",
-    "-",
-    "a\udc80b",
-    "a\x1bb",
-    " ",
-    "a/b/c",
-)
+_NAMES = ("a" * 244, "a" * 256, "é" * 130, "-", " ", "a/b/c")
+_NAMES += ("a\x00b", "a\nb", "a\udc80b", "a\x1bb")
 _INSIDE = ("manifest.json", ".lock", ".index.lock", "index.html", "missions", "sweeps")
 _INSIDE += ("checkpoint.safetensors", "sweeps/kept.toml", "sweeps/kept")
 
@@ -42,7 +32,7 @@ _INSIDE += ("checkpoint.safetensors", "sweeps/kept.toml", "sweeps/kept")
 def outputs(draw: st.DrawFn) -> Case:
     """A command whose output meets something in its place."""
     inputs = (ready.SCENARIO, ready.STUDY, ready.TRAINING, ready.RESULTS, ready.PAGE)
-    steps: list[Step] = [Copy(name, f"in/{name}") for name in inputs]
+    steps: list[Step] = [copy(name, f"in/{name}") for name in inputs]
     if draw(st.integers(0, 4)) == 0:
         stdout = draw(st.sampled_from(["full", "closed"]))
         return Case("output", draw(st.sampled_from(_PRINTING)), tuple(steps), stdout=stdout)
@@ -51,18 +41,18 @@ def outputs(draw: st.DrawFn) -> Case:
     trouble = draw(st.sampled_from(["node", "node", "disk", "name", "inside", "above", "old"]))
     name, file_size = f"a{ending}", None
     if trouble == "node":
-        steps.append(Node(f"out/{name}", draw(st.sampled_from(NODES))))
+        steps.append(node(f"out/{name}", draw(st.sampled_from(NODES))))
     elif trouble == "disk":
         file_size = draw(st.sampled_from([512, 4096, 20_000]))
     elif trouble == "name":
         name = draw(st.sampled_from(_NAMES)) + ending
     elif trouble == "inside":
         inside = draw(st.sampled_from(_INSIDE))
-        steps.append(Node(f"out/{name}/{inside}", draw(st.sampled_from(NODES))))
+        steps.append(node(f"out/{name}/{inside}", draw(st.sampled_from(NODES))))
     elif trouble == "above":
-        steps.append(Node("out/above", draw(st.sampled_from((*NODES, "locked")))))
+        steps.append(node("out/above", draw(st.sampled_from((*NODES, "locked")))))
         name = f"above/{name}"
     else:
-        steps.append(Write(f"out/{name}", b"an old file"))
+        steps.append(write(f"out/{name}", b"an old file"))
     arguments = commands.line(words, {option: f"../out/{name}"})
     return Case("output", arguments, tuple(steps), file_size=file_size, lasting=10)

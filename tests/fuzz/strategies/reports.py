@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from reports.pages.notebook import read
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
-from tests.fuzz.steps import Copy
+from tests.fuzz.steps import copy
 from tests.fuzz.strategies import commands
 from tests.fuzz.strategies.changes import Changes, json_changes, odd, results_changes
 from tests.fuzz.strategies.values import texts, toml_values
@@ -28,7 +28,7 @@ def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
     """A shipped report, one of whose folders is changed, in a special way or any."""
     studies, beside = read(name).studies, _BESIDE.get(name, ())
     folders = [*studies, *beside]
-    steps: list[Step] = [Copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
+    steps: list[Step] = [copy(f"{ready.REPORTS}/{one}", f"{_RESULTS}/{one}") for one in folders]
     changes = [
         (json_changes if one == ready.KEPT else results_changes)(f"{_RESULTS}/{one}")
         for one in folders
@@ -36,10 +36,10 @@ def reports(draw: st.DrawFn, name: str, special: Changes | None = None) -> Case:
     known = read(name).parameters
     parameters = {key: text for key, text in ready.ASKED_WITH.items() if key in known}
     if name in _ASKING:
-        steps += [Copy(ready.ASKED, _RESULTS), Copy(ready.SCENARIO, f"in/{ready.SCENARIO}")]
+        steps += [copy(ready.ASKED, _RESULTS), copy(ready.SCENARIO, f"in/{ready.SCENARIO}")]
         changes.append(json_changes(_RESULTS))
     if name == "learning":
-        steps.append(Copy(ready.TRAINED, _TRAINED))
+        steps.append(copy(ready.TRAINED, _TRAINED))
         changes.append(json_changes(_TRAINED))
         parameters["trained"] = f'"../{_TRAINED}"'
     if special:

@@ -5,13 +5,13 @@ from hypothesis import strategies as st
 from analysis.names import MEASURES
 from tests.fuzz import ready
 from tests.fuzz.case import Case
-from tests.fuzz.steps import Copy, Write
+from tests.fuzz.steps import copy, write
 from tests.fuzz.strategies.commands import line
 from tests.fuzz.strategies.sections import PLAIN, odd_numbers
 from tests.fuzz.strategies.values import numbers, toml_values
 
-_INPUTS = tuple(Copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.SECTIONS, ready.STORM))
-_INPUTS += (Copy(ready.RESULTS, f"in/{ready.RESULTS}"),)
+_INPUTS = tuple(copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.SECTIONS, ready.STORM))
+_INPUTS += (copy(ready.RESULTS, f"in/{ready.RESULTS}"),)
 _COMMANDS = (("simulate",), ("evaluate",), ("scenarios", "show"), ("sweep",))
 # Values of a field that are equal, or of no field at all.
 _DUPLICATES = (
@@ -60,7 +60,7 @@ def duplicates(draw: st.DrawFn) -> Case:
     text = f'scenario = "{ready.SECTIONS}"\npolicies = ["greedy"]\nmissions = 1\n'
     text += f'[design]\nkind = "{kind}"\nvalues.{field} = [{values}]\n'
     arguments = ("study", "run", "../in/twice.toml", "--dry-run")
-    return Case("duplicate", arguments, (*_INPUTS, Write("in/twice.toml", text.encode())), code=2)
+    return Case("duplicate", arguments, (*_INPUTS, write("in/twice.toml", text.encode())), code=2)
 
 
 @st.composite

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import ready
 from tests.fuzz.case import Case
-from tests.fuzz.steps import Copy
+from tests.fuzz.steps import copy
 
 _SEA = ("--scenario", f"../in/{ready.SCENARIO}")
 _RUN = ("study", "run", f"../in/{ready.STUDY}", "--out", "../out/a")
@@ -31,5 +31,5 @@ def signals(draw: st.DrawFn) -> Case:
     sent = st.tuples(moments, st.sampled_from(allowed).map(int))
     chosen = tuple(sorted(draw(st.lists(sent, min_size=1, max_size=2))))
     inputs = (ready.SCENARIO, ready.STUDY, ready.TRAINING, ready.RESULTS)
-    steps = tuple(Copy(name, f"in/{name}") for name in inputs)
+    steps = tuple(copy(name, f"in/{name}") for name in inputs)
     return Case("signal", words, steps, signals=chosen, again=is_study)

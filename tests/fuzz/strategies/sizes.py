@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from tests.fuzz import ready
 from tests.fuzz.case import Case, Step
-from tests.fuzz.steps import Copy, Write
+from tests.fuzz.steps import copy, write
 
 _huge = st.integers(4, 12).map(lambda power: 10**power) | st.integers(12, 40).map(
     lambda power: 2**power
@@ -47,9 +47,9 @@ def sizes(draw: st.DrawFn) -> Case:
     )
     training = f"[{n}, {n}]" if config == "hidden" else str(n)
     steps: tuple[Step, ...] = (
-        Copy(ready.RESULTS, f"in/{ready.RESULTS}"),
-        Write("in/big.toml", study.encode()),
-        Write("in/big-training.toml", _training(config, training).encode()),
+        copy(ready.RESULTS, f"in/{ready.RESULTS}"),
+        write("in/big.toml", study.encode()),
+        write("in/big-training.toml", _training(config, training).encode()),
     )
     return Case("size", draw(st.sampled_from(commands)), steps, lasting=3)
 

@@ -55,24 +55,15 @@ def quoted(text: str) -> str:
 
 
 pairs = st.tuples(numbers, numbers).map(lambda pair: f"[{pair[0]}, {pair[1]}]")
-json_values = st.one_of(
-    numbers,
-    texts.map(quoted),
-    st.sampled_from(["null", "true", "[]", "{}", '""', "[[]]", '{"": null}', "NaN", "-Infinity"]),
-    pairs,
-    long_texts.map(quoted),
-    nested,
-    st.integers(10, 10**5).map(lambda count: f"[{'0,' * count}0]"),
-)
-toml_values = st.one_of(
-    numbers,
-    texts.map(quoted),
-    st.sampled_from(["true", "[]", "{}", '""', "[[]]", "nan", "-inf", "1979-05-27", "07:32:00"]),
-    pairs,
-    long_texts.map(quoted),
-    nested,
-    st.lists(texts.map(quoted), max_size=4).map(lambda items: f"[{', '.join(items)}]"),
-)
+_words = {
+    "json": ["null", "true", "[]", "{}", '""', "[[]]", '{"": null}', "NaN", "-Infinity"],
+    "toml": ["true", "[]", "{}", '""', "[[]]", "nan", "-inf", "1979-05-27", "07:32:00"],
+}
+_values = st.one_of(numbers, texts.map(quoted), pairs, long_texts.map(quoted), nested)
+_many = st.integers(10, 10**5).map(lambda count: f"[{'0,' * count}0]")
+_lists = st.lists(texts.map(quoted), max_size=4).map(lambda items: f"[{', '.join(items)}]")
+json_values = st.one_of(_values, st.sampled_from(_words["json"]), _many)
+toml_values = st.one_of(_values, st.sampled_from(_words["toml"]), _lists)
 _actions = st.sampled_from(["replace", "replace", "replace", "remove", "rename", "insert"])
 json_keys = texts.map(quoted)
 
@@ -82,9 +73,7 @@ def json_edits(draw: st.DrawFn) -> tuple[tuple[int, str, str], ...]:
     """One to three edits of a JSON document."""
     edits = []
     for _ in range(draw(st.sampled_from([1, 1, 1, 2, 3]))):
-        action = draw(
-            st.sampled_from(["replace", "replace", "replace", "remove", "rename", "insert"])
-        )
+        action = draw(_actions)
         new = draw(json_keys if action == "rename" else json_values)
         edits.append((draw(positions), action, new))
     return tuple(edits)
