@@ -1,7 +1,6 @@
 """The matrix of libraries: how it is made from reports, and that the page has the current one."""
 
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -19,6 +18,7 @@ from tests.integrations.matrix import (
     YES,
     row,
 )
+from tests.test_packaging import pins
 
 OWN_PINS = sorted((ROOT / "examples" / "requirements").glob("*.txt"))
 TESTED = {path.stem.removeprefix("test_") for path in (ROOT / "tests/integrations").glob("test_*")}
@@ -35,24 +35,14 @@ def suite(**outcomes: str) -> ElementTree.Element:
     return ElementTree.fromstring(f"<testsuite>{library}{''.join(cases)}</testsuite>")
 
 
-def pins(path: Path) -> dict[str, str]:
-    """The exact versions in a file, by the canonical names of the distributions."""
-    lines = [line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")]
-    pairs = [re.fullmatch(r"([\w.-]+)(?:\[[\w,]+\])?==([^\s=*]+)", line) for line in lines]
-    assert all(pairs), path
-    return {canonicalize_name(pair[1]): pair[2] for pair in pairs if pair}
+OUTCOMES = [("", YES), ("<failure/>", FAILED), ("<error/>", FAILED)]
+OUTCOMES += [("<skipped/>", MISSING), ("absent", MISSING)]
 
 
-def test_a_library_whose_checks_pass_has_a_green_row() -> None:
-    assert row(suite(), "rllib") == ["`rllib` (`ray`)", "2.60.0", *[YES] * len(CHECKS)]
-
-
-@pytest.mark.parametrize(
-    ("outcome", "cell"),
-    [("<failure/>", FAILED), ("<error/>", FAILED), ("<skipped/>", MISSING), ("absent", MISSING)],
-)
-def test_a_check_that_did_not_pass_is_seen(outcome: str, cell: str) -> None:
-    [*_, seeds] = row(suite(test_seeds_repeat_episodes=outcome), "rllib")
+@pytest.mark.parametrize(("outcome", "cell"), OUTCOMES)
+def test_a_row_has_the_outcome_of_every_check(outcome: str, cell: str) -> None:
+    *others, seeds = row(suite(test_seeds_repeat_episodes=outcome), "rllib")
+    assert others == ["`rllib` (`ray`)", "2.60.0", *[YES] * (len(CHECKS) - 1)]
     assert seeds == cell
 
 
