@@ -1,13 +1,16 @@
-"""Set-up of the whole test session: one thread for torch, and the hypothesis profiles.
+"""Set-up of the whole test session: one thread for torch, the hypothesis profiles, quick tests.
 
 Tests run side by side, where the threads of one would be in the way of the other.
 
 By default properties draw few examples, always the same. With ``--hypothesis-profile=verify`` they
 draw many fresh ones, and count as slow tests, so that ``nox -s verify`` runs them too.
+
+``pytest -m quick`` runs the tests of ``QUICK`` and imports no other file, as that takes longest.
 """
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
@@ -16,21 +19,47 @@ from tests.installed import installed
 
 __all__ = ["installed"]  # a fixture
 
+HERE = Path(__file__).parent
+# Files and folders whose tests take less than half a minute together.
+QUICK = (
+    *("dess/scenario", "dess/sections/test_age.py", "dess/sections/test_arrivals.py"),
+    *("dess/sections/test_buffers.py", "dess/sections/test_charging.py"),
+    *("dess/sections/test_failures.py", "dess/sections/test_fleet.py", "dess/test_errors.py"),
+    *("dess/test_files.py", "dess/test_locks.py", "dess/test_missions.py"),
+    *("dess/test_paper_records.py", "dess/test_rules.py", "dess/test_sea.py"),
+    *("dess/test_streams.py", "policies/test_trained.py", "analysis/stats", "test_doors.py"),
+)
+# Files that take longest; they come first, so that workers end together.
+LONGEST = ("reports", "analysis/execution", "fuzz", "test_architecture.py", "test_docs.py")
+LONGEST += ("test_extras.py",)
+
 os.environ["OMP_NUM_THREADS"] = "1"
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # by nohup; commands would ignore it, too
     signal.signal(signal.SIGHUP, lambda *_: None)
 
-settings.register_profile("default", max_examples=50, deadline=None, derandomize=True)
+settings.register_profile("default", max_examples=30, deadline=None, derandomize=True)
 settings.register_profile("verify", max_examples=1000, deadline=None, print_blob=True)
 settings.load_profile("default")
 
 
+def is_in(path: Path, places: tuple[str, ...]) -> bool:
+    """Whether a path is one of some places in the folder of the tests, or in one of them."""
+    return any(path.is_relative_to(HERE / place) for place in places)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    is_test = collection_path.name.startswith("test_")
+    asked_for_others = config.option.markexpr != "quick" or is_in(collection_path, QUICK)
+    return None if asked_for_others or not is_test else True
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests of reports have the longest files; they come first, so that workers end together."""
-    items.sort(key=lambda item: "reports" not in item.path.parts)
+    items.sort(key=lambda item: not is_in(item.path, LONGEST))
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
     deep = item.config.getoption("hypothesis_profile") == "verify"
     if deep and is_hypothesis_test(getattr(item, "obj", None)):
         item.add_marker(pytest.mark.slow)
+    if is_in(item.path, QUICK) and item.get_closest_marker("slow") is None:
+        item.add_marker(pytest.mark.quick)

@@ -268,6 +268,7 @@ def shown(interval: dict[str, float]) -> Any:
     return pytest.approx([100 * interval[key] for key in ("mean", "low", "high")], abs=0.06)
 
 
+@pytest.mark.slow
 def test_the_table_of_policies_is_what_its_command_prints(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -37,6 +37,7 @@ def test_the_wheel_runs_without_the_repository(installed: Path, tmp_path: Path) 
     check_commands(installed, tmp_path)
 
 
+@pytest.mark.slow
 def test_the_sdist_builds_the_same_wheel(tmp_path: Path) -> None:
     shutil.unpack_archive(built("sdist", tmp_path / "sdist"), tmp_path)
     [source] = tmp_path.glob("dess-*")

@@ -144,7 +144,7 @@ OF_THE_PUBLISHER = {
 
 
 @pytest.mark.filterwarnings("ignore:ConjunctiveGraph is deprecated")
-@pytest.mark.parametrize("name", ["plain", "grid"])
+@pytest.mark.parametrize("name", [pytest.param("plain", marks=pytest.mark.slow), "grid"])
 @pytest.mark.parametrize(
     "severity, known", [("REQUIRED", set()), ("RECOMMENDED", OF_THE_PUBLISHER)]
 )

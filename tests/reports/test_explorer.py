@@ -96,7 +96,7 @@ def check_curve(page: Page, results: Results, places: tuple[int, ...], along: in
     assert heights == pytest.approx([100 - mean for mean in means], abs=0.051)
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.slow), 390])
 def test_moving_a_slider_shows_the_figures_of_the_grid(
     visit: Callable[[Path, int], Visit], results: Results, document: Path, width: int
 ) -> None:

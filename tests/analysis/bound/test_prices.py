@@ -73,7 +73,13 @@ def test_no_policy_has_a_higher_mean_on_a_tiny_sea() -> None:
     check_means(space, ["random", "nearest", "greedy", "tour", "planner"], 20)
 
 
-@pytest.mark.parametrize(("uavs", "quota"), [(1, 120), (2, 100), (3, 80), (4, 60)])
+MORE_UAVS = [(2, 100), (3, 80), (4, 60)]
+
+
+@pytest.mark.parametrize(
+    ("uavs", "quota"),
+    [(1, 120), *(pytest.param(*pair, marks=pytest.mark.slow) for pair in MORE_UAVS)],
+)
 def test_no_policy_has_a_higher_mean_in_the_paper_with_a_short_quota(uavs: int, quota: int) -> None:
     """With longer quotas, two or more UAVs have the bound 1."""
     check_means(load_scenario("paper", uavs=uavs, quota=quota), ["greedy", "ddqn", "planner"], 4)

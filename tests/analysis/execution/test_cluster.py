@@ -53,6 +53,7 @@ def cluster():
         yield cluster.scheduler_address
 
 
+@pytest.mark.slow
 def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
     study = small_study(tmp_path, policies=["killed-once", "greedy"])
     run_study(study, tmp_path / "out", scheduler=cluster)
@@ -88,6 +89,7 @@ def test_dask_gives_up_a_chunk_that_kills_every_worker(plugin, cluster, tmp_path
     assert shlex.split(failure.command)[-4:] == ["--policy", "killed-always", "--replication", "5"]
 
 
+@pytest.mark.slow
 def test_a_study_goes_on_after_its_scheduler_was_killed(tmp_path, monkeypatch, capfd):
     small_study(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -70,11 +70,15 @@ def check_studies(folder, workers, number, kills, missions, progress=chunks):
         assert files_of(killed.out) == whole
 
 
+@pytest.mark.slow
 def test_a_study_that_is_told_to_end_equals_an_undisturbed_one(tmp_path):
     check_studies(tmp_path, 2, signal.SIGHUP, 1, 100)
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+KILLED = pytest.param(signal.SIGKILL, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("number", [KILLED, signal.SIGINT])
 def test_a_study_that_ends_in_its_bounds_equals_an_undisturbed_one(number, tmp_path):
     check_studies(tmp_path, 1, number, 1, 30, bounds)
 
@@ -179,6 +183,7 @@ def results(tmp_path):
     return tmp_path / "results"
 
 
+@pytest.mark.slow
 def test_a_report_that_is_told_to_end_leaves_nothing(results, tmp_path):
     command = a_page(tmp_path / "killed", results)
     assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)

@@ -5,6 +5,7 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+import pytest
 import tomli_w
 
 from analysis import sweep
@@ -38,6 +39,7 @@ def test_the_page_names_the_cheapest_fleet(tmp_path: Path) -> None:
     assert "--require success=0.5 --require collection_ratio=0.1" in text
 
 
+@pytest.mark.slow
 def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     """In Jupyter, from top to bottom; with another requirement."""
     values = {**ASKED, "scenario": str(_sea(tmp_path))}

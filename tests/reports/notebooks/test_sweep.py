@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+import pytest
 from nbclient import NotebookClient
 
 from analysis import load_results, numbers, sweep
@@ -44,6 +45,7 @@ def run_changed(name: str, folder: Path, old: str, new: str, values: dict[str, A
     return [o.data.get("text/markdown", "") for o in outputs if o.output_type == "execute_result"]
 
 
+@pytest.mark.slow
 def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     """In Jupyter, from top to bottom; one field is swept in place of two."""
     scenario = write_scenario(tmp_path)

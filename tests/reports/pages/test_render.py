@@ -391,6 +391,7 @@ def test_values_stand_in_the_cell_of_the_parameters_and_run_from_there(
     assert "'random'" in (tmp_path / "mission.html").read_text("utf-8").replace("&#39;", "'")
 
 
+@pytest.mark.slow
 def test_an_edited_parameter_is_that_of_the_notebook(
     results: Path, notebooks: Path, tmp_path: Path
 ) -> None:
@@ -505,7 +506,9 @@ def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
     assert "the cell after" in (tmp_path / "mission.html").read_text("utf-8")
 
 
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGKILL")
+HEEDED = ("SIGINT", "SIGTERM", "SIGHUP")
+SIGNALS = ["SIGTERM", "SIGKILL"]
+SIGNALS += [pytest.param(name, marks=pytest.mark.slow) for name in ("SIGINT", "SIGHUP")]
 
 
 @contextmanager
@@ -526,7 +529,7 @@ def rendering(results: Path, folder: Path) -> Iterator[subprocess.Popen]:
 
     def heed() -> None:
         """Heed signals that a background job of a shell ignores, and its children with it."""
-        for name in SIGNALS[:3]:
+        for name in HEEDED:
             signal.signal(getattr(signal, name), signal.SIG_DFL)
 
     command = [sys.executable, "-c", script]

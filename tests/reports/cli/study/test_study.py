@@ -104,6 +104,7 @@ def test_pages_that_cannot_be_written_are_refused_before_the_run(dess, tmp_path)
     assert files_of(tmp_path) == before
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
 def test_ctrl_c_leaves_a_folder_that_a_second_run_completes(dess, tmp_path):
     command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "out"]
