@@ -47,8 +47,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         overall: The mean difference over all missions, drawn as a dashed line.
     """
     rows = table[table["field"] == field].sort_values("position")
-    with style.look():
-        figure, ax = style.panels(3.5, values="y")
+    with style.panels(3.5, values="y") as (figure, ax):
         ax.axhline(0, color=style.INK, linewidth=1.2, zorder=1)
         ax.axhline(
             overall, color=style.MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall"
@@ -61,7 +60,7 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
                         gid=row.verdict)  # fmt: skip
         ax.set_title(parameter(field).label, parse_math=True)
         ax.set(ylabel="mean difference [points]")
-        ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=_ends(table))
+        ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=style.ends(table, zero=True))
         ax.set_xticks(rows["position"], rows["value"])
         style.points_axis(ax.yaxis, 6)
     return figure
@@ -80,8 +79,7 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     grid = np.full((len(names), len(names_2)), np.nan)
     grid[table["position"], table["position_2"]] = table["mean"]
     widest = max(float(np.nanmax(np.abs(grid))), 0.01)
-    with style.look():
-        figure, ax = style.panels(1.5 + 0.55 * len(names))
+    with style.panels(1.5 + 0.55 * len(names)) as (figure, ax):
         ax.grid(False)
         colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
         ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
@@ -121,8 +119,7 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
     room = 0.04 * (high - low)
     x = np.concatenate([[min(values[0], low) - 1], values, [max(values[-1], high) + 1]])
     y = np.concatenate([[0], shares, [1]])
-    with style.look():
-        figure, ax = style.panels(3.9)
+    with style.panels(3.9) as (figure, ax):
         ax.axvspan(x[0], 0, color=COLOURS[BEHIND], alpha=0.12, linewidth=0, zorder=0)
         ax.axvspan(0, x[-1], color=COLOURS[AHEAD], alpha=0.10, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
@@ -140,10 +137,3 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         style.points_axis(ax.xaxis, 7)
         ax.yaxis.set_major_formatter(PercentFormatter(1))
     return figure
-
-
-def _ends(table: pd.DataFrame) -> tuple[float, float]:
-    """The ends of an axis that contains all intervals and 0."""
-    low, high = min(table["low"].min(), 0.0), max(table["high"].max(), 0.0)
-    room = max(0.06 * (high - low), 0.002)
-    return low - room, high + room

@@ -26,8 +26,7 @@ def front(table: pd.DataFrame, metric: str, currency: str, required: float | Non
         required: The required mean of the metric, drawn as a line.
     """
     colours = style.policy_colours(table["policy"])
-    with style.look():
-        figure, ax = style.panels(4.1)
+    with style.panels(4.1) as (figure, ax):
         for policy, rows in table.groupby("policy", sort=False):
             _settings(rows, metric, *colours[str(policy)], ax)
         on_front = table[table["on_front"]].sort_values(COST)

@@ -40,8 +40,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
     """
     averages = smoothed(curves[curves["variant"].isin(labels)], metric)
     colours = dict(zip(labels, style.palette(), strict=False))
-    with style.look():
-        figure, ax = style.panels(3.9, values="y")
+    with style.panels(3.9, values="y") as (figure, ax):
         for number, (variant, label) in enumerate(labels.items()):
             of_variant = averages[averages["variant"] == variant]
             _trainings(of_variant, colours[variant], ax)
@@ -53,7 +52,7 @@ def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> F
             ax.set_ylim(max(low - room, -0.02), min(high + room, 1.02))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         _steps_axis(averages["updates"].max(), ax)
-        _legend_below(ax)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -86,8 +85,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     values = last.groupby("variant")[metric]
     level = table.loc[table["variant"] == baseline, "mean"].item()
     left, right = _ends(table, last[metric], OFF * level)
-    with style.look():
-        figure, ax = style.panels(0.9 + 0.42 * len(table), values="x")
+    with style.panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
         ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, row in table.reset_index(drop=True).iterrows():
             reached = values.get_group(row["variant"])
@@ -115,8 +113,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
         name: The name of the policy.
     """
     kept = curve[curve["is_best"]].iloc[-1]
-    with style.look():
-        figure, ax = style.panels(3.9, values="y")
+    with style.panels(3.9, values="y") as (figure, ax):
         looks = zip(style.palette()[2:], ("--", ":", "-"), strict=False)
         for metric, (colour, line) in zip(EVALUATED, looks, strict=False):
             for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
@@ -128,7 +125,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
         ax.set(title=name, ylim=(-0.02, 1.04))
         ax.yaxis.set_major_formatter(PercentFormatter(1))
         _steps_axis(curve["updates"].max(), ax)
-        _legend_below(ax)
+        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -198,8 +195,3 @@ def _steps_axis(last: int, ax: Axes) -> None:
     ax.set(xlim=(0, last * 1.02), xlabel="training step [1000 updates]")
     ax.xaxis.set_major_locator(MaxNLocator(nbins=7))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:g}"))
-
-
-def _legend_below(ax: Axes) -> None:
-    ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=2, columnspacing=1.2,
-              handletextpad=0.5)  # fmt: skip

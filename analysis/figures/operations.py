@@ -7,8 +7,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import style
-from analysis.figures.settings import curves, graded, of_metric
-from analysis.names import metric_label, parameter, value_text
+from analysis.figures.settings import graded, lines
+from analysis.names import parameter, value_text
 
 
 def against(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None = None) -> Figure:
@@ -22,24 +22,8 @@ def against(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | Non
         panel: A column with a panel for each value; by default there is one panel.
     """
     rows = rows[rows["metric"] == metric]
-    panels = [*rows.groupby(panel, sort=False)] if panel else [("", rows)]
-    values = sorted(rows[x].unique())
-    with style.look():
-        figure, axes = style.panels(2.9 * len(panels) + 0.9, len(panels), "y", sharex=True,
-                                    sharey=True, squeeze=False)  # fmt: skip
-        for ax, (value, part) in zip(axes.flat, panels, strict=True):
-            looks = graded(sorted(rows[line].unique()))
-            curves(part.assign(policy=part[line].map(value_text)), x, looks, values, ax)
-            about = parameter(str(panel))
-            name = "" if panel in (None, "policy") else f"{about.name} "
-            ax.set_title(f"{name}{value_text(value)}".strip(), fontsize=10, fontweight="normal")
-            of_metric(ax.yaxis, metric)
-        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
-        axes.flat[-1].set_xlabel(parameter(x).label)
-        handles = axes.flat[0].get_legend_handles_labels()
-        title = parameter(line).label
-        figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
-    return figure
+    looks = graded(sorted(rows[line].unique()))
+    return lines(rows, x, sorted(rows[x].unique()), metric, looks, line, panel)
 
 
 def queue(rows: pd.DataFrame) -> Figure:
@@ -50,9 +34,10 @@ def queue(rows: pd.DataFrame) -> Figure:
     """
     fleets = [*rows.groupby("uavs")]
     looks = graded(sorted(rows["pads"].unique()))
-    with style.look():
-        figure, axes = style.panels(1.9 * len(fleets) + 0.9, len(fleets), "y", sharex=True,
-                                    squeeze=False)  # fmt: skip
+    with style.panels(1.9 * len(fleets) + 0.9, len(fleets), "y", sharex=True, squeeze=False) as (
+        figure,
+        axes,
+    ):
         for ax, (uavs, part) in zip(axes.flat, fleets, strict=True):
             for pads, line in part.groupby("pads"):
                 colour = looks[value_text(pads)][0]

@@ -37,19 +37,20 @@ def gaps(table: pd.DataFrame) -> Figure:
     fleets = [*table[table["uavs"] != ALL].groupby("uavs", sort=False)]
     policies = [*dict.fromkeys(table["policy"])]
     colours = style.policy_colours(policies)
-    with style.look():
-        figure, axes = style.panels((0.75 + 0.22 * len(policies)) * len(fleets) + 0.6,
-                                    len(fleets), "x", sharex=True, squeeze=False)  # fmt: skip
+    with style.panels(
+        (0.75 + 0.22 * len(policies)) * len(fleets) + 0.6,
+        len(fleets),
+        "x",
+        sharex=True,
+        squeeze=False,
+    ) as (figure, axes):
         for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
             bound = rows.iloc[0]
             ax.axvspan(bound[f"{BOUND}_low"], bound[f"{BOUND}_high"], color=style.MUTED, alpha=0.3,
                        linewidth=0)  # fmt: skip
             ax.axvline(bound[BOUND], color=style.INK, linewidth=1.3, label="upper bound")
-            for y, (_, row) in enumerate(rows.iterrows()):
-                arms = style.arms(row, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
-                ax.errorbar(row[PRODUCT], y, xerr=arms, **style.dot(row["policy"], colours))
-            ax.set_yticks(range(len(rows)), rows["policy"])
-            ax.set(title=f"{fleet(uavs)}: bound {bound[BOUND]:.1%}", ylim=(len(rows) - 0.4, -0.6))
+            style.policy_rows(rows, colours, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
+            ax.set(title=f"{fleet(uavs)}: bound {bound[BOUND]:.1%}")
         ax.set(xlim=(-0.02, 1.02), xlabel=METRICS[PRODUCT])
         ax.xaxis.set_major_formatter(PercentFormatter(1))
         style.legend_below(figure, ax)
@@ -65,8 +66,7 @@ def differences(table: pd.DataFrame) -> Figure:
     colours = style.policy_colours(table["policy"])
     places = {uavs: place for place, uavs in enumerate(dict.fromkeys(table["uavs"]))}
     rows = table.assign(place=table["uavs"].map(places), mean=table["difference"])
-    with style.look():
-        figure, ax = style.panels(3.4, values="y")
+    with style.panels(3.4, values="y") as (figure, ax):
         ax.axhline(0, color=style.INK, linewidth=1.2, zorder=1)
         style.policy_means(rows, "place", colours, 0.1, ax, linestyle="")
         names = [uavs if uavs == ALL else fleet(uavs) for uavs in places]
@@ -87,8 +87,7 @@ def front(table: pd.DataFrame, bound: float) -> Figure:
     """
     colours = style.policy_colours(table["policy"])
     best = table[table["on_front"]].sort_values("seconds")
-    with style.look():
-        figure, ax = style.panels(4.2)
+    with style.panels(4.2) as (figure, ax):
         ax.axhline(bound, color=style.INK, linewidth=1.3, linestyle="--", label="upper bound")
         ax.step(best["seconds"], best["mean"], where="post", color=style.MUTED, linewidth=1.2,
                 label="Pareto front", zorder=1)  # fmt: skip
@@ -135,8 +134,7 @@ def at_home(table: pd.DataFrame) -> Figure:
         table: Rows of ``optimality.planner.at_home``.
     """
     colours = style.policy_colours(table["policy"])
-    with style.look():
-        figure, ax = style.panels(3.4, values="y")
+    with style.panels(3.4, values="y") as (figure, ax):
         for policy, rows in table.groupby("policy", sort=False):
             ax.plot(rows["slot"], rows["share"], color=colours[str(policy)][0], label=policy)
         ax.set(title="UAVs in the charging zone", xlabel="mission slot", ylabel="share of the UAVs",
@@ -153,8 +151,7 @@ def plan(mission: LoggedMission, courses: Sequence[Course]) -> Figure:
         mission: The mission.
         courses: What the plan has each UAV do.
     """
-    with style.look():
-        figure, ax = style.panels(6.0)
+    with style.panels(6.0) as (figure, ax):
         trajectories(mission.log, mission.scenario, ax)
         for uav, course in enumerate(courses):
             colour = style.uav_colours(len(courses))[uav]
@@ -188,8 +185,7 @@ def _map(
     low: float = 0.0,
 ) -> Figure:
     """The nodes of a scenario in the colours of their values, from ``low`` to 1, with texts."""
-    with style.look():
-        figure, ax = style.panels(5.4)
+    with style.panels(5.4) as (figure, ax):
         chart(space, ax)
         x, y = np.array(space.nodes).T
         ax.scatter(x, y, c=values, s=420, cmap=colours, vmin=low, vmax=1.0, zorder=3,

@@ -37,11 +37,10 @@ def effect(
     values = rows.drop_duplicates("position").sort_values("position")["value"].tolist()
     colours = style.policy_colours(policies)
     looks, half_width = {policy: colours[policy] for policy in changes}, APART * len(values)
-    with style.look():
-        figure, axes = style.panels(7.6, 4, "y", sharex=True, height_ratios=(1, 1.6, 1.6, 1.2))
+    with style.panels(7.6, 4, "y", sharex=True, height_ratios=(1, 1.6, 1.6, 1.2)) as (figure, axes):
         for ax, metric in zip(axes, METRICS, strict=False):
             style.policy_means(rows[rows["metric"] == metric], "position", looks, half_width, ax)
-            ax.set(title=METRICS[metric], ylim=_ends(table[table["metric"] == metric]))
+            ax.set(title=METRICS[metric], ylim=style.ends(table[table["metric"] == metric], 0.1))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         for policy, shift in zip(changes, style.shifts(len(changes), half_width), strict=True):
             _changes(changes[policy], shift, style.dot(policy, colours), axes[3])
@@ -68,8 +67,7 @@ def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     """
     rows = rows.reset_index(drop=True)
     colour = style.palette()[0]
-    with style.look():
-        figure, ax = style.panels(1.5 + 0.52 * len(rows), values="x")
+    with style.panels(1.5 + 0.52 * len(rows), values="x") as (figure, ax):
         for index, shift, face in (("first", -0.18, "white"), ("total", 0.18, colour)):
             name = {"first": "alone (first order)", "total": "with all interactions (total)"}[index]
             spots = np.arange(len(rows)) + shift
@@ -95,13 +93,6 @@ def _changes(pairs: pd.DataFrame, shift: float, look: dict, ax: Axes) -> None:
     spots = np.array([0, *rows["second"]]) + shift
     ax.errorbar(spots, [0, *rows["difference"]], yerr=bars, **look, linewidth=1)
     ax.axhline(0, color=style.MUTED, linewidth=0.9, zorder=1)
-
-
-def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """The ends of an axis for all intervals of a metric, at least ten points long."""
-    low, high = rows["low"].min(), rows["high"].max()
-    room = max(0.06 * (high - low), 0.005)
-    return min(low - room, high - 0.1), high + room
 
 
 def _tick(name: str) -> str:

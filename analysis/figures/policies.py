@@ -26,16 +26,14 @@ def performance(summary: pd.DataFrame, metric: str, printed: float | None = None
     """
     rows = summary[summary["metric"] == metric].reset_index(drop=True)
     colours = style.policy_colours(rows["policy"])
-    with style.look():
-        figure, ax = style.panels(1.3 + 0.42 * len(rows), values="x")
-        for y, row in rows.iterrows():
-            ax.errorbar(row["mean"], y, xerr=style.arms(row), **style.dot(row["policy"], colours))
-            style.note_at_right(f"{row['mean']:.1%}", y, ax)
+    with style.panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
+        style.policy_rows(rows, colours, ax)
+        for y, mean in enumerate(rows["mean"]):
+            style.note_at_right(f"{mean:.1%}", y, ax)
         if printed is not None:
             ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
             style.legend_below(figure, ax)
-        ax.set_yticks(range(len(rows)), rows["policy"])
-        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02), ylim=(len(rows) - 0.4, -0.6))
+        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02))
         ax.set_xticks(np.linspace(0, 1, 6))
         ax.xaxis.set_major_formatter(PercentFormatter(1))
     return figure
@@ -53,8 +51,7 @@ def by_fleet(
     """
     rows = summary[summary["metric"] == metric]
     colours = style.policy_colours(summary["policy"])
-    with style.look():
-        figure, ax = style.panels(3.9, values="y")
+    with style.panels(3.9, values="y") as (figure, ax):
         style.policy_means(rows, "uavs", colours, 0.12, ax, alpha=0.9)
         if printed:
             ax.plot(*zip(*sorted(printed.items()), strict=True), marker="D", markersize=6,
@@ -63,6 +60,5 @@ def by_fleet(
         ax.set_xticks(sorted(rows["uavs"].unique()))
         ax.set_yticks(np.linspace(0, 1, 6))
         ax.yaxis.set_major_formatter(PercentFormatter(1))
-        ax.legend(loc="upper center", bbox_to_anchor=(0.46, -0.16), ncols=5, columnspacing=1.1,
-                  handletextpad=0.5)  # fmt: skip
+        style.legend_below(figure, ax, 5)
     return figure

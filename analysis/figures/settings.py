@@ -3,7 +3,7 @@
 Each returns a figure of its own; nothing touches pyplot's state. Shares are in percent.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import ceil
 from textwrap import fill
 from typing import Any
@@ -56,25 +56,49 @@ def plot(
         InputError: If there is no such field, metric or policy.
     """
     rows = settings.averaged(results, [x, hue] if hue else [x], metric, policy)
+    values = settings.varied(results)
+    if hue:
+        return lines(rows, x, values[x], metric, graded(values[hue]), hue, "policy")
     colours = style.policy_colours(results.policies)
-    names = rows["policy"].unique()
-    parts = {name: rows[rows["policy"] == name] for name in names} if hue else {"": rows}
-    with style.look():
-        figure, axes = style.panels(3.1 * len(parts) + 0.8, len(parts), "y", sharex=True,
-                                    sharey=True, squeeze=False)  # fmt: skip
-        for ax, (name, part) in zip(axes.flat, parts.items(), strict=True):
-            looks = {policy: colours[policy] for policy in names}
-            if hue:
-                part = part.assign(policy=part[hue].map(value_text))
-                looks = graded(settings.varied(results)[hue])
-            curves(part, x, looks, settings.varied(results)[x], ax)
-            ax.set(title=f"{metric_label(metric)}{': ' * bool(name)}{name}")
+    looks = {name: colours[name] for name in rows["policy"].unique()}
+    return lines(rows, x, values[x], metric, looks, "policy")
+
+
+def lines(
+    rows: pd.DataFrame,
+    x: str,
+    values: Sequence[Any],
+    metric: str,
+    looks: dict[str, tuple[str, str]],
+    line: str,
+    panel: str | None = None,
+) -> Figure:
+    """A metric against a field: a curve for each value of a column, with 95 % intervals.
+
+    Args:
+        rows: The means of the metric, with ``mean``, ``low`` and ``high``.
+        x: The field on the horizontal axis.
+        values: Its values.
+        metric: The metric.
+        looks: The looks of the curves, by name.
+        line: The column with a curve for each value: a field, or ``policy``.
+        panel: A column with a panel for each value; by default there is one panel.
+    """
+    panels = [*rows.groupby(panel, sort=False)] if panel else [("", rows)]
+    height, count = 2.9 * len(panels) + 0.9, len(panels)
+    with style.panels(height, count, "y", sharex=True, sharey=True, squeeze=False) as (
+        figure,
+        axes,
+    ):
+        for ax, (value, part) in zip(axes.flat, panels, strict=True):
+            curves(part.assign(policy=part[line].map(value_text)), x, looks, values, ax)
+            name = "" if panel in (None, "policy") else parameter(str(panel)).name
+            ax.set_title(f"{name} {value_text(value)}".strip(), fontsize=10, fontweight="normal")
             of_metric(ax.yaxis, metric)
+        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
-        title = parameter(hue).label if hue else None
-        handles = axes.flat[0].get_legend_handles_labels()
-        legend = figure.legend(*handles, loc="outside lower center", ncols=4, title=title)
-        legend.get_title().set_parse_math(True)
+        title = None if line == "policy" else parameter(line).label
+        style.legend_below(figure, axes.flat[0], 4, title)
     return figure
 
 
@@ -112,9 +136,9 @@ def heat_map(
     columns = min(COLUMNS, len(facets))
     lines = ceil(len(facets) / columns)
     height = min(1.6 + 0.5 * len(values[y]), 5.5) if not facet else 0.9 + 1.75 * lines
-    with style.look():
-        figure, axes = style.panels(height, lines, "xy", ncols=columns, sharex=True, sharey=True,
-                                    squeeze=False)  # fmt: skip
+    with style.panels(
+        height, lines, "xy", ncols=columns, sharex=True, sharey=True, squeeze=False
+    ) as (figure, axes):
         for ax, value in zip(axes.flat, facets, strict=False):
             part = rows if value is None else rows[rows[facet] == value]
             ends = rows["mean"].min(), rows["mean"].max()
@@ -147,19 +171,15 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
     fields = settings.by_influence(effects)
     colours = style.policy_colours(results.policies)
     looks = {name: colours[name] for name in effects["policy"].unique()}
-    with style.look():
-        figure, axes = _panels(len(fields))
-        for ax, field in zip(axes.flat, fields, strict=False):
-            part = effects[effects["field"] == field]
-            ticks = part.drop_duplicates("position").sort_values("position")["value"].tolist()
-            style.policy_means(part, "position", looks, 0.02 * len(ticks), ax)
-            _name_ticks(ax.xaxis, ticks, 6)
-            ax.set(xlim=(-0.5, len(ticks) - 0.5))
-            ax.set_xlabel(_label(field), parse_math=True)
-            of_metric(ax.yaxis, metric)
-        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
-        style.legend_below(figure, axes.flat[0], 4)
-    return figure
+
+    def draw(field: str, ax: Axes) -> None:
+        part = effects[effects["field"] == field]
+        ticks = part.drop_duplicates("position").sort_values("position")["value"].tolist()
+        style.policy_means(part, "position", looks, 0.02 * len(ticks), ax)
+        _name_ticks(ax.xaxis, ticks, 6)
+        ax.set_xlim(-0.5, len(ticks) - 0.5)
+
+    return _panel_per_field(fields, metric, draw)
 
 
 def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
@@ -173,24 +193,20 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
     table = settings.ranked(results, metric, policy)
     values = settings.varied(results)
     colours = style.policy_colours(results.policies)
-    with style.look():
-        figure, axes = _panels(len(values))
-        for ax, field in zip(axes.flat, values, strict=False):
-            places, names = _axis(values[field])
-            for name, part in table.groupby("policy", sort=False):
-                spots = part[field].map(dict(zip(values[field], places, strict=True)))
-                ax.scatter(spots, part[metric], s=18, alpha=0.7, color=colours[str(name)][0],
-                           marker=colours[str(name)][1], linewidths=0, label=name,
-                           rasterized=len(table) > 2000)  # fmt: skip
-            if names:
-                _name_ticks(ax.xaxis, names, 6)
-            elif len(places) <= 6:
-                ax.set_xticks(places)
-            ax.set_xlabel(_label(field), parse_math=True)
-            of_metric(ax.yaxis, metric)
-        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
-        style.legend_below(figure, axes.flat[0], 4)
-    return figure
+
+    def draw(field: str, ax: Axes) -> None:
+        places, names = _axis(values[field])
+        for name, part in table.groupby("policy", sort=False):
+            spots = part[field].map(dict(zip(values[field], places, strict=True)))
+            ax.scatter(spots, part[metric], s=18, alpha=0.7, color=colours[str(name)][0],
+                       marker=colours[str(name)][1], linewidths=0, label=name,
+                       rasterized=len(table) > 2000)  # fmt: skip
+        if names:
+            _name_ticks(ax.xaxis, names, 6)
+        elif len(places) <= 6:
+            ax.set_xticks(places)
+
+    return _panel_per_field([*values], metric, draw)
 
 
 def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
@@ -200,14 +216,10 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
         missions: A row per mission, with ``policy`` and the metric.
         metric: The metric.
     """
-    colours = style.policy_colours(missions["policy"])
-    with style.look():
-        figure, ax = style.panels(3.9)
-        for number, (name, part) in enumerate(missions.groupby("policy", sort=False)):
-            ax.ecdf(part[metric], label=str(name), color=colours[str(name)][0], linewidth=1.7,
-                    linestyle=style.LINES[number % 4])  # fmt: skip
-        ax.set(xlabel=metric_label(metric), ylabel="share of the missions", ylim=(-0.02, 1.02))
-        ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+    values = {str(name): part[metric] for name, part in missions.groupby("policy", sort=False)}
+    with style.panels(3.9) as (figure, ax):
+        style.distributions(values, ax)
+        ax.set(xlabel=metric_label(metric), ylabel="share of the missions")
         of_metric(ax.xaxis, metric)
         style.legend_below(figure, ax, 4)
     return figure
@@ -267,20 +279,23 @@ def _cells(
     return mesh
 
 
-def _panels(count: int) -> tuple[Figure, np.ndarray]:
+def _panel_per_field(
+    fields: Sequence[str], metric: str, draw: Callable[[str, Axes], None]
+) -> Figure:
     """A panel per field, two in a row, with the same axis of values."""
-    columns = min(2, count)
-    lines = ceil(count / columns)
-    figure, axes = style.panels(0.9 + 2.3 * lines, lines, "y", ncols=columns, sharey=True,
-                                squeeze=False)  # fmt: skip
-    for ax in axes.flat[count:]:
-        ax.set_visible(False)
-    return figure, axes
-
-
-def _label(field: str) -> str:
-    """The name of a field below a narrow panel."""
-    return fill(parameter(field).label, 28)
+    columns = min(2, len(fields))
+    rows = ceil(len(fields) / columns)
+    layout = {"ncols": columns, "sharey": True, "squeeze": False}
+    with style.panels(0.9 + 2.3 * rows, rows, "y", **layout) as (figure, axes):
+        for ax, field in zip(axes.flat, fields, strict=False):
+            draw(field, ax)
+            ax.set_xlabel(fill(parameter(field).label, 28), parse_math=True)
+            of_metric(ax.yaxis, metric)
+        for ax in axes.flat[len(fields) :]:
+            ax.set_visible(False)
+        figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
+        style.legend_below(figure, axes.flat[0], 4)
+    return figure
 
 
 def _axis(values: Sequence[Any]) -> tuple[list[float], list[str]]:

@@ -2,8 +2,7 @@
 
 A figure is made inside ``look`` and touches no state of pyplot::
 
-    with style.look():
-        figure, ax = style.panels(height=3.5, values="x")
+    with style.panels(height=3.5, values="x") as (figure, ax):
         ax.errorbar(row["mean"], 0, xerr=style.arms(row), **style.dot("greedy", colours))
         style.legend_below(figure, ax)
 """
@@ -20,7 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from analysis.numbers import minus
 
@@ -62,10 +61,11 @@ def look() -> Iterator[None]:
         yield
 
 
+@contextmanager
 def panels(
     height: float, rows: int = 1, values: Literal["x", "y", "xy"] = "xy", **options: Any
-) -> tuple[Figure, Any]:
-    """A new figure with its axes, one below the other.
+) -> Iterator[tuple[Figure, Any]]:
+    """A new figure with its axes, one below the other, and inside the look of all figures.
 
     Args:
         height: The height of the figure [inches].
@@ -73,11 +73,12 @@ def panels(
         values: The axes that have grid lines.
         options: Further arguments of ``Figure.subplots``.
     """
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    axes = figure.subplots(rows, **options)
-    for ax in np.ravel(axes):
-        grid_of(values, ax)
-    return figure, axes
+    with look():
+        figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+        axes = figure.subplots(rows, **options)
+        for ax in np.ravel(axes):
+            grid_of(values, ax)
+        yield figure, axes
 
 
 def grid_of(values: Literal["x", "y", "xy"], ax: Axes) -> None:
@@ -153,6 +154,43 @@ def policy_means(
                     **dot(policy, looks), **options)  # fmt: skip
 
 
+def policy_rows(
+    rows: pd.DataFrame, looks: Mapping[str, tuple[str, str]], ax: Axes, *columns: str
+) -> None:
+    """A row per policy, the first on top: its mean as a dot with its interval.
+
+    Args:
+        rows: The rows, with ``policy``.
+        looks: The looks of the policies.
+        ax: The axes to draw on.
+        columns: The mean and the ends of its interval; by default ``mean``, ``low`` and ``high``.
+    """
+    for y, (_, row) in enumerate(rows.iterrows()):
+        mean = row[columns[0] if columns else "mean"]
+        ax.errorbar(mean, y, xerr=arms(row, *columns), **dot(row["policy"], looks))
+    ax.set_yticks(range(len(rows)), rows["policy"])
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+
+
+def distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:
+    """The share of the missions with at most a value: a curve per policy."""
+    colours = policy_colours(values)
+    for number, (policy, of_policy) in enumerate(values.items()):
+        ax.ecdf(of_policy, label=policy, color=colours[policy][0], linewidth=1.7,
+                linestyle=LINES[number % 4])  # fmt: skip
+    ax.set_ylim(-0.02, 1.02)
+    ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+
+
+def ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
+    """The ends of an axis for all intervals, at least ``length`` long, and with 0 if asked."""
+    low, high = rows["low"].min(), rows["high"].max()
+    if zero:
+        low, high = min(low, 0.0), max(high, 0.0)
+    room = max(0.06 * (high - low), 0.005)
+    return min(low - room, high - length), high + room
+
+
 def shifts(count: int, half_width: float) -> np.ndarray:
     """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
     return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
@@ -180,6 +218,8 @@ def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
                        textcoords="offset points", va="center", fontsize=size)  # fmt: skip
 
 
-def legend_below(figure: Figure, ax: Axes, columns: int = 3) -> None:
+def legend_below(figure: Figure, ax: Axes, columns: int = 3, title: str | None = None) -> None:
     """A legend of what is drawn on the axes, below the figure."""
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=columns)
+    entries = ax.get_legend_handles_labels()
+    legend = figure.legend(*entries, loc="outside lower center", ncols=columns, title=title)
+    legend.get_title().set_parse_math(True)

@@ -3,6 +3,7 @@
 Each returns a figure of its own; nothing touches pyplot's state.
 """
 
+from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,7 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
     table, spots = observed.table, np.arange(len(observed.table))
     n = table["expected"].sum()
     error = np.sqrt(table["expected"] * (1 - table["expected"] / n).clip(lower=1e-12))
-    with style.look():
-        figure, (ax, below) = _panels()
+    with _with_deviations() as (figure, (ax, below)):
         ax.bar(spots, table["expected"], 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
         ax.set_title(title, parse_math=True)
@@ -66,8 +66,7 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
     known = [closed_forms.rate_moments(space, d).mean for d in away]
-    with style.look():
-        figure, (ax, below) = _panels()
+    with _with_deviations() as (figure, (ax, below)):
         ax.plot(away, known, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
         ax.scatter(table["distance"], table["mean"], s=30, color=SEEN, zorder=3, label="simulated")
         ax.set(title="Mean rate of a lone UAV", ylabel="data units per\ncommunication slot")
@@ -90,8 +89,7 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
         space: The scenario, with a range of initial data.
     """
     law = closed_forms.initial_total(space)
-    with style.look():
-        figure, ax = style.panels(3.4)
+    with style.panels(3.4) as (figure, ax):
         bins = int(np.clip(np.sqrt(len(values)), 8, 50))
         ax.hist(values, bins, density=True, color=KNOWN, label="observed")
         reach = law.mean() + 3 * law.std() * np.array([-1, 1])
@@ -112,8 +110,7 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
         title: The title of the figure.
     """
     shown = blocks.head(SHOWN)
-    with style.look():
-        figure, ax = style.panels(3.6, values="y")
+    with style.panels(3.6, values="y") as (figure, ax):
         looks = (
             (True, SEEN, "o", "contains the mean of all"),
             (False, MISS, "X", "does not contain it"),
@@ -144,8 +141,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     """
     height, gap = 1.0, 0.35
     tops = [-(height + gap) * number for number in range(len(steps) + 1)]
-    with style.look():
-        figure, ax = style.panels(0.8 * len(tops))
+    with style.panels(0.8 * len(tops)) as (figure, ax):
         for number, (name, text) in enumerate(steps):
             _box(ax, tops[number], height, name, text, style.ZONE if number == 0 else style.SEA)
         _box(ax, tops[-1], height, end, "", style.ZONE)
@@ -162,7 +158,7 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
     return figure
 
 
-def _panels() -> tuple[Figure, tuple[Axes, Axes]]:
+def _with_deviations() -> AbstractContextManager[tuple[Figure, Any]]:
     """A panel and a lower one for the deviations, over the same axis."""
     return style.panels(4.6, 2, "y", sharex=True, height_ratios=(2, 1))
 

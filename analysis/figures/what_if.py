@@ -26,15 +26,14 @@ def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -
     """
     rows = table[table["metric"] == metric].dropna(subset="mean")
     colours = style.policy_colours(rows["policy"])
-    with style.look():
-        figure, ax = style.panels(4.1, values="y")
+    with style.panels(4.1, values="y") as (figure, ax):
         style.policy_means(rows, "point", colours, 0.025 * (len(colours) - 1), ax)
         ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
         ticks = ["\n".join((s, *words)) for s, words in zip(SIDES, settings, strict=True)]
         ax.set_xticks((0, 1), ticks)
         of_metric(ax.yaxis, metric)
         if metric in METRICS:
-            ax.set_ylim(_ends(rows))
+            ax.set_ylim(style.ends(rows, 0.05))
             ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
         style.legend_below(figure, ax)
     return figure
@@ -48,8 +47,10 @@ def gains(answers: pd.DataFrame) -> Figure:
     """
     rows = answers[answers["metric"].isin([*METRICS])].rename(columns={"difference": "mean"})
     colours = style.policy_colours(rows["policy"])
-    with style.look():
-        figure, ax = style.panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(colours)), values="x")
+    with style.panels(1.6 + len(METRICS) * (0.35 + 0.22 * len(colours)), values="x") as (
+        figure,
+        ax,
+    ):
         offsets = style.shifts(len(colours), 0.055 * (len(colours) - 1))
         for policy, shift in zip(colours, offsets, strict=True):
             changes = rows[rows["policy"] == policy].set_index("metric").loc[[*METRICS]]
@@ -70,36 +71,21 @@ def spread(differences: Mapping[str, pd.Series]) -> Figure:
     Args:
         differences: For each policy the result of ``questions.what_if.answer.differences``.
     """
-    colours = style.policy_colours(differences)
     tails = (1 - MIDDLE) / 2
     ends = np.array([gaps.quantile([tails, 1 - tails]) for gaps in differences.values()])
     low, high = min(ends[:, 0].min(), 0.0), max(ends[:, 1].max(), 0.0)
     room = max(0.04 * (high - low), 0.002)
-    with style.look():
-        figure, axes = style.panels(5.6, 2, sharey=True)
+    with style.panels(5.6, 2, sharey=True) as (figure, axes):
         titles = ("Share of missions with that difference or less", "The central part of it")
         for ax, title in zip(axes, titles, strict=True):
-            for number, (policy, gaps) in enumerate(differences.items()):
-                values = np.sort(gaps.to_numpy(float))
-                shares = np.arange(1, len(values) + 1) / len(values)
-                ax.step([values[0], *values], [0, *shares], where="post", label=policy,
-                        color=colours[policy][0], linestyle=style.LINES[number % 4],
-                        linewidth=1.7)  # fmt: skip
+            style.distributions(differences, ax)
             ax.axvline(0, color=style.INK, linewidth=0.9, zorder=1)
             ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
-            ax.set(title=title, ylim=(-0.02, 1.02))
-            ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+            ax.set_title(title)
             style.points_axis(ax.xaxis, 7)
         axes[1].set(xlim=(low - room, high + room), xlabel="percentage points")
         style.legend_below(figure, axes[0])
     return figure
-
-
-def _ends(rows: pd.DataFrame) -> tuple[float, float]:
-    """The ends of an axis for all intervals, at least five points long."""
-    low, high = rows["low"].min(), rows["high"].max()
-    room = max(0.08 * (high - low), (0.05 - (high - low)) / 2, 0.005)
-    return low - room, high + room
 
 
 def _broken(name: str) -> str:

@@ -1,6 +1,5 @@
 """What figures of a comparison show is in their tables."""
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -118,11 +117,3 @@ def test_no_difference_at_all_can_be_drawn(missions):
     (ax,) = drawings.distribution(missions.assign(difference=0.0), PAIR).axes
     low, high = ax.get_xlim()
     assert low < 0 < high
-
-
-def test_figures_leave_no_state_behind(missions, table):
-    before = dict(mpl.rcParams)
-    drawings.lead(table, "uavs", 0.0)
-    drawings.heat(regions.across(missions, "uavs", "flying_time"), "uavs", "flying_time")
-    drawings.distribution(missions, PAIR)
-    assert dict(mpl.rcParams) == before

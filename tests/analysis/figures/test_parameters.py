@@ -1,6 +1,5 @@
 """What figures of parameters show is in their tables."""
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
@@ -106,10 +105,3 @@ def test_sensitivities_are_bars_with_intervals(indices):
     names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
     assert names == ["UAVs", "$C_S$", "noise of the replication"]
     assert ax.get_ylim() == (2.5, -0.5)  # the first on top
-
-
-def test_figures_leave_no_state_behind(table, indices):
-    before = dict(mpl.rcParams)
-    parameters.effect(table, "initial_data", CHANGES, POLICIES)
-    parameters.sensitivity(indices, "mine")
-    assert dict(mpl.rcParams) == before

@@ -45,7 +45,7 @@ def test_curves_are_the_means_with_intervals_at_their_places(results):
 def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
     drawing = figures.plot(results, "initial_data", hue="uavs")
     table = settings.averaged(results, ["initial_data", "uavs"])
-    assert [ax.get_title(loc="left").split(": ")[1] for ax in drawing.axes] == results.policies
+    assert [ax.get_title(loc="left") for ax in drawing.axes] == results.policies
     for ax, policy in zip(drawing.axes, results.policies, strict=True):
         for uavs, (_, y, _) in zip((1, 2), curves(ax), strict=True):
             own = table[(table["policy"] == policy) & (table["uavs"] == uavs)]
@@ -58,9 +58,9 @@ def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
     rates = [0, 0.001, 0.002, 0.005, 0.01]
     for values, angle in ((rates, 30), ([1, 2, 3, 10], 0)):
         rows = pd.DataFrame({"rate": values, "policy": "greedy", "mean": 0.5, "low": 0.4})
-        figure, ax = style.panels(3)
         looks = figures.graded(["greedy"])
-        figures.curves(rows.assign(high=0.6), "rate", looks, values, ax)
+        with style.panels(3) as (figure, ax):
+            figures.curves(rows.assign(high=0.6), "rate", looks, values, ax)
         assert [t.get_rotation() for t in ax.get_xticklabels()] == [angle] * len(values)
         figure.draw_without_rendering()
         boxes = [t.get_tightbbox() for t in ax.get_xticklabels()]

@@ -1,7 +1,13 @@
 """Colours tell nodes and policies apart, and tick labels are signed."""
 
+import re
+from pathlib import Path
+
+import matplotlib as mpl
+import pandas as pd
 import pytest
 
+from analysis.figures import style
 from analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
 from policies.registry import SHIPPED
 
@@ -32,3 +38,22 @@ def test_shipped_policies_have_a_look_of_their_own() -> None:
 def test_differences_on_an_axis_are_signed_points() -> None:
     shares = (0.025, -0.1, 0.0, 0.0005)
     assert [signed_points(share) for share in shares] == ["+2.5", "−10", "0", "+0.05"]
+
+
+def test_a_figure_has_the_look_and_leaves_no_state_behind() -> None:
+    before = dict(mpl.rcParams)
+    with pytest.raises(KeyError), style.panels(3) as (figure, _):
+        assert figure.axes and not mpl.rcParams["text.parse_math"]
+        raise KeyError
+    assert dict(mpl.rcParams) == before
+    for module in Path(style.__file__).parent.glob("*.py"):
+        assert not re.search(r"import pyplot|matplotlib\.pyplot", module.read_text("utf-8"))
+
+
+def test_an_axis_holds_all_intervals_and_has_a_least_length() -> None:
+    rows = pd.DataFrame({"low": [0.5, 0.6], "high": [0.52, 0.9]})
+    for length, zero in ((0.0, False), (0.0, True), (0.1, False), (0.8, False)):
+        low, high = style.ends(rows, length, zero)
+        assert low < 0.5 and high > 0.9
+        assert high - low >= length
+        assert (low < 0) == zero

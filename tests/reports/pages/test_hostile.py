@@ -120,8 +120,7 @@ def test_a_block_of_commands_cannot_be_left() -> None:
 
 @pytest.mark.parametrize("name", ["$\\foo$", "$", "a$b$c", "\\$x"])
 def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
-    with style.look():
-        drawing, axes = style.panels(3)
+    with style.panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
         style.legend_below(drawing, axes)
