@@ -33,10 +33,10 @@ VARIANTS = {
         ("dess/channel.py", "if order[row, mission.nodes] == 0:", "if True:"),
     ),
     "no inlining: the rules are called": (
-        ("dess/code/kernels.py", "function, forceinline=True, _nrt=False", "function"),
+        ("dess/code/kernels.py", '{"forceinline": True, "_nrt": False}', "{}"),
     ),
     "references counted in inlined rules, too": (
-        ("dess/code/kernels.py", "forceinline=True, _nrt=False", "forceinline=True"),
+        ("dess/code/kernels.py", '"forceinline": True, "_nrt": False', '"forceinline": True'),
     ),
     "the code of sections compiled in": (
         (

@@ -22,9 +22,8 @@ from dess import rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.record import Records, empty_records, write_operations, write_record
+from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
-from dess.sections.section import is_extended
 from dess.state import (
     check_seed,
     constants_of,
@@ -255,8 +254,6 @@ def _advance(job_of, queue, source, state, world, scratch, records):
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]
-            write_record(mission, team, data, records.missions[job], records.uavs[job])
-            if is_extended(mission):
-                write_operations(mission, team, sensors[b], teeth[b], records.operations[job])
+            write_record(mission, team, data, sensors[b], teeth[b], records, job)
             queue[1] += 1
             _next_mission(b, job_of, queue, source, state)

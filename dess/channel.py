@@ -117,25 +117,42 @@ def _world_of(scenario: ScenarioSpace, thread: int) -> World:
 
 @kernel
 def _fill_row(u, row, nodes, mean_snr, order, means):
-    """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR."""
+    """Fill the row of a step: the nodes by descending mean SNR (ties: lower index), and the SNR.
+
+    The functions of numpy that sort and copy arrays would take seconds to compile.
+    """
     count, m = means.shape[1:]
     places = (mean_snr.shape[1] - 1) // (mean_snr.shape[0] - 1)  # per cell
     part = places // (m * u.slots_per_cell)  # places that the UAV flies per communication slot
     step, along_x = STEP_X[u.executed] + STEP_Y[u.executed], STEP_Y[u.executed] == 0
-    value = np.empty((count, m))
-    high = np.full(count, -math.inf)
+    value, high = np.empty((count, m)), np.empty(count)
     for k in range(count):
+        high[k] = -math.inf
+        order[row, k] = k
         dx, dy = u.x - nodes[k, 0], u.y - nodes[k, 1]
         fine, coarse = (places * dx, dy) if along_x else (places * dy, dx)
         for n in range(m):  # the UAV has still this part of the step before it
             ahead = (u.slots_left * m + m - 1 - n) * part
             value[k, n] = mean_snr[abs(coarse), abs(fine - ahead * step)]
             high[k] = max(high[k], value[k, n])
-    ranking = np.argsort(-high, kind="mergesort")
+    gap = count // 2
+    while gap > 0:  # Shell's sort
+        for end in range(gap, count):
+            k, rank = order[row, end], end
+            while rank >= gap and _is_before(high, k, order[row, rank - gap]):
+                order[row, rank] = order[row, rank - gap]
+                rank -= gap
+            order[row, rank] = k
+        gap //= 2
     for rank in range(count):
-        order[row, rank] = ranking[rank]
-        means[row, rank] = value[ranking[rank]]
+        for n in range(m):
+            means[row, rank, n] = value[order[row, rank], n]
     order[row, count] = 1
+
+
+@inlined
+def _is_before(high, k, other):
+    return high[k] > high[other] or (high[k] == high[other] and k < other)
 
 
 @inlined
@@ -144,7 +161,7 @@ def open_slot(mission, uavs, nodes, mean_snr, order, means, search):
     for i in range(mission.uavs):
         u = uavs[i]
         if u.active:
-            leg = fleet.leg(mission, u)
+            leg = fleet.leg(u)
             row = ((leg * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
             search[i, ROW] = row
             if order[row, mission.nodes] == 0:

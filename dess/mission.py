@@ -38,12 +38,10 @@ from dess.record import (
     EventLog,
     MissionRecord,
     empty_records,
-    write_operations,
-    write_record,
+    write_records,
 )
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
-from dess.sections.charging import request_pad
 from dess.sections.failure_log import log_failures
 from dess.sections.failures import strike
 from dess.sections.packets import Packets, deliver
@@ -64,6 +62,7 @@ from dess.state import (
 )
 from dess.view import decide, team_of
 
+_NOBODY = np.zeros(0, np.int64)
 Process = Generator[simpy.Event, Any, None]
 _Uav: Any = namedtuple("_Uav", UAV.names or ())  # type: ignore[misc]
 
@@ -140,13 +139,10 @@ class MissionModel:
         self.env.run(self.env.process(self._clock()))
         self._log_state("mission_end")
         records = empty_records(1, len(self.fleet), self.is_extended)
-        write_record(self.mission, self.uavs, self.residual, records.missions[0], records.uavs[0])
-        operations = None
-        if self.is_extended:
-            operations = records.operations[0]
-            write_operations(self.mission, self.uavs, self.sensors, self.teeth, operations)
-            if self.packets is not None:
-                self.packets.write(operations)
+        write_records(np.zeros(1, np.int64), self.state, records)
+        if self.packets is not None:
+            self.packets.write(records.operations[0])
+        operations = records.operations[0] if self.is_extended else None
         return MissionRecord(records.missions[0], records.uavs[0], self.log, operations)
 
     def _clock(self) -> Process:
@@ -159,12 +155,12 @@ class MissionModel:
         slot, active, allowed = 0, len(self.fleet), 0
         while active:
             decide(self.team, self.state, self.world)
-            may_charge = _resolve(missions, uavs)
+            may_charge, granted = _resolve(missions, uavs), _NOBODY
             if may_charge != allowed or pads_fail:
                 allowed = may_charge
                 self._request_pads(slot, may_charge)
-                self._start_charging(slot)
-            _spend(missions, uavs)
+                granted = self._grant_pads(slot)
+            _spend(missions, uavs, granted)
             self._log_moves(slot)
             for n in range(1, m + 1):
                 yield env.timeout(slot + n / m - env.now)
@@ -197,7 +193,8 @@ class MissionModel:
             if may_charge >> i & 1:
                 if not has_asked:
                     self.zone.ask(i)
-                    request_pad(self.mission, u)
+                    u["pad_request"] = slot
+                    self.mission["pad_requests"] += 1
                     self._log_charging("charge_request", slot, i)
             elif has_asked:
                 if not self.zone.holds_pad(i):
@@ -205,11 +202,12 @@ class MissionModel:
                 self.zone.leave(i)
                 u["pad_request"] = -1
 
-    def _start_charging(self, slot: int) -> None:
-        """Let the UAVs that are granted a pad charge from this slot on."""
-        for i in self.zone.grant():
-            rules.start_charging(self.mission, self.uavs, i)
+    def _grant_pads(self, slot: int) -> np.ndarray:
+        """Grant the free pads; return the UAVs that charge from this slot on, in their order."""
+        granted = self.zone.grant()
+        for i in granted:
             self._log_charging("charge_start", slot, i)
+        return np.array(granted, np.int64)
 
     def _fail(self, slot: int) -> int:
         """Let things fail and be repaired; return the number of UAVs that are still active."""
@@ -309,7 +307,10 @@ def _resolve(missions, uavs):
 
 
 @kernel
-def _spend(missions, uavs):
+def _spend(missions, uavs, granted):
+    """Let the UAVs that were granted pads begin to charge, and update the batteries."""
+    for i in granted:
+        rules.start_charging(missions[0], uavs[0], i)
     rules.spend(missions[0], uavs[0])
 
 

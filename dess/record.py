@@ -6,11 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dess.code.kernels import kernel
+from dess.code.kernels import inlined, kernel
+from dess.rules import data_left
 from dess.scenario.constants import Constants
 from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
+from dess.sections.section import extension
 from dess.state import END_NAMES, QUOTA
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
@@ -147,8 +149,20 @@ class Records(NamedTuple):
 
 
 @kernel
-def write_record(mission, uavs, residual, record, uav_records):
-    """Write the record of a finished mission into a ``MISSION_RECORD`` and (I,) ``UAV_RECORD``."""
+def write_records(places, state, records):
+    """Write the records of the missions at these (N,) places of the state."""
+    for row in range(len(places)):
+        b = places[row]
+        write_record(
+            state.missions[b], state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
+            records, row,
+        )  # fmt: skip
+
+
+@inlined
+def write_record(mission, uavs, residual, sensors, teeth, records, row):
+    """Write the record of a mission into a row of ``Records``."""
+    record, uav_records = records.missions[row], records.uavs[row]
     record.seed = mission.seed
     record.replication = mission.replication
     record.uavs = mission.uavs
@@ -159,9 +173,7 @@ def write_record(mission, uavs, residual, record, uav_records):
     record.initial = mission.initial
     record.arrived = mission.arrived
     record.collected = mission.collected
-    record.residual = 0.0
-    for k in range(mission.nodes):
-        record.residual += residual[k]
+    record.residual = data_left(mission, residual)
     record.uav_slots = 0
     record.success = 1
     record.reward = 0.0
@@ -183,11 +195,13 @@ def write_record(mission, uavs, residual, record, uav_records):
     # Rounding may lift the ratio above 1; without any data it is 1.
     record.collection_ratio = min(record.collected / total, 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
+    _write_operations(mission, uavs, sensors, teeth, records.operations, row)
 
 
-@kernel
-def write_operations(mission, uavs, sensors, teeth, out):
+@extension
+def _write_operations(mission, uavs, sensors, teeth, operations, row):
     """Write what an extended scenario measures into an ``OPERATIONS`` record filled with nan."""
+    out = operations[row]
     if mission.age_measured != 0:
         write_age(mission, sensors, teeth, out)
     if mission.has_charging:

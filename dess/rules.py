@@ -16,14 +16,12 @@ The batch engine runs a slot in the order of Section III-C (see ``advance``):
 
 import math
 
-import numpy as np
-
 from dess import channel, streams
 from dess.code.kernels import inlined, kernel
 from dess.sections import age, fleet, wind
-from dess.sections.charging import is_before, request_pad, share_power
-from dess.sections.failures import strike, take_pad, working_pads
-from dess.sections.section import is_extended
+from dess.sections.charging import is_before, share_power
+from dess.sections.failures import strike_if_on, take_pad, working_pads
+from dess.sections.section import extension
 from dess.state import (
     ACTIVE,
     BATTERY,
@@ -104,9 +102,7 @@ def launch(mission, ranges, types, uavs, residual, sensors, teeth):
 
 @kernel
 def _launch_uavs(mission, types, uavs):
-    """Draw distinct start cells in the zone, without replacement."""
-    cells = mission.zone_width * mission.zone_height
-    free_cells = np.arange(cells)  # entries 0 to i - 1 are the cells already drawn
+    """Put the active UAVs on distinct cells of the zone, drawn at random."""
     for i in range(len(uavs)):
         u, kind = uavs[i], types[i]
         u.quota, u.slots_per_cell, u.rate = kind.quota, kind.slots_per_cell, kind.rate
@@ -123,12 +119,29 @@ def _launch_uavs(mission, types, uavs):
         u.amount = u.snr = u.collected = u.reward = u.total_reward = 0.0
         u.x = u.y = u.from_x = u.from_y = -1
         if u.active:
-            words = streams.block(mission.seed, mission.replication, streams.START, 0, 0, i)
-            pick = streams.integer(words[0], i, cells - 1)
-            free_cells[i], free_cells[pick] = free_cells[pick], free_cells[i]
-            u.x, u.y = zone_cell(mission, free_cells[i])
+            u.x, u.y = zone_cell(mission, _start_cell(mission, i))
             u.from_x, u.from_y = u.x, u.y
             _update_latch(mission, u)  # a UAV may start at or below C_S
+
+
+@inlined
+def _start_cell(mission, i):
+    """The number of the start cell of UAV ``i``, drawn without replacement.
+
+    UAV i takes the cell at its place of a list of all cells, and the cell at place i of the list
+    takes that place. Since all draws can be repeated, there need be no such list.
+    """
+    place = _start_place(mission, i)
+    for j in range(i - 1, -1, -1):
+        if _start_place(mission, j) == place:
+            place = j
+    return place
+
+
+@inlined
+def _start_place(mission, i):
+    words = streams.block(mission.seed, mission.replication, streams.START, 0, 0, i)
+    return streams.integer(words[0], i, mission.zone_width * mission.zone_height - 1)
 
 
 @inlined
@@ -152,13 +165,13 @@ def resolve(mission, uavs):
     count = mission.uavs
     for i in range(count):
         u = uavs[i]
-        if u.active and fleet.continue_move(mission, u):
+        if u.active and fleet.continue_move(u):
             continue
         u.from_x, u.from_y = u.x, u.y
         u.overruled = False
         if not u.active:
             continue
-        if u.charging or is_grounded(mission, u):
+        if u.charging or u.grounded:
             u.action = HOVER
         u.executed = u.action
         u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
@@ -175,7 +188,7 @@ def resolve(mission, uavs):
         # Mark all collisions first, then cancel, so that the order of the UAVs does not matter.
         for i in range(count):
             u = uavs[i]
-            if u.active and u.executed != HOVER and fleet.begins_move(mission, u):
+            if u.active and u.executed != HOVER and fleet.begins_move(u):
                 for j in range(count):
                     if j != i and uavs[j].active and _collide(mission, u, uavs[j]):
                         if not u.overruled:
@@ -212,21 +225,25 @@ def _cancel(u):
 
 
 @inlined
-def is_grounded(mission, u):
-    """Whether a UAV is under repair."""
-    return is_extended(mission) and u.grounded
-
-
-@inlined
-def flies(mission, u):
+def flies(u):
     """Whether a UAV is in the air: it is active and neither charges nor is grounded."""
-    return u.active and not u.charging and not is_grounded(mission, u)
+    return u.active and not u.charging and not u.grounded
 
 
 @inlined
-def may_act(mission, u):
+def may_act(u):
     """Whether a UAV is asked for an action: it flies, and is not in the middle of a move."""
-    return flies(mission, u) and (not is_extended(mission) or u.slots_left == 0)
+    return flies(u) and u.slots_left == 0
+
+
+@inlined
+def legal_moves(mission, u):
+    """The actions that keep a UAV on the grid, a bit for each."""
+    legal = 0
+    for action in range(5):
+        if on_grid(mission, u.x + STEP_X[action], u.y + STEP_Y[action]):
+            legal |= 1 << action
+    return legal
 
 
 @inlined
@@ -236,7 +253,7 @@ def may_charge(mission, u):
     The UAV flies, is in the zone, has its charging latch set, and its policy chose Hover. A move
     that the safety controller turned into Hover does not start charging.
     """
-    is_ready = u.active and not is_grounded(mission, u) and u.latch
+    is_ready = u.active and not u.grounded and u.latch
     return is_ready and u.action == HOVER and in_zone(mission, u.x, u.y)
 
 
@@ -248,9 +265,7 @@ def grant_pads(mission, uavs):
     requests a pad or stays in the queue. A UAV that no longer meets it leaves the queue. A UAV that
     has a pad keeps it until it is charged.
     """
-    free = mission.pads
-    if is_extended(mission):
-        free = working_pads(mission)
+    free = working_pads(mission)
     waiting = 0
     for i in range(mission.uavs):
         u = uavs[i]
@@ -261,7 +276,8 @@ def grant_pads(mission, uavs):
         else:
             waiting += 1
             if u.pad_request < 0:
-                request_pad(mission, u)
+                u.pad_request = mission.slot
+                mission.pad_requests += 1
     for _ in range(min(free, waiting)):
         first = -1
         for i in range(mission.uavs):
@@ -275,17 +291,14 @@ def grant_pads(mission, uavs):
 @inlined
 def start_charging(mission, uavs, i):
     """Give a free pad to UAV ``i``."""
-    if is_extended(mission) and mission.has_failures:
-        take_pad(mission, uavs, uavs[i])
+    take_pad(mission, uavs, uavs[i])
     uavs[i].charging = True
 
 
 @inlined
 def spend(mission, uavs):
     """Update the batteries for one slot (eq. 8): charging UAVs gain, flying UAVs lose."""
-    limited = is_extended(mission) and mission.power > 0
-    if limited:
-        share_power(mission, uavs)
+    limited = share_power(mission, uavs)
     for i in range(mission.uavs):
         u = uavs[i]
         if not u.active:
@@ -294,22 +307,21 @@ def spend(mission, uavs):
             if not limited:
                 u.battery = min(u.battery + mission.charge_rate, mission.charge_complete)
             u.slots_charging += 1
-        elif is_grounded(mission, u):
+        elif u.grounded:
             mission.slots_grounded += 1
         else:
             u.battery -= mission.flight_cost
-            if is_extended(mission) and mission.wind_most > 0:
-                _spend_against_wind(mission, u)
+            _spend_against_wind(mission, u)
             u.slots_flying += 1
             if u.pad_request >= 0:
                 u.slots_waiting += 1
     mission.slot_collected = 0.0
 
 
-@inlined
+@extension
 def _spend_against_wind(mission, u):
     """Take the surcharge of a move, in its first slot; a battery is never below 0."""
-    if fleet.begins_move(mission, u):
+    if mission.wind_most > 0 and fleet.begins_move(u):
         extra = wind.move_surcharge(mission, u.x - u.from_x, u.y - u.from_y, u.x, u.y)
         u.battery = max(u.battery - mission.flight_cost * extra, 0)
 
@@ -328,17 +340,14 @@ def communicate(
     for i in range(mission.uavs):
         u = uavs[i]
         u.served = -1
-        if not flies(mission, u):
+        if not flies(u):
             continue
-        if (n - 1) % channel.GROUP == 0 or (is_extended(mission) and mission.continuous != 0):
+        if (n - 1) % channel.GROUP == 0 or mission.continuous != 0:
             channel.open_group(i, search)
         snr, node = channel.best_node(mission, i, residual, order, means, batches, search, n)
         if node < 0:
             continue
-        rate = channel.rate(mission, snr)
-        if is_extended(mission):
-            rate *= u.rate
-        amount = min(rate, residual[node])
+        amount = min(channel.rate(mission, snr) * u.rate, residual[node])
         residual[node] -= amount
         if residual[node] == 0.0:
             age.empty(mission, sensors[node], teeth, n)
@@ -359,9 +368,7 @@ def arrive(mission, residual, arrivals):
         residual: (K,) residual data [data units], increased.
         arrivals: (K,) new data of the slot [data units], overwritten.
     """
-    if (
-        is_extended(mission) and mission.continuous != 0
-    ):  # then they are events of their own (dess.sections.packets)
+    if mission.continuous != 0:  # then they are events of their own (dess.sections.packets)
         return
     probability_of_none = math.exp(-mission.arrival_rate)
     for k in range(0, mission.nodes, 4):
@@ -396,7 +403,7 @@ def reward_terms(mission, u, charged):
         mission.reward_charging if charged else 0.0,
         mission.reward_quota if u.end == QUOTA else 0.0,
         mission.reward_depleted if u.end == BATTERY else 0.0,
-        mission.age_reward * age.mean_age(mission) if is_extended(mission) else 0.0,
+        mission.age_reward * age.mean_age(mission),
     )
 
 
@@ -429,6 +436,15 @@ def settle(mission, uavs):
 
 
 @inlined
+def data_left(mission, residual):
+    """The residual data of all nodes together [data units]."""
+    total = 0.0
+    for k in range(mission.nodes):
+        total += residual[k]
+    return total
+
+
+@inlined
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
     nodes, mean_snr, order, means, batches, search,
@@ -444,5 +460,4 @@ def advance(
         )  # fmt: skip
     arrive(mission, residual, arrivals)
     settle(mission, uavs)
-    if is_extended(mission) and mission.has_failures:
-        strike(mission, uavs, residual, sensors, LOST)
+    strike_if_on(mission, uavs, residual, sensors, LOST)

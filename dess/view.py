@@ -13,9 +13,9 @@ import numpy as np
 from dess.channel import World
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.rules import may_act, on_grid
+from dess.rules import legal_moves, may_act
 from dess.scenario import ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y, State
+from dess.state import HOVER, State
 
 
 class View:
@@ -95,12 +95,11 @@ def legal_actions(missions, uavs, rows_mission, rows_uav):
     legal = np.zeros((len(rows_mission), 5), np.bool_)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
-        u = uavs[b, i]
-        legal[row, HOVER] = True
-        if i >= 0 and may_act(missions[b], u):
-            for action in range(4):
-                x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-                legal[row, action] = on_grid(missions[b], x, y)
+        moves = 1 << HOVER
+        if i >= 0 and may_act(uavs[b, i]):
+            moves = legal_moves(missions[b], uavs[b, i])
+        for action in range(5):
+            legal[row, action] = moves >> action & 1
     return legal
 
 
@@ -118,7 +117,7 @@ def acting_rows(missions, uavs, policies, number):
     for b in range(len(missions)):
         if missions[b].active > 0:
             for i in range(number, missions[b].uavs, policies):
-                if may_act(missions[b], uavs[b, i]):
+                if may_act(uavs[b, i]):
                     rows_mission[count] = b
                     rows_uav[count] = i
                     count += 1

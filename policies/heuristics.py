@@ -13,6 +13,7 @@ from dess import streams
 from dess.code.kernels import inlined, kernel
 from dess.observations.guard import (
     contest,
+    guard,
     margin,
     must_charge,
     parking_cell,
@@ -23,11 +24,11 @@ from dess.observations.guard import (
     waiting_time,
 )
 from dess.observations.reach import reach_of
-from dess.rules import flies
+from dess.rules import data_left, flies
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
-_RANDOM, _NEAREST, _GREEDY, _TOUR, _AGE, _UNGUARDED = range(6)
+_NEAREST, _GREEDY, _TOUR, _AGE = range(4)
 
 # A node is worth a visit if it has at least this share of the mean initial data. Without such a
 # threshold, UAVs would fly to and fro for single new data units.
@@ -41,6 +42,26 @@ _BEYOND = 0.1
 _CONTEST_COST = np.array([0.0, 0.5, 2.5, 50.0])
 
 
+class Random:
+    """Choose a safe action at random, from a random stream that only policies use."""
+
+    name = "random"
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose the (R,) actions for the rows of the view."""
+        return _choose(view.state.missions, view.state.uavs, guard(view), view.mission, view.uav)
+
+
+class RandomUnguarded:
+    """Choose as ``random`` does, but without the return guard: it shows what the guard is worth."""
+
+    name = "random-unguarded"
+
+    def act(self, view: View) -> np.ndarray:
+        """Choose the (R,) actions for the rows of the view."""
+        return _choose(view.state.missions, view.state.uavs, view.legal, view.mission, view.uav)
+
+
 class _Heuristic:
     """A policy whose rule for the goal is part of a compiled function."""
 
@@ -49,34 +70,12 @@ class _Heuristic:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        state = view.state
-        circuit = _circuit(view.world.nodes.tobytes()) if self._kind == _TOUR else _NO_CIRCUIT
+        state, nodes = view.state, view.world.nodes
+        circuit = _circuit(nodes.tobytes()) if self._kind == _TOUR else _NO_CIRCUIT
         return _decide(
-            self._kind,
-            state.missions,
-            state.uavs,
-            state.residual,
-            state.sensors,
-            view.world.nodes,
-            circuit,
-            reach_of(state.missions),
-            view.mission,
-            view.uav,
-        )
-
-
-class Random(_Heuristic):
-    """Choose a safe action at random, from a random stream that only policies use."""
-
-    name = "random"
-    _kind = _RANDOM
-
-
-class RandomUnguarded(_Heuristic):
-    """Choose as ``random`` does, but without the return guard: it shows what the guard is worth."""
-
-    name = "random-unguarded"
-    _kind = _UNGUARDED
+            self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
+            reach_of(state.missions), view.mission, view.uav,
+        )  # fmt: skip
 
 
 class Nearest(_Heuristic):
@@ -116,63 +115,59 @@ class Age(_Heuristic):
 
 
 @kernel
+def _choose(missions, uavs, allowed, rows_mission, rows_uav):
+    """Random allowed moves into uncontested cells; Hover where there is none."""
+    actions = np.empty(len(rows_mission), np.int64)
+    for row in range(len(rows_mission)):
+        i, mission, team = rows_uav[row], missions[rows_mission[row]], uavs[rows_mission[row]]
+        moves = count = 0
+        for action in range(4):
+            x, y = team[i].x + STEP_X[action], team[i].y + STEP_Y[action]
+            if allowed[row, action] and contest(mission, team, i, x, y) == 0:
+                moves |= 1 << action
+                count += 1
+        actions[row] = HOVER
+        if count > 0:
+            place = (streams.POLICY, 0, mission.slot, i)
+            words = streams.block(mission.seed, mission.replication, *place)
+            pick = streams.integer(words[0], 0, count - 1)
+            for action in range(4):
+                if moves >> action & 1:
+                    if pick == 0:
+                        actions[row] = action
+                    pick -= 1
+    return actions
+
+
+@kernel
 def _decide(
     kind, missions, uavs, residual, sensors, nodes, circuit, reach, rows_mission, rows_uav
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
-    safe = np.empty(5, np.bool_)
-    ages = np.empty(len(nodes))
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         actions[row] = _action(
-            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, reach,
-            taken, safe, ages,
-        )  # fmt: skip
+            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, reach, taken
+        )
     return actions
 
 
 @inlined
-def _action(
-    kind, mission, team, i, data, sensors, nodes, circuit, reach, taken, safe, ages
-):  # fmt: skip
-    """The action of UAV ``i``; ``taken``, ``safe`` and ``ages`` are working memory."""
+def _action(kind, mission, team, i, data, sensors, nodes, circuit, reach, taken):
+    """The action of UAV ``i``; ``taken`` is working memory."""
     u = team[i]
-    charge = kind != _UNGUARDED and must_charge(mission, u, data.sum())
+    charge = must_charge(mission, u, data_left(mission, data))
     home_x, home_y = u.x, u.y
     if charge:
         home_x, home_y, _ = parking_cell(mission, team, i, taken)
-    safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
-    if kind in (_RANDOM, _UNGUARDED):
-        return _random_action(mission, team, i, safe)
-    if kind == _AGE:
-        for k in range(len(nodes)):  # at the end of this slot
-            age = mission.slot + 1 - sensors[k].newest
-            ages[k] = age if data[k] > 0.0 else 0.0
-        data = ages
-    node = _goal(kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y, reach)
+    safe = safe_moves(mission, team, i, charge, home_x, home_y, reach)
+    node = _goal(
+        kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
+    )
     if node >= 0:
         home_x, home_y = nodes[node, 0], nodes[node, 1]
     return step_towards(mission, team, i, safe, home_x, home_y)
-
-
-@kernel
-def _random_action(mission, team, i, safe):
-    """A random safe move into an uncontested cell; Hover if there is none."""
-    u = team[i]
-    choices = np.zeros(4, np.bool_)
-    for action in range(4):
-        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        choices[action] = safe[action] and contest(mission, team, i, x, y) == 0
-    if not choices.any():
-        return HOVER
-    words = streams.block(mission.seed, mission.replication, streams.POLICY, 0, mission.slot, i)
-    pick = streams.integer(words[0], 0, choices.sum() - 1)
-    for action in range(4):
-        pick -= choices[action]
-        if pick < 0:
-            return action
-    return HOVER
 
 
 @inlined
@@ -181,7 +176,7 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
     u = team[i]
     best, least = HOVER, 1e18
     for action in range(5):
-        if not safe[action]:
+        if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         cost = path_length(mission, team, i, x, y, goal_x, goal_y)
@@ -193,12 +188,9 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, nodes, circuit, charge, home_x, home_y, reach
+    kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
 ):  # fmt: skip
-    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none.
-
-    ``data`` are the residual data of the nodes; for ``age``, the ages of the nodes with data.
-    """
+    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
     spare = slots_needed(mission, u)
     if charge:
@@ -218,7 +210,7 @@ def _goal(
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == _AGE:
-            score = _staleness(data, nodes, k, slots)
+            score = _staleness(mission, data, sensors, nodes, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
         if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, x, y, slots):
@@ -231,13 +223,14 @@ def _goal(
 
 
 @inlined
-def _staleness(ages, nodes, k, slots):
+def _staleness(mission, data, sensors, nodes, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
     here = beyond = 0.0
     for other in range(len(nodes)):
-        if ages[other] > 0.0:
+        if data[other] > 0.0:
+            age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
             further = abs(nodes[k, 0] - nodes[other, 0]) + abs(nodes[k, 1] - nodes[other, 1])
-            score = ages[other] / (slots + further + _SLOTS_AT_NODE)
+            score = age / (slots + further + _SLOTS_AT_NODE)
             if other == k:
                 here = score
             else:
@@ -255,7 +248,7 @@ def _slots(u, x, y):
 def _teammate_is_nearer(mission, team, i, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
-        if j != i and flies(mission, o):
+        if j != i and flies(o):
             other = _slots(o, x, y)
             if other < slots or (other == slots and j < i):
                 return True

@@ -15,12 +15,16 @@ from typing import Any
 
 from numba import config, njit
 from numba.core.caching import IndexDataCacheFile
+from numba.extending import overload
 
 from dess.code.sources import code_of, combined
 from dess.errors import InputError
 
 # Without a value of its own, a function would take over ``_nrt`` from the function that calls it.
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": True}
+# Wrappers for C would take time to compile, and nothing calls them.
+_OPTIONS: dict[str, Any] = {
+    "nogil": True, "error_model": "numpy", "_nrt": True, "no_cfunc_wrapper": True
+}  # fmt: skip
 
 
 def kernel(function: Callable, **options: Any) -> Any:
@@ -61,14 +65,20 @@ def _cache_file(cache: Any, stamp: str) -> IndexDataCacheFile:
     return file
 
 
-def inlined(function: Callable) -> Any:
-    """Compile a function like ``kernel``, and inline its code into the compiled callers.
+def inlined(function: Callable, choose: Callable | None = None) -> Any:
+    """Let compiled functions call a function; its code is inlined into theirs.
 
     The function must neither create nor return arrays, since its code does not count references to
     arrays. For the small functions of a mission slot, counting would take longer than the functions
-    themselves.
+    themselves. For Python, the function is not compiled.
+
+    Args:
+        function: The function.
+        choose: Returns, for the types of the arguments, the function to compile in its place.
     """
-    return kernel(function, forceinline=True, _nrt=False)
+    options: Any = _OPTIONS | {"forceinline": True, "_nrt": False}
+    overload(function, jit_options=options, strict=False)(choose or (lambda *args: function))
+    return function
 
 
 @lru_cache

@@ -14,9 +14,8 @@ from dess.batch import check_slotted
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.record import Records, empty_records, write_operations, write_record
+from dess.record import Records, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
-from dess.sections.section import is_extended
 from dess.state import (
     ACTION_NAMES,
     TRUNCATED,
@@ -151,7 +150,7 @@ class MissionStepper:
         """The records of the missions in these environments, up to the present slot."""
         fleet = self.state.uavs.shape[1]
         records = empty_records(len(environments), fleet, self.space.is_extended)
-        _record(environments, self.state, records)
+        write_records(environments, self.state, records)
         return records
 
 
@@ -167,22 +166,6 @@ def _launch(environments, first, constants, ranges, types, state):
             mission, ranges, types,
             state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
         )  # fmt: skip
-
-
-@kernel
-def _record(environments, state, records):
-    """Write the records of the missions in these environments."""
-    for row in range(len(environments)):
-        b = environments[row]
-        write_record(
-            state.missions[b], state.uavs[b], state.residual[b],
-            records.missions[row], records.uavs[row],
-        )  # fmt: skip
-        if is_extended(state.missions[b]):
-            write_operations(
-                state.missions[b], state.uavs[b], state.sensors[b], state.teeth[b],
-                records.operations[row],
-            )  # fmt: skip
 
 
 @kernel

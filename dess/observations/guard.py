@@ -13,9 +13,9 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
-from dess.rules import flies, in_zone, is_grounded, on_grid, zone_cell, zone_number
+from dess.rules import data_left, flies, in_zone, on_grid, zone_cell, zone_number
 from dess.sections.failures import working_pads
-from dess.sections.section import is_extended
+from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
@@ -50,18 +50,21 @@ def must_charge(mission, u, data):
     # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
-    if not is_extended(mission):
-        return u.battery < mission.flight_cost * needed
     if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and working_pads(mission) == 0:
         return False
-    moves = (needed + u.slots_per_cell - 1) // u.slots_per_cell
-    return u.battery < mission.flight_cost * (needed + mission.wind_most * moves)
+    return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
+
+
+@extension
+def _most_wind(mission, u, slots):
+    """The battery [%] that the wind costs at most in moves that take so many slots."""
+    return mission.wind_most * ((slots + u.slots_per_cell - 1) // u.slots_per_cell)
 
 
 @inlined
 def is_parked(mission, u):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
-    return u.active and (is_grounded(mission, u) or (u.latch and in_zone(mission, u.x, u.y)))
+    return u.active and (u.grounded or (u.latch and in_zone(mission, u.x, u.y)))
 
 
 @inlined
@@ -152,12 +155,10 @@ def margin(mission, u):
 
     A detour goes forth and back, so the wind costs the most in one direction only.
     """
-    if not is_extended(mission):
-        return (mission.active - 1) * MARGIN_PER_TEAMMATE
     return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
 
 
-@kernel
+@inlined
 def waiting_time(mission, uavs, i):
     """The slots for which UAV ``i`` must expect to wait for a pad.
 
@@ -172,19 +173,15 @@ def waiting_time(mission, uavs, i):
         i: Index of the UAV.
     """
     u = uavs[i]
-    if u.pad_request >= 0:
-        return 0
-    if is_extended(mission):
-        if not (mission.plans_waits or mission.pad_rate > 0.0):
-            return 0
-    elif mission.uavs <= mission.pads:
+    may_wait = mission.pad_rate > 0.0 or (mission.plans_waits and mission.uavs > mission.pads)
+    if u.pad_request >= 0 or not may_wait:
         return 0
     ahead = lacking = 0
     for j in range(mission.uavs):
         o = uavs[j]
         has_asked = o.active and o.pad_request >= 0
         is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
-        must = flies(mission, o) and o.battery < mission.flight_cost * slots_needed(mission, o)
+        must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
         if j != i and (has_asked or (must and is_lower)):
             ahead += 1
             lacking += mission.charge_complete - min(o.battery, mission.charge_start)
@@ -261,7 +258,7 @@ def contest(mission, uavs, i, x, y):
 
 
 @inlined
-def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
+def safe_moves(mission, uavs, i, charge, home_x, home_y, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -277,7 +274,9 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home_x, home_y: Its parking cell.
         reach: The table of ``reach_of``.
-        safe: (5,) mask, overwritten.
+
+    Returns:
+        The safe actions, a bit for each.
     """
     u = uavs[i]
     spare = margin(mission, u)
@@ -308,14 +307,12 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach, safe):
             least, nearest = late, 0
         if late == least:
             nearest |= bit
-    chosen = nearest
     if nearest & clear and (least > 0 or u.overruled):
-        chosen = nearest & clear
-    elif least > 0 and clear & in_time:
+        return nearest & clear
+    if least > 0 and clear & in_time:
         # the margin is there to wait or step aside until the teammate has passed
-        chosen = clear & in_time
-    for action in range(5):
-        safe[action] = chosen >> action & 1
+        return clear & in_time
+    return nearest
 
 
 @inlined
@@ -337,11 +334,13 @@ def _mask(missions, uavs, residual, rows_mission, rows_uav, reach):
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
-        charge = must_charge(mission, team[i], residual[b].sum())
+        charge = must_charge(mission, team[i], data_left(mission, residual[b]))
         home_x, home_y = 0, 0
         if charge:
             home_x, home_y, _ = parking_cell(mission, team, i, taken)
-        safe_moves(mission, team, i, charge, home_x, home_y, reach, masks[row])
+        safe = safe_moves(mission, team, i, charge, home_x, home_y, reach)
+        for action in range(5):
+            masks[row, action] = safe >> action & 1
     return masks
 
 

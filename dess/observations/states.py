@@ -21,9 +21,9 @@ from dess.observations.guard import (
     slots_needed,
 )
 from dess.observations.reach import reach_of
-from dess.rules import may_act, on_grid
+from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y, State
+from dess.state import HOVER, State
 
 # Columns of ``CompactStates.missions``.
 CHARGE_START, CHARGE_COMPLETE = range(2)
@@ -101,13 +101,12 @@ def compact_states(state: State, guarded: bool) -> CompactStates:
 @kernel
 def _fill(missions, uavs, residual, guarded, reach, out):
     taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
-    safe = np.empty(5, np.bool_)
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
         out.missions[b, CHARGE_START] = mission.charge_start
         out.missions[b, CHARGE_COMPLETE] = mission.charge_complete
         out.residual[b] = residual[b]
-        data = residual[b].sum()
+        data = data_left(mission, residual[b])
         for i in range(mission.uavs):
             u, row = team[i], out.uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
@@ -119,17 +118,12 @@ def _fill(missions, uavs, residual, guarded, reach, out):
             row[MUST_CHARGE] = must_charge(mission, u, data)
             home_x, home_y, slots = parking_cell(mission, team, i, taken)
             row[HOME] = min(battery_home(mission, u, slots, reach), _MOST)
-            if may_act(mission, u):
+            if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
-                    safe_moves(mission, team, i, charge, home_x, home_y, reach, safe)
+                    row[MASK] = safe_moves(mission, team, i, charge, home_x, home_y, reach)
                 else:
-                    for action in range(5):
-                        x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-                        safe[action] = on_grid(mission, x, y)
-                row[MASK] = 0
-                for action in range(5):
-                    row[MASK] |= safe[action] << action
+                    row[MASK] = legal_moves(mission, u)
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:

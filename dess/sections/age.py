@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Number, Section, is_extended
+from dess.sections.section import Number, Section, extension
 
 # The most communication slots of a mission whose ages are measured: the batch engine counts the
 # teeth of each mission by their length, in an array with an entry per communication slot.
@@ -44,14 +44,18 @@ def empty(mission, sensor, teeth, n):
         teeth: (G,) number of teeth by length in communication slots, or (0,) if not measured.
         n: Communication slot, 1..m.
     """
+    if mission.continuous != 0:  # then the packets have times
+        return
     now = mission.slot + n / mission.communication_slots
-    if is_extended(mission):
-        if mission.continuous != 0:  # then the packets have times
-            return
-        if mission.age_measured != 0:
-            teeth[_length(mission, sensor, now)] += 1
-        mission.newest += now - sensor.newest
+    _end_tooth(mission, sensor, teeth, now)
+    mission.newest += now - sensor.newest
     sensor.newest = now
+
+
+@extension
+def _end_tooth(mission, sensor, teeth, now):
+    if mission.age_measured != 0:
+        teeth[_length(mission, sensor, now)] += 1
 
 
 @inlined
@@ -60,7 +64,7 @@ def _length(mission, sensor, now):
     return np.int64(round((now - sensor.newest) * mission.communication_slots))
 
 
-@inlined
+@extension
 def mean_age(mission):
     """The mean age of all nodes at the end of a slot [slots]."""
     return mission.slot - mission.newest / mission.nodes

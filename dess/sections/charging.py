@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Integer, Section
+from dess.sections.section import Integer, Section, extension
 
 
 class Charging(Section):
@@ -53,15 +53,16 @@ def is_before(mission, u, other):
     return u.pad_request < other.pad_request
 
 
-@inlined
-def request_pad(mission, u):
-    """Let a UAV ask for a pad in the present slot."""
-    u.pad_request = mission.slot
-    mission.pad_requests += 1
+@extension
+def share_power(mission, uavs):
+    """Charge the UAVs on the pads if the power is limited; return whether it is."""
+    if mission.power > 0:
+        _share_power(mission, uavs)
+    return mission.power > 0
 
 
 @kernel
-def share_power(mission, uavs):
+def _share_power(mission, uavs):
     """Charge the UAVs on the pads with the limited power, one after the other.
 
     Each takes what it can take (``charge_rate``, up to ``charge_complete``) of what is left.

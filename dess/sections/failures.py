@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.sections.section import Probability, Section, Slots
+from dess.sections.section import Probability, Section, Slots, extension
 
 MOST_PADS = 64  # charging pads that can fail: as many as the largest fleet has UAVs
 
@@ -66,6 +66,13 @@ class Failures(Section):
             "uav_data_lost": self.uav_data == "lost",
             "node_data_lost": self.node_data == "lost",
         }
+
+
+@extension
+def strike_if_on(mission, uavs, residual, sensors, lost):
+    """``strike``, if the section is on."""
+    if mission.has_failures:
+        strike(mission, uavs, residual, sensors, lost)
 
 
 @kernel
@@ -155,20 +162,26 @@ def _strike_node(mission, residual, sensor, k):
     residual[k] = 0.0
 
 
-@kernel
+@inlined
 def working_pads(mission):
     """The number of charging pads that are not out of order."""
-    if mission.pad_rate == 0.0:
-        return mission.pads
-    working = mission.pads
-    for j in range(mission.pads):
-        working -= mission.pads_out[j]
-    return working
+    return mission.pads - _broken_pads(mission)
 
 
-@kernel
+@extension
+def _broken_pads(mission):
+    broken = 0
+    if mission.pad_rate > 0.0:
+        for j in range(mission.pads):
+            broken += mission.pads_out[j]
+    return broken
+
+
+@extension
 def take_pad(mission, uavs, u):
     """Give a UAV the first pad that works and that no UAV holds; ``charging`` is set after."""
+    if not mission.has_failures:
+        return
     for j in range(mission.pads):
         free = mission.pads_out[j] == 0
         for i in range(mission.uavs):

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined
-from dess.sections.section import Integer, Number, Section, is_extended
+from dess.sections.section import Integer, Number, Section
 
 
 class UavType(Section):
@@ -86,18 +86,16 @@ def places_per_slot(fleet: Fleet) -> int:
 
 
 @inlined
-def leg(mission, u):
+def leg(u):
     """The number of a UAV's leg in the present slot, from 0 on; the only one of s = 1 is 0."""
-    if not is_extended(mission):
-        return 0
     s = u.slots_per_cell
     return s * (s - 1) // 2 + s - 1 - u.slots_left
 
 
 @inlined
-def continue_move(mission, u):
+def continue_move(u):
     """Whether a UAV is in the middle of a move; if so, let it fly on for one slot."""
-    if not is_extended(mission) or u.slots_left == 0:
+    if u.slots_left == 0:
         return False
     u.slots_left -= 1
     u.action = u.executed
@@ -106,9 +104,9 @@ def continue_move(mission, u):
 
 
 @inlined
-def begins_move(mission, u):
+def begins_move(u):
     """Whether a UAV that moves begins its move in the present slot."""
-    return not is_extended(mission) or u.slots_left == u.slots_per_cell - 1
+    return u.slots_left == u.slots_per_cell - 1
 
 
 def share_of_move(m: int, u: Any, n: int) -> float:

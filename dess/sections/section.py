@@ -1,9 +1,11 @@
 """The base of all sections, and the types of their fields."""
 
+from collections.abc import Callable
 from typing import Annotated, Any, Self
 
-from numba.extending import overload
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+from dess.code.kernels import inlined
 
 # A strict integer: 2.0, true and "2" are refused.
 Integer = Annotated[int, Field(strict=True)]
@@ -48,17 +50,18 @@ class Section(BaseModel):
         return cls.model_validate({})
 
 
-def is_extended(mission: Any) -> bool:
-    """Whether a section of the scenario of a ``MISSION`` record is on; for compiled code.
+def extension(function: Callable) -> Any:
+    """Compile a function like ``inlined`` for missions with sections; in others it does nothing.
 
-    Of a record without this field, the compiler knows that none is: it leaves out the code of the
-    sections, which would make the mission slots of all other scenarios slower.
+    The first argument is the record of a mission. Of ``PLAIN_MISSION`` the compiler knows that no
+    section is on: the function is not compiled, and returns 0.
     """
-    return bool(mission["is_extended"])
+
+    def choose(mission: Any, *_: Any) -> Callable:
+        return function if "is_extended" in mission.fields else _nothing
+
+    return inlined(function, choose)
 
 
-@overload(is_extended, jit_options={"forceinline": True})
-def _is_extended(mission):
-    if "is_extended" in mission.fields:
-        return lambda mission: mission.is_extended != 0
-    return lambda mission: False
+def _nothing(_mission: Any, *_: Any) -> int:
+    return 0

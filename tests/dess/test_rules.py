@@ -8,7 +8,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from scipy import special
 
-from dess import channel, rules, streams
+from dess import rules, streams
 from dess.channel import Scratch, World, empty_scratch, world_of
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import (
@@ -25,6 +25,7 @@ from dess.state import (
     ranges_of,
     types_of,
 )
+from tests import compiled
 from tests.drawn import EAST, NORTH, SOUTH, WEST, cells, replications, scenarios, seeds, spaces
 
 STEPS = list(zip(STEP_X.tolist(), STEP_Y.tolist(), strict=True))
@@ -52,8 +53,8 @@ def _communicate(state: State, world: World, scratch: Scratch, n: int) -> None:
     """Communication slot ``n`` of a mission slot."""
     mission, uavs, residual, sensors, teeth = (array[0] for array in state)
     nodes, mean_snr, *tables = world
-    channel.open_slot(mission, uavs, nodes, mean_snr, *tables, scratch.search)
-    rules.communicate(mission, uavs, residual, sensors, teeth, *tables, *scratch, n)
+    compiled.open_slot(mission, uavs, nodes, mean_snr, *tables, scratch.search)
+    compiled.communicate(mission, uavs, residual, sensors, teeth, *tables, *scratch, n)
 
 
 # --- launch ---
@@ -122,7 +123,7 @@ def _resolve(
     for i, ((x, y), action) in enumerate(uavs):
         team[i]["x"], team[i]["y"], team[i]["action"] = x, y, action
         team[i]["active"] = i not in idle
-    rules.resolve(state.missions[0], team)
+    compiled.resolve(state.missions[0], team)
     after = list(zip(team["x"].tolist(), team["y"].tolist(), strict=True))
     for u in team[team["active"]]:
         dx, dy = STEPS[u["executed"]]
@@ -237,7 +238,7 @@ def _one_slot(u: dict[str, Any], **scenario: Any) -> Any:
     for name, value in u.items():
         own[name] = value
     arrivals = np.zeros(state.residual.shape[1], np.int64)
-    rules.advance(
+    compiled.advance(
         state.missions[0],
         state.uavs[0],
         state.residual[0],
@@ -350,7 +351,7 @@ def _queue(pads: int, requests: list[int], charging: list[int], slot: int = 9) -
     team = state.uavs[0]
     team["latch"], team["battery"], team["action"] = True, 20, HOVER
     team["pad_request"], team["charging"] = requests, np.isin(range(len(requests)), charging)
-    rules.grant_pads(state.missions[0], team)
+    compiled.grant_pads(state.missions[0], team)
     assert (team["pad_request"] == np.where(np.array(requests) < 0, slot, requests)).all()
     return np.nonzero(team["charging"])[0].tolist()
 
@@ -369,7 +370,7 @@ def test_who_no_longer_hovers_leaves_the_queue() -> None:
     team["latch"], team["battery"] = True, 20
     team["action"] = [EAST, HOVER, HOVER]
     team["pad_request"] = [1, 3, 2]
-    rules.grant_pads(state.missions[0], team)
+    compiled.grant_pads(state.missions[0], team)
     assert team["charging"].tolist() == [False, False, True]
     assert team["pad_request"].tolist() == [-1, 3, 2]
 
@@ -512,7 +513,7 @@ def test_arrivals_are_the_poisson_deviates_of_their_coordinates() -> None:
     arrivals = np.zeros(state.residual.shape[1], np.int64)
     before = state.residual[0].copy()
     state.missions["slot"] = 33
-    rules.arrive(state.missions[0], state.residual[0], arrivals)
+    compiled.arrive(state.missions[0], state.residual[0], arrivals)
     words = [
         streams.block(np.uint64(8), 9, streams.ARRIVAL, 0, 33, k // 4)[k % 4] for k in range(7)
     ]
@@ -546,7 +547,7 @@ def test_settlement(
     u["communications"], u["battery"], mission["slot"] = progress
     u["overruled"] = overruled
     mission["slot_collected"] = 7.0  # by the whole team: each UAV is paid for all of it
-    rules.settle(mission, state.uavs[0])
+    compiled.settle(mission, state.uavs[0])
     assert u["end"] == end
     assert u["active"] == (end == ACTIVE)
     assert mission["active"] == int(u["active"]) + int(mate["active"])
@@ -563,6 +564,6 @@ def test_charging_is_rewarded_and_the_inactive_get_nothing() -> None:
     u["charging"], u["battery"] = True, 50
     gone["active"], gone["reward"], gone["total_reward"] = False, 3.0, 3.0
     state.missions["slot_collected"] = 2.0
-    rules.settle(state.missions[0], state.uavs[0])
+    compiled.settle(state.missions[0], state.uavs[0])
     assert u["reward"] == pytest.approx(1.3 * 2 - 0.1 + 0.05, abs=1e-12)
     assert (gone["reward"], gone["total_reward"]) == (0.0, 3.0)

@@ -11,6 +11,7 @@ from dess.channel import empty_scratch, world_of
 from dess.scenario import ScenarioSpace
 from dess.state import State, constants_of, empty_state, ranges_of, types_of
 from policies import load
+from tests import compiled
 from tests.analysis.bound.tiny_sea import TinySea, contraction
 
 # --- without shadowing: all action sequences, by the rules of the simulator ---
@@ -41,7 +42,7 @@ def optimum(space: ScenarioSpace, seed: int) -> float:
             mission = after.missions[0]
             after.uavs[0]["action"] = actions
             arrays = (array[0] for array in after)
-            rules.advance(*arrays, arrivals, *world, *scratch)
+            compiled.advance(*arrays, arrivals, *world, *scratch)
             if mission["active"]:
                 ratios.append(best(after))
             else:

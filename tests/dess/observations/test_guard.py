@@ -9,10 +9,11 @@ from hypothesis import event, given
 from dess import streams
 from dess.batch import simulate_batch
 from dess.mission import simulate
-from dess.observations.guard import guard, must_charge, waiting_time
+from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER, constants_of, empty_state
 from dess.view import View
+from tests import compiled
 from tests.drawn import EAST, NORTH, SOUTH, WEST, Fidget, replications, seeds, spaces
 
 
@@ -152,7 +153,7 @@ def _wait(batteries: list[int], asked: list[int], quota: int = 440, **scenario: 
     team = state.uavs[0]
     team["active"], team["battery"], team["pad_request"] = True, batteries, -1
     team["quota"], team["slots_per_cell"], team["pad_request"][asked] = quota, 1, 0
-    return int(waiting_time(state.missions[0], team, 0))
+    return int(compiled.waiting_time(state.missions[0], team, 0))
 
 
 OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
@@ -196,8 +197,8 @@ def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
     state.missions[:] = constants_of(space)
     u = state.uavs[0, 0]
     u["battery"], u["quota"], u["slots_per_cell"] = 5, 440, 1
-    assert must_charge(state.missions[0], u, 1e6)
+    assert compiled.must_charge(state.missions[0], u, 1e6)
     state.missions["pads_out"][0, 0] = 1
-    assert not must_charge(state.missions[0], u, 1e6)
+    assert not compiled.must_charge(state.missions[0], u, 1e6)
     state.missions["pad_repair"] = 0.5
-    assert must_charge(state.missions[0], u, 1e6)
+    assert compiled.must_charge(state.missions[0], u, 1e6)

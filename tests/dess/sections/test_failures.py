@@ -9,7 +9,7 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dess import InputError, rules
+from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.record import MissionRecord
@@ -17,6 +17,7 @@ from dess.scenario import Scenario, ScenarioSpace, load_scenario
 from dess.sections.failures import strike
 from dess.state import HOVER, LOST, State, constants_of, empty_state
 from dess.view import View
+from tests import compiled
 from tests.drawn import Commuter, Script, Wanderer, extended_spaces, failures, replications, seeds
 
 # A UAV over the only node, of which it takes 8 units in each slot; all batteries last.
@@ -237,7 +238,7 @@ def _grounded(x: int) -> tuple[State, Any]:
 def test_a_grounded_uav_stays_where_it_is_and_blocks_its_cell() -> None:
     state, team = _grounded(1)
     team["action"] = [1, 1]  # both east
-    rules.resolve(state.missions[0], team)
+    compiled.resolve(state.missions[0], team)
     assert team["x"].tolist() == [0, 1]
     assert team["overruled"].tolist() == [True, False]
 
