@@ -113,7 +113,7 @@ MISSION = np.dtype(
 )
 
 # The same for scenarios without sections. It differs in the name of a field only, which tells the
-# compiler to leave out the code of the sections (``dess.sections.section.is_extended``).
+# compiler to leave out the code of the sections (``dess.sections.section.extension``).
 PLAIN_MISSION = np.dtype(
     [("is_plain", *field[1:]) if field[0] == "is_extended" else field for field in MISSION.descr],
     align=True,

@@ -17,7 +17,7 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.observations.guard import guard, must_charge
 from dess.rules import in_zone, zone_cell
-from dess.state import HOVER, State
+from dess.state import HOVER, STEP_X, State
 from dess.view import View
 from policies.heuristics import step_towards
 from policies.planner.fluid import CRAFT, MOST_SLOTS, fly
@@ -165,7 +165,11 @@ def _decide(
             x, y, number = team[i].x, team[i].y, memory.first[b, i].next
             if number < plan.lengths[i]:
                 x, y = plan.waypoints[i, number].x, plan.waypoints[i, number].y
-            action = step_towards(mission, team, i, safe[row], x, y)
+            moves = 0
+            for move in range(len(STEP_X)):
+                if safe[row, move]:
+                    moves |= 1 << move
+            action = step_towards(mission, team, i, moves, x, y)
         actions[row] = action
     return len(rows_mission)
 
