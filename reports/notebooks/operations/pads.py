@@ -54,16 +54,15 @@ html.say("{answer}", answer=html.composed(answers.pads(study, margin)))
 # ## Success and product
 
 # %%
-html.gallery(
-    [
-        (
-            figures.against(means, "pads", "uavs", metric, "policy"),
-            f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
-            f"n = {missions} missions per point; bars are {level} intervals.",
-        )
-        for metric in metrics[:2]
-    ]
-)
+drawn = [
+    (
+        figures.against(means, "pads", "uavs", metric, "policy"),
+        f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
+        f"n = {missions} missions per point; bars are {level} intervals.",
+    )
+    for metric in metrics
+]
+html.gallery(drawn[:2])
 
 # %%
 lost = effects.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
@@ -82,16 +81,7 @@ html.table(
 # the pads in use. A mission in which no UAV asked for a pad has no waiting time.
 
 # %%
-html.gallery(
-    [
-        (
-            figures.against(means, "pads", "uavs", metric, "policy"),
-            f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
-            f"n = {missions} missions per point; bars are {level} intervals.",
-        )
-        for metric in uses
-    ]
-)
+html.gallery(drawn[2:])
 
 # %% [markdown]
 # ### The queue over time
