@@ -30,6 +30,7 @@ def test_performance_shows_means_intervals_and_the_printed_figure(metric: str) -
     (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
     assert list(printed.get_xdata()) == [0.55, 0.55]
     assert ax.get_title(loc="left") == METRICS[metric]
+    assert [note.get_text() for note in ax.texts] == [f"{mean:.1%}" for mean in rows["mean"]]
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
 
 
