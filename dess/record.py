@@ -192,8 +192,8 @@ def write_record(mission, uavs, residual, sensors, teeth, records, row):
         if u.end != QUOTA:
             record.success = 0
     total = record.initial + record.arrived
-    # Rounding may lift the ratio above 1; without any data it is 1.
-    record.collection_ratio = min(record.collected / total, 1.0) if total > 0.0 else 1.0
+    # Rounding may put the ratio a little below 0 or above 1; without any data it is 1.
+    record.collection_ratio = min(max(record.collected / total, 0.0), 1.0) if total > 0.0 else 1.0
     record.collection_ratio_and_communication = record.collection_ratio * record.success
     _write_operations(mission, uavs, sensors, teeth, records.operations, row)
 

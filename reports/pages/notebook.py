@@ -19,7 +19,7 @@ import jupytext
 import nbformat
 from nbformat import NotebookNode
 
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from dess.files.reading import paths_in, read_text
 from reports.pages.parameters import values_of, with_paths, with_values
 
@@ -129,7 +129,7 @@ def read(name: str, folder: Path = SHIPPED) -> Report:
         InputError: If the folder has no report of that name.
     """
     if name not in (names := names_in(folder)):
-        raise InputError(f"report: {name!r} is unknown{one_of(name, names)}")
+        raise InputError(f"report: {shown(name)} is unknown{one_of(name, names)}")
     return report_of(name, parsed(name, folder))
 
 

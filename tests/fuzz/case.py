@@ -58,7 +58,8 @@ class Case:
         command = "study run" if words[:2] == ["study", "run"] else "".join(words[:1])
         is_named = any(word.startswith("--out") for word in self.arguments)
         allowed = [OUT]
-        if command == "sweep" or (command == "study run" and not is_named):
+        is_kept = command == "report" and not any(w.startswith("--results") for w in self.arguments)
+        if command == "sweep" or is_kept or (command == "study run" and not is_named):
             allowed.append(f"{CWD}/results")
         if "--report" in self.arguments or (command in ("sweep", "report") and not is_named):
             allowed.append(f"{CWD}/build")

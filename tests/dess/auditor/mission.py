@@ -118,7 +118,7 @@ class _Auditor:
         total = self.nodes.initial + self.nodes.arrived
         success = int(all(u.end == "quota" for u in self.uavs))
         collected = sum(u.collected for u in self.uavs)
-        ratio = min(collected / total, 1.0) if total > 0 else 1.0
+        ratio = min(max(collected / total, 0.0), 1.0) if total > 0 else 1.0
         return self.parameters | {
             "uavs": len(self.uavs),
             "slots": self.log.slot,
