@@ -41,6 +41,8 @@ def _run(folder: Path) -> str:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
+    # Python itself misses a change within the second in which it wrote its bytecode.
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     (tmp_path / "caller.py").write_text(CALLER)
     (tmp_path / "callee.py").write_text(CALLEE.format(1))
     assert _run(tmp_path) == "2 compiled"
