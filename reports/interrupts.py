@@ -4,26 +4,24 @@ with Interrupts() as interrupts:
     ...                     # a signal raises KeyboardInterrupt here
 """
 
-import math
 import signal
 import sys
 import threading
-import time
-from _thread import interrupt_main
 from contextlib import AbstractContextManager
 from typing import Any
 
 NUMBERS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
-CLEANUP = 5.0  # seconds that a command has to end; more signals within them are ignored
-AGAIN = 0.05  # seconds until an interrupt that Python has dropped is raised again
+AGAIN = 0.25  # seconds until an interrupt that something has swallowed is raised again
 
 
 class Interrupts(AbstractContextManager["Interrupts"]):
     """Handlers of the signals during a ``with`` block in the main thread; none in other threads.
 
-    A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
+    A finalizer, a callback or a library may swallow the interrupt. So it is raised again and again
+    until the block ends, but not while it is handled: a cleanup is left in peace, also by a second
+    signal. A signal that was ignored before, as SIGHUP under ``nohup``, stays ignored.
 
     Attributes:
         received: Whether there was a signal.
@@ -37,7 +35,6 @@ class Interrupts(AbstractContextManager["Interrupts"]):
                 so that a second signal does not disturb the end.
         """
         self.is_last, self.received = is_last, False
-        self._number, self._ignored_until = int(signal.SIGINT), 0.0
         self._hook = sys.unraisablehook
         self._handlers: dict[int, Any] = {}
 
@@ -50,34 +47,31 @@ class Interrupts(AbstractContextManager["Interrupts"]):
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ignored_until = math.inf
+        if self.received and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0)
         for number, handler in self._handlers.items():
-            signal.signal(number, signal.SIG_IGN if self.is_last else handler)
+            is_ignored = self.is_last and number in NUMBERS
+            signal.signal(number, signal.SIG_IGN if is_ignored else handler)
         if threading.current_thread() is threading.main_thread():
             sys.unraisablehook = self._hook
 
     def _receive(self, number: int, frame: Any) -> None:
-        self.received, self._number = True, number
-        if time.monotonic() >= self._ignored_until:
-            self._ignored_until = time.monotonic() + CLEANUP
+        if not self.received and hasattr(signal, "setitimer"):
+            self._handlers[signal.SIGALRM] = signal.signal(signal.SIGALRM, self._receive)
+            signal.setitimer(signal.ITIMER_REAL, AGAIN, AGAIN)
+        self.received = True
+        if not _is_handled():
             raise KeyboardInterrupt
 
     def _unraisable(self, error: Any) -> None:
-        """Raise an interrupt again that Python drops because it came in a finalizer or callback."""
+        """Say nothing of an interrupt that came in a finalizer or callback: it comes again."""
         if not isinstance(error.exc_value, KeyboardInterrupt):
             self._hook(error)
-            return
-        self._ignored_until = 0.0
-        again = threading.Timer(AGAIN, _send, [self._number])
-        again.daemon = True
-        again.start()
 
 
-def _send(number: int) -> None:
-    """Send a signal to the main thread, which may be waiting for something."""
-    if hasattr(signal, "pthread_kill"):
-        main = threading.main_thread().ident
-        assert main is not None
-        signal.pthread_kill(main, number)
-    else:
-        interrupt_main()
+def _is_handled() -> bool:
+    """Whether the running code is in the ``finally``, ``except`` or ``with`` of an interrupt."""
+    error = sys.exc_info()[1]
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__context__
+    return error is not None

@@ -183,7 +183,7 @@ class _Running:
         """The CPU time of the command so far, in seconds."""
         with suppress(psutil.NoSuchProcess):
             times = psutil.Process(self.process.pid).cpu_times()
-            return times.user + times.system + times.children_user
+            return times.user + times.system  # without workers, which count when they have ended
         return 0.0
 
     def kill(self) -> None:

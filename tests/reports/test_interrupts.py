@@ -1,5 +1,6 @@
 """SIGTERM and SIGHUP end a command as Ctrl-C does, whatever it is doing."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -10,7 +11,7 @@ import time
 import pytest
 
 from reports import cli
-from reports.interrupts import Interrupts
+from reports.interrupts import AGAIN, Interrupts
 from tests.analysis.small import environment, files_of, small_study
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends signals")
@@ -60,24 +61,42 @@ def test_a_second_signal_does_not_disturb_the_cleanup(monkeypatch, capsys):
             signal.raise_signal(signal.SIGHUP)
         finally:
             signal.raise_signal(signal.SIGTERM)
+            time.sleep(2 * AGAIN)
             cleaned.append(True)
 
     assert during(twice, monkeypatch, capsys) == (130, "", LINE)
     assert cleaned == [True]
 
 
-def test_a_signal_in_a_finalizer_is_not_lost(monkeypatch, capsys):
+def in_a_finalizer():
     class Finalized:
         def __del__(self):
             signal.raise_signal(signal.SIGTERM)
 
-    def finalize():
-        Finalized()
+    Finalized()
+
+
+def swallowed():
+    with contextlib.suppress(BaseException):
+        signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.mark.parametrize("lose", [in_a_finalizer, swallowed])
+def test_a_signal_is_not_lost(lose, monkeypatch, capsys):
+    def lost():
+        lose()
         threading.Event().wait(60)
 
     begin = time.monotonic()
-    assert during(finalize, monkeypatch, capsys) == (130, "", LINE)
+    assert during(lost, monkeypatch, capsys) == (130, "", LINE)
     assert time.monotonic() - begin < 30
+
+
+def test_a_signal_disturbs_no_command_after_it(monkeypatch, capsys):
+    before = signal.getsignal(signal.SIGALRM)
+    during(lambda: signal.raise_signal(signal.SIGTERM), monkeypatch, capsys)
+    assert signal.getsignal(signal.SIGALRM) is before
+    assert signal.getitimer(signal.ITIMER_REAL) == (0, 0)
 
 
 def test_a_signal_that_was_ignored_stays_ignored(monkeypatch, capsys):
