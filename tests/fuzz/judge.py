@@ -31,7 +31,7 @@ _RAW = {"Cc", "Cs", "Zl", "Zp"}  # categories of characters that must not reach 
 # Lines on standard error that say what a command does, and no error.
 _NEWS = re.compile(
     r"compiling the simulator .*|[\d,]+ missions(, [\d,]+ of them present)?|.*\d(s/|it/|/s).*"
-    r"|replay memory: .*|curves: tensorboard .*"
+    r"|replay memory: .*|curves: tensorboard .*|.*: this training is not finished .*"
 )
 # Folders that libraries make and use again, and that have the name of the user.
 _CACHES = ("tmp/torchinductor_",)
