@@ -90,7 +90,7 @@ def measures_of(space: Constants) -> list[str]:
 
 
 # Columns of the event log, and the types of their arrays.
-_EVENT_COLUMNS = {
+EVENT_COLUMNS = {
     "time": np.float64,
     "event": object,
     "uav": np.int64,
@@ -252,16 +252,16 @@ class EventLog:
 
     def __getattr__(self, name: str) -> list:
         """A column as a list, as in ``log.event``."""
-        if name not in _EVENT_COLUMNS:
+        if name not in EVENT_COLUMNS:
             raise AttributeError(name)
-        index = [*_EVENT_COLUMNS].index(name)
+        index = [*EVENT_COLUMNS].index(name)
         return [row[index] for row in self.rows]
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""
         return {
             name: np.array([row[index] for row in self.rows], dtype)
-            for index, (name, dtype) in enumerate(_EVENT_COLUMNS.items())
+            for index, (name, dtype) in enumerate(EVENT_COLUMNS.items())
         }
 
 

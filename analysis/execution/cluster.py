@@ -7,14 +7,14 @@ a note of this module.
 import asyncio
 import logging
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from analysis.execution.jobs import Job, Progress, attempt
-from analysis.execution.workers import Finished, Pool, reported
+from analysis.execution.jobs import Job, attempt
+from analysis.execution.workers import Pool
 from analysis.results.provenance import Member, engine_code
 from dess import InputError
 from dess.code.libraries import needs
@@ -33,7 +33,12 @@ class SchedulerError(Exception):
 
 
 class Cluster(Pool):
-    """A dask.distributed cluster, whose workers must have this code."""
+    """A dask.distributed cluster, whose workers must have this code.
+
+    It runs a job several times by itself before it reports that the workers of the job have died.
+    """
+
+    attempts = 1
 
     def __init__(self, address: str):
         """Name the cluster.
@@ -72,49 +77,29 @@ class Cluster(Pool):
     def __exit__(self, *_: object) -> None:
         self._exits.close()
 
-    def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
-        """Run the jobs; yield their numbers and results as they come in.
+    def _finished(self, jobs: Mapping[int, Job], suspects: set[int]) -> Iterator[tuple[int, Any]]:
+        """Results by job number as they come in; ``suspects`` gets the jobs whose workers died.
 
         Raises:
             InputError: If a worker cannot run the jobs.
             SchedulerError: If the connection to the scheduler is lost.
         """
-        deadly = []
-        for number, result in self._finished(jobs):
-            if result is None:
-                deadly.append(number)
-            else:
-                yield number, reported(jobs[number], result, progress)
-        for number in deadly:
-            yield number, reported(jobs[number], self._alone(jobs[number]), progress)
-
-    def _alone(self, job: Job) -> Any:
-        """What becomes of a job whose workers died several times, while no other job is running."""
-        problem = self._given_up(job)
-        # If all of its missions can be simulated, another job has killed the workers.
-        result = None if problem.mission else self._once(job)
-        return problem if result is None else result
-
-    def _once(self, job: Job) -> Any:
-        ((_, result),) = self._finished([job])
-        return result
-
-    def _finished(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]:
-        """Numbers and results of jobs as they come in; None if the workers of a job have died."""
         done: SimpleQueue[Any] = SimpleQueue()
         code = engine_code()
-        codes = {policy: job.code for policy, job in {job.policy: job for job in jobs}.items()}
+        codes = {policy: job.code for policy, job in {j.policy: j for j in jobs.values()}.items()}
         futures = []
         try:
-            for job in jobs:
+            for job in jobs.values():
                 own = codes[job.policy]
-                future = self.client.submit(_checked, job, code, own, pure=False)
-                future.add_done_callback(done.put)
-                futures.append(future)
-            numbers = {future.key: number for number, future in enumerate(futures)}
-            for _ in jobs:
+                futures.append(self.client.submit(_checked, job, code, own, pure=False))
+                futures[-1].add_done_callback(done.put)
+            numbers = {future.key: number for future, number in zip(futures, jobs, strict=True)}
+            for _ in futures:
                 future = self._next(done)
-                yield numbers[future.key], self._result(future)
+                if (result := self._result(future)) is None:
+                    suspects.add(numbers[future.key])
+                else:
+                    yield numbers[future.key], result
                 future.release()
         except InputError:
             raise

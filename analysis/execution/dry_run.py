@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from analysis import numbers
@@ -19,10 +19,8 @@ from analysis.execution.effort import (
     seconds_per_mission,
 )
 from analysis.execution.engines import simulate_missions
-from analysis.execution.reuse import sources
-from analysis.results.chunks import Chunk, bound_parts, check_parts, parts_of
-from analysis.results.manifest import NO_TEAM
-from analysis.results.store import MANIFEST, Store
+from analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
+from analysis.results.store import MANIFEST, Store, sources
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import MAX_SIZE
 from analysis.study.study import MANY_POINTS, Study
@@ -44,13 +42,20 @@ class Planned:
         policy: The team.
         missions: Number of missions needed; a lower bound if a rule decides it.
         present: Number of these missions that are already in the results folder.
-        seconds: Estimated time of the others and of missing event logs [s].
+        logs: Number of missing event logs.
+        seconds: Estimated time of what is missing [s]; 0 before it is estimated.
     """
 
     policy: str
     missions: int
     present: int
-    seconds: float
+    logs: int = 0
+    seconds: float = 0.0
+
+    @property
+    def missing(self) -> int:
+        """Number of missions that a run would simulate."""
+        return self.missions - self.present
 
 
 @dataclass(frozen=True)
@@ -102,22 +107,12 @@ def plan_study(
         raise InputError(
             f"study {study.name}: {study.size:,} design points; allowed: {MAX_SIZE:,} at most"
         )
-    many = study.size > MANY_POINTS and not (Path(out) / MANIFEST).exists()
-    store = None if many else Store.peek(study, out, accept_code)
-    rows, logs = [], _logs(study, store) / len(study.policies)
-    for team in range(len(study.policies)):
-        missing, total = _missing(study, store, team)
-        seconds = _seconds(study, team, missing, logs, clock)
-        rows.append(Planned(study.policies[team], total, total - missing, seconds))
+    counted = _counted(study, _folder(study, out, accept_code))
+    parts = [replace(p, seconds=_seconds(study, p, clock)) for p in counted]
+    rows = tuple(parts[: len(study.policies)])
     at_most = len(study.policies) * _budget(study) if study.rule else None
-    bounds = None
-    if study.bounds:
-        total, missing = study.size * study.first, _missing_bounds(study, store)
-        each = _seconds_per_bound(study, clock) if missing else 0.0
-        bounds = Planned("upper bounds", total, total - missing, missing * each)
-    parts = [*rows, bounds] if bounds else rows
     seconds = sum(planned.seconds for planned in parts) / workers
-    return Plan(tuple(rows), study.size, at_most, seconds, bounds)
+    return Plan(rows, study.size, at_most, seconds, parts[-1] if study.bounds else None)
 
 
 def check_run(
@@ -169,39 +164,34 @@ def check_effort(
             contains something else, or ``workers`` is out of range.
     """
     check_workers(workers)
-    teams = range(len(study.policies))
-    if study.size > MANY_POINTS:
-        missing, logs = [study.size * study.first for _ in teams], _logs(study)
-        bounds = _missing_bounds(study, None)
-    else:
-        store = Store.peek(study, out, accept_code)
-        missing = [_missing(study, store, team)[0] for team in teams]
-        if sum(missing) > FEW:
-            for source in sources(reuse, store.manifest):
-                store.count(source)
-            missing = [_missing(study, store, team)[0] for team in teams]
-        logs, bounds = _logs(study, store), _missing_bounds(study, store)
+    store, teams = _folder(study, out, accept_code), len(study.policies)
+    parts = _counted(study, store)
+    if store and sum(planned.missing for planned in parts[:teams]) > FEW:
+        for source in sources(reuse, store.manifest):
+            store.count(source)
+        parts = _counted(study, store)
+    missing = sum(planned.missing for planned in parts[:teams])
     what = (
-        f"study {study.name}: {'at least ' if study.rule else ''}{sum(missing):,} missions to "
-        f"simulate (policies: {len(study.policies)}, design points: {study.size:,}, "
-        f"workers: {workers:,})"
+        f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
+        f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
     )
     if study.size > MAX_SIZE:
         raise InputError(f"{what}; allowed: {MAX_SIZE:,} design points")
-    if yes or not sum(missing) + logs + bounds:
-        return sum(missing)
-    if study.size > MANY_POINTS:
-        seconds = _all_seconds(study, missing, logs, clock) / workers
-        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
+    work = sum(planned.missing + planned.logs for planned in parts)
+    if yes or not work:
+        return missing
     ends = [study.point(number).scenario for number in {0, study.size - 1}]
-    few = all(are_few(sum(missing) + logs, space) for space in ends)
-    seconds = 0.0 if few else _all_seconds(study, missing, logs, clock)
-    if bounds > FEW_BOUNDS:
-        seconds += bounds * _seconds_per_bound(study, clock)
-    check_time(what, seconds / workers)
-    held = study.size * (POINT_MEMORY + study.first * len(teams) * MISSION_MEMORY)
+    bounds = parts[-1].missing if study.bounds else 0
+    few = study.size <= MANY_POINTS and all(are_few(work - bounds, space) for space in ends)
+    estimated = [] if few else parts[:teams]
+    estimated += parts[teams:] if bounds > FEW_BOUNDS else []
+    seconds = sum(_seconds(study, planned, clock) for planned in estimated) / workers
+    if not store:
+        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
+    check_time(what, seconds)
+    held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
     check_workers_memory(what, workers, ends, held)
-    return sum(missing)
+    return missing
 
 
 def _check_policies(study: Study) -> None:
@@ -221,31 +211,31 @@ def _check_policies(study: Study) -> None:
             continue
 
 
-def _missing(study: Study, store: Store | None, team: int) -> tuple[int, int]:
-    """Number of missions of a team that are missing, and that are needed for now."""
+def _folder(study: Study, out: str | Path, accept_code: bool) -> Store | None:
+    """The folder, to count what is missing; None for a new study of too many points to make."""
+    if study.size > MANY_POINTS and not (Path(out) / MANIFEST).exists():
+        return None
+    return Store.peek(study, out, accept_code)
+
+
+def _counted(study: Study, store: Store | None) -> list[Planned]:
+    """What is needed for now, and what of it is present: of every policy, then of the bounds."""
+    of_policy = study.size * study.first
+    names = [*study.policies, *(["upper bounds"] if study.bounds else [])]
     if store is None:
-        return study.size * study.first, study.size * study.first
-    manifest = store.manifest
-    parts = parts_of(manifest, team) + check_parts(manifest, team)
-    missing = store.missing(Chunk(team, tuple(parts)))
-    return missing.missions if missing else 0, sum(len(part.replications) for part in parts)
-
-
-def _missing_bounds(study: Study, store: Store | None) -> int:
-    """Number of upper bounds that are missing and needed for now; all, if there is no folder."""
-    if store is None:
-        return study.size * study.first * study.bounds
-    chunk = store.bounds.missing(Chunk(NO_TEAM, tuple(bound_parts(store.manifest))))
-    return chunk.missions if chunk else 0
-
-
-def _seconds_per_bound(study: Study, clock: Clock) -> float:
-    """The time of an upper bound [s], measured on one."""
-    space = study.point(0).scenario
-    upper_bound(space, TRIAL_SEED, 0, iterations=1)  # compiles
-    begin = clock()
-    upper_bound(space, TRIAL_SEED, 0)
-    return clock() - begin
+        return [Planned(name, of_policy, 0, study.size * study.logged) for name in names]
+    manifest, logged = store.manifest, [study.logged] * study.size
+    plan = []
+    for team, policy in enumerate(study.policies):
+        parts = parts_of(manifest, team) + check_parts(manifest, team)
+        needed, missing = missions_in(parts), missions_in(store.missing("missions", parts))
+        logs = missions_in(store.missing("events", parts_of(manifest, team, logged)))
+        plan.append(Planned(policy, needed, needed - missing, logs))
+    if study.bounds:
+        parts = bound_parts(manifest)
+        missing = missions_in(store.missing("bounds", parts))
+        plan.append(Planned("upper bounds", missions_in(parts), missions_in(parts) - missing))
+    return plan
 
 
 def _budget(study: Study) -> int:
@@ -257,33 +247,28 @@ def _budget(study: Study) -> int:
     return study.precision.budget * study.size
 
 
-def _logs(study: Study, store: Store | None = None) -> int:
-    """Number of event logs that are missing; all, if the folder is not known."""
-    needed = study.logged * study.size * len(study.policies)
-    present = store.logged if store and needed else []
-    return needed - sum(number < cell.first + study.logged for cell, number in present)
+def _seconds(study: Study, planned: Planned, clock: Clock) -> float:
+    """Estimated time [s] on one core of the missing missions and event logs, or of the bounds."""
+    if planned.policy not in study.policies:
+        return planned.missing * _seconds_per_bound(study, clock) if planned.missing else 0.0
+    team = load_team(planned.policy)
 
+    def spaces_of(missions: int) -> list[ScenarioSpace]:
+        """The scenarios of missions that are spread over the design points."""
+        places = [(n * study.size) // missions for n in range(missions)]
+        return [study.point(place).scenario for place in places]
 
-def _all_seconds(study: Study, missing: Sequence[int], logs: int, clock: Clock) -> float:
-    """Estimated time [s] of missing missions of every team, and of event logs, on one core."""
-    each = logs / len(missing)
-    return sum(_seconds(study, team, count, each, clock) for team, count in enumerate(missing))
-
-
-def _seconds(study: Study, team: int, missions: int, logs: float, clock: Clock) -> float:
-    """Estimated time [s] of missions and event logs of a team on one core."""
     return sum(
-        count * _seconds_per_mission(study, team, engine, clock)
-        for engine, count in ((study.engine, missions), ("events", logs))
+        count * seconds_per_mission(spaces_of, team, engine, clock)
+        for engine, count in ((study.engine, planned.missing), ("events", planned.logs))
         if count
     )
 
 
-def _seconds_per_mission(study: Study, team: int, engine: str, clock: Clock) -> float:
-    """The mean time of a mission [s], measured on missions of various design points."""
-
-    def spaces_of(missions: int) -> list[ScenarioSpace]:
-        places = [(n * study.size) // missions for n in range(missions)]
-        return [study.point(place).scenario for place in places]
-
-    return seconds_per_mission(spaces_of, load_team(study.policies[team]), engine, clock)
+def _seconds_per_bound(study: Study, clock: Clock) -> float:
+    """The time of an upper bound [s], measured on one."""
+    space = study.point(0).scenario
+    upper_bound(space, TRIAL_SEED, 0, iterations=1)  # compiles
+    begin = clock()
+    upper_bound(space, TRIAL_SEED, 0)
+    return clock() - begin

@@ -31,10 +31,9 @@ from policies.registry import TypedByUser, load_team
 
 METRICS = (*SHARES, *MEANS)
 
-# Missions whose values are added up together. The sums depend on it, and on nothing else. It is a
-# multiple of the number of missions that are simulated together.
-BLOCK = 2**20
-MEMORY = 2**24  # of the records of missions that are simulated together [bytes]
+# The memory of the records of missions whose values are added up together [bytes]; the last bits of
+# sums depend on it.
+MEMORY = 2**24
 
 
 @dataclass(frozen=True)
@@ -106,8 +105,8 @@ def evaluate(
     team = TypedByUser(team)
     _check(scenario, team, missions, seed, workers)
     pieces = [range(missions)]
-    (all_of_it,) = _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock)
-    return all_of_it
+    (whole,) = _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock)
+    return whole
 
 
 def means(
@@ -122,29 +121,30 @@ def means(
 ) -> Means:
     """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
 
-    Neither the number of workers nor the number of missions that are simulated together changes
-    the result.
-
-    Args:
-        scenario: As for ``evaluate``, as all other arguments.
-        team: The team.
-        missions: Number of missions.
-        seed: Seed of the missions.
-        engine: The engine.
-        workers: Number of threads or processes.
-        progress: Called while the missions are simulated.
-        clock: Returns the time [s].
+    The arguments are those of ``evaluate``. The number of workers does not change the result.
 
     Raises:
         InputError: As for ``evaluate``.
     """
     _check(scenario, team, missions, seed, workers)
-    sums, uav_slots, seconds = _Sums(), 0, 0.0
-    pieces = _pieces_of(missions, _together(scenario))
+    moments: dict[str, Moments] = {}
+    uav_slots, seconds, size = 0, 0.0, _together(scenario)
+    pieces = (range(n, min(n + size, missions)) for n in range(0, missions, size))
     for piece in _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock):
-        sums.add(piece.records)
+        for metric, values in _metrics(piece.records).items():
+            new = Moments.of(values)
+            moments[metric] = moments[metric].with_others(new) if metric in moments else new
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
-    return Means(team, sums.all(), uav_slots, seconds)
+    return Means(team, moments, uav_slots, seconds)
+
+
+def _metrics(records: Records) -> dict[str, np.ndarray]:
+    """The values of every metric that some of the missions have measured."""
+    values = {metric: records.missions[metric] for metric in METRICS}
+    if len(records.operations):
+        measured = {name: records.operations[name] for name in OPERATIONS.names or ()}
+        values |= {name: of[~np.isnan(of)] for name, of in measured.items()}
+    return {metric: of for metric, of in values.items() if len(of)}
 
 
 def check_evaluation(
@@ -206,42 +206,6 @@ def _together(scenario: ScenarioSpace) -> int:
     return 2 ** ((MEMORY // each).bit_length() - 1)
 
 
-def _pieces_of(missions: int, size: int) -> Iterator[range]:
-    for begin in range(0, missions, size):
-        yield range(begin, min(begin + size, missions))
-
-
-class _Sums:
-    """The moments of metrics of missions that come in pieces."""
-
-    def __init__(self) -> None:
-        self._moments: dict[str, Moments] = {}
-        self._waiting: list[dict[str, np.ndarray]] = []  # values of at most BLOCK missions
-        self._missions = 0
-
-    def add(self, records: Records) -> None:
-        """Add missions, of which ``BLOCK`` is a multiple if others follow."""
-        missions, measured = records.missions, records.operations
-        values = {metric: missions[metric].astype(float) for metric in METRICS}
-        names = (OPERATIONS.names or ()) if len(measured) else ()
-        values |= {name: measured[name] for name in names}
-        self._waiting.append(values)
-        self._missions += len(missions)
-        if self._missions % BLOCK == 0:
-            self.all()
-
-    def all(self) -> dict[str, Moments]:
-        """The moments of all missions so far; those that come later form a new block."""
-        for metric in self._waiting[0] if self._waiting else ():
-            found = np.concatenate([values[metric] for values in self._waiting])
-            found = found[~np.isnan(found)]  # nan: not measured
-            if len(found):
-                new, held = Moments.of(found), self._moments.get(metric)
-                self._moments[metric] = held.with_others(new) if held else new
-        self._waiting.clear()
-        return self._moments
-
-
 def _evaluations(
     scenario: ScenarioSpace,
     team: str,
@@ -252,35 +216,32 @@ def _evaluations(
     progress: Progress | None,
     clock: Clock,
 ) -> Iterator[Evaluation]:
-    """An evaluation for each piece of the replications."""
+    """An evaluation for each piece of the replications; only the simulation is timed."""
+    policies, pool = load_team(team), Here(workers)
     if engine == "batch":
-        policies = load_team(team)
         simulate_batch(scenario, policies, seed, 1)  # compiles
-        for piece in pieces:
-            begin = clock()
+    else:
+        first = _jobs(scenario, team, range(1), seed)
+        _results(pool, first * (1 if workers == 1 else 2 * workers))  # starts the processes
+    for piece in pieces:
+        begin = clock()
+        if engine == "batch":
             records = simulate_batch(
                 scenario, policies, seed, piece, workers=workers, progress=progress
             )
-            yield Evaluation(team, records, clock() - begin)
-        return
-    pool, is_warm = Here(workers), False
-    for piece in pieces:
-        jobs = [
-            MissionsJob(chunk, (scenario,) * len(chunk.parts), team, seed, engine)
-            for chunk in split([Part(Cell(0, 0, "", 0), piece)], CHUNK[engine])
-        ]
-        if not is_warm:
-            _results(pool, [next(jobs[0].alone())] * (1 if workers == 1 else 2 * workers))
-            is_warm = True
-        begin = clock()
-        chunks = _results(pool, jobs, progress)
-        seconds = clock() - begin
-        records = Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))
-        yield Evaluation(team, records, seconds)
+        else:
+            records = _results(pool, _jobs(scenario, team, piece, seed), progress)
+        yield Evaluation(team, records, clock() - begin)
 
 
-def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> list[Records]:
-    """The results of all jobs, in the order of the jobs.
+def _jobs(scenario: ScenarioSpace, team: str, replications: range, seed: int) -> list[Job]:
+    """Jobs of the event engine."""
+    chunks = split([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
+    return [MissionsJob(chunk, (scenario,), team, seed, "events") for chunk in chunks]
+
+
+def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> Records:
+    """The records of all jobs, in the order of the jobs.
 
     Raises:
         RuntimeError: If one of them failed.
@@ -289,4 +250,5 @@ def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) 
     for result in done.values():
         if isinstance(result, Problem):
             raise RuntimeError(f"{result.error}\n{result.traceback}")
-    return [done[number] for number in range(len(jobs))]
+    chunks = (done[number] for number in range(len(jobs)))
+    return Records(*(np.concatenate(kind) for kind in zip(*chunks, strict=True)))

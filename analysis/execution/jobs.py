@@ -2,14 +2,16 @@
 
 import errno
 import traceback
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from analysis.bound import Bound, upper_bound
 from analysis.execution.engines import simulate_missions
+from analysis.results import parquet
 from analysis.results.chunks import Chunk, Part
 from analysis.results.manifest import Cell
 from analysis.results.provenance import Member, bound_code, members_of
@@ -26,15 +28,17 @@ _FULL = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG")} -
 
 
 @dataclass(frozen=True)
-class MissionsJob:
-    """A job that simulates the missions of a chunk.
+class Job(ABC):
+    """Work on the missions of a chunk: their records, their event logs or their bounds.
 
     Attributes:
-        chunk: The chunk, which tells the missions and where they are stored.
+        chunk: The chunk, which tells the missions and where the result is stored.
         spaces: The scenario of each part of the chunk.
         policy: The team of the chunk.
         seed: Seed of the missions.
-        engine: ``batch`` or ``events``.
+        engine: ``batch`` or ``events``, for the records.
+        kind: The kind of work, as in ``store.TABLES``.
+        work: What is made in place of records, in words.
     """
 
     chunk: Chunk
@@ -42,143 +46,110 @@ class MissionsJob:
     policy: str
     seed: int
     engine: str
+    kind: ClassVar[str]
+    work: ClassVar[str] = ""
 
     @property
     def missions(self) -> int:
         """The number of missions."""
         return self.chunk.missions
 
-    def run(self, progress: Progress | None = None) -> Records:
-        """Simulate the missions; ``progress`` gets the number of missions since its last call."""
-        team = load_team(self.policy, max(space.uavs[1] for space in self.spaces))
-        rows = [(space, r) for space, r, _ in self._missions()]
-        spaces, replications = [list(column) for column in zip(*rows, strict=True)]
-        return simulate_missions(self.engine, spaces, team, self.seed, replications, progress)
+    @property
+    def each(self) -> list[tuple[ScenarioSpace, Cell, int]]:
+        """The scenario, the cell and the replication of each of the missions."""
+        parts = zip(self.spaces, self.chunk.parts, strict=True)
+        return [(space, part.cell, r) for space, part in parts for r in part.replications]
 
-    def alone(self) -> Iterator["MissionsJob"]:
+    def alone(self) -> Iterator[Self]:
         """A job for each of the missions."""
-        for space, replication, cell in self._missions():
+        for space, cell, replication in self.each:
             part = Part(cell, range(replication, replication + 1))
             yield replace(self, chunk=replace(self.chunk, parts=(part,)), spaces=(space,))
 
-    def _missions(self) -> Iterator[tuple[ScenarioSpace, int, Cell]]:
-        for space, part in zip(self.spaces, self.chunk.parts, strict=True):
-            for replication in part.replications:
-                yield space, replication, part.cell
+    @abstractmethod
+    def run(self, progress: Progress | None = None) -> Any:
+        """Do the work; ``progress`` gets the number of missions done since its last call."""
+
+    @abstractmethod
+    def save(self, store: Store, result: Any) -> None:
+        """Store the result."""
+
+    def warm_up(self) -> None:
+        """Compile what ``run`` needs; nothing by default."""
+        return
+
+    @property
+    def code(self) -> list[Member] | str:
+        """The code, beside that of the engines, on which the result depends."""
+        return members_of(self.policy)
+
+
+class MissionsJob(Job):
+    """A job that simulates the missions of a chunk."""
+
+    kind = "missions"
+
+    def run(self, progress: Progress | None = None) -> Records:
+        """Simulate the missions; ``progress`` gets the number of missions since its last call."""
+        team = load_team(self.policy, max(space.uavs[1] for space in self.spaces))
+        spaces, _, replications = zip(*self.each, strict=True)
+        return simulate_missions(self.engine, spaces, team, self.seed, replications, progress)
 
     def save(self, store: Store, records: Records) -> None:
         """Store the records."""
-        store.write(self.chunk, records)
+        store.keep(self.kind, self.chunk, parquet.tables_of(self.chunk, records))
 
     def warm_up(self) -> None:
         """Compile the engine, with a heuristic, since it is unknown what other policies do."""
         replace(next(self.alone()), policy="random").run()
 
-    @property
-    def code(self) -> list[Member]:
-        """The code, beside that of the engines, on which the result depends."""
-        return members_of(self.policy)
 
+class LogJob(Job):
+    """A job that simulates one mission for its event log; another job stores its record."""
 
-@dataclass(frozen=True)
-class LogJob:
-    """A job that simulates one mission for its event log.
-
-    Attributes:
-        chunk: The mission; another job stores its record.
-        space: The scenario of the mission.
-        policy: The team.
-        seed: The seed.
-    """
-
-    chunk: Chunk
-    space: ScenarioSpace
-    policy: str
-    seed: int
-    missions = 1
-
-    @property
-    def mission(self) -> Part:
-        """The only part of the chunk."""
-        return self.chunk.parts[0]
+    kind, work = "events", "event logs"
 
     def run(self, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """Simulate the mission with the SimPy engine."""
-        team = load_team(self.policy, self.space.uavs[1])
-        replication = self.mission.replications[0]
-        log = simulate(self.space, team, self.seed, replication, events=True).events
+        ((space, _, replication),) = self.each
+        team = load_team(self.policy, space.uavs[1])
+        log = simulate(space, team, self.seed, replication, events=True).events
         assert log is not None
         return log.columns()
 
-    def alone(self) -> Iterator["LogJob"]:
-        """The job itself, since it has one mission."""
-        yield self
-
     def save(self, store: Store, columns: dict[str, np.ndarray]) -> None:
         """Store the event log."""
-        store.write_log(self.mission.cell, self.mission.replications[0], columns)
-
-    def warm_up(self) -> None:
-        """Do nothing, since the log of a single mission is soon made."""
-
-    @property
-    def code(self) -> list[Member]:
-        """The code, beside that of the engines, on which the result depends."""
-        return members_of(self.policy)
+        ((_, cell, replication),) = self.each
+        store.keep_log(cell, replication, columns)
 
 
-@dataclass(frozen=True)
-class BoundsJob:
-    """A job that computes the upper bounds of missions, which hold for every policy.
+class BoundsJob(Job):
+    """A job that computes the upper bounds of missions, which hold for every policy."""
 
-    Attributes:
-        chunk: The missions.
-        spaces: The scenario of each part of the chunk.
-        seed: Seed of the missions.
-    """
-
-    chunk: Chunk
-    spaces: tuple[ScenarioSpace, ...]
-    seed: int
-    policy = "the upper bound"
-
-    @property
-    def missions(self) -> int:
-        """The number of missions."""
-        return self.chunk.missions
+    kind = work = "bounds"
 
     def run(self, progress: Progress | None = None) -> list[Bound]:
         """Compute the bounds; ``progress`` gets the number of bounds since its last call."""
         bounds = []
-        for space, part in zip(self.spaces, self.chunk.parts, strict=True):
-            for replication in part.replications:
-                bounds.append(upper_bound(space, self.seed, replication))
-                if progress:
-                    progress(1)
+        for space, _, replication in self.each:
+            bounds.append(upper_bound(space, self.seed, replication))
+            if progress:
+                progress(1)
         return bounds
-
-    def alone(self) -> Iterator["BoundsJob"]:
-        """A job for each of the missions."""
-        for space, part in zip(self.spaces, self.chunk.parts, strict=True):
-            for number in part.replications:
-                alone = Part(part.cell, range(number, number + 1))
-                yield BoundsJob(Chunk(self.chunk.team, (alone,)), (space,), self.seed)
 
     def save(self, store: Store, bounds: list[Bound]) -> None:
         """Store the bounds."""
-        store.bounds.write(self.chunk, bounds)
+        store.keep(self.kind, self.chunk, [parquet.table_of_bounds(self.chunk, bounds)])
 
     def warm_up(self) -> None:
         """Compile the bound."""
-        upper_bound(self.spaces[0], self.seed, self.chunk.parts[0].replications[0], iterations=1)
+        space, _, replication = self.each[0]
+        upper_bound(space, self.seed, replication, iterations=1)
 
     @property
     def code(self) -> str:
         """The code, beside that of the engines, on which the result depends."""
         return bound_code()
-
-
-Job = MissionsJob | LogJob | BoundsJob
 
 
 @dataclass(frozen=True)
@@ -220,7 +191,20 @@ def attempt(job: Job, progress: Progress | None = None) -> Any:
         if isinstance(error, OSError) and error.errno in _FULL:
             line = f"{job.policy}: {error.strerror}; allowed: a disk with room for compiled code"
             raise InputError(line) from None
-        return Problem.of(error, _culprit(job))
+        return Problem.of(error, first_failing(job, _fails))
+
+
+def first_failing(job: Job, fails: Callable[[Job], bool]) -> Part | None:
+    """The first mission of a job that also fails when it is simulated alone."""
+    return next((single.chunk.parts[0] for single in job.alone() if fails(single)), None)
+
+
+def _fails(job: Job) -> bool:
+    try:
+        job.run()
+    except Exception:
+        return True
+    return False
 
 
 def was_interrupted(error: BaseException | None) -> bool:
@@ -230,13 +214,3 @@ def was_interrupted(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-def _culprit(job: Job) -> Part | None:
-    """The first mission of a job that fails when it is simulated alone."""
-    for single in job.alone():
-        try:
-            single.run()
-        except Exception:
-            return single.chunk.parts[0]
-    return None

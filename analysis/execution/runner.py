@@ -7,7 +7,7 @@ rounds. What a round needs depends only on the missions of the rounds before.
 
 import shlex
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,28 +15,34 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from analysis.execution.cluster import Cluster
 from analysis.execution.effort import check_workers
 from analysis.execution.engines import CHUNK
 from analysis.execution.jobs import BoundsJob, Job, LogJob, MissionsJob, Problem, Progress
-from analysis.execution.reuse import sources
 from analysis.execution.workers import Here, Pool
 from analysis.results import commands
-from analysis.results.chunks import Chunk, Failure, Part, check_parts, gaps, parts_of, split
-from analysis.results.manifest import Cell, Selected
-from analysis.results.store import Store
+from analysis.results.chunks import (
+    Chunk,
+    Part,
+    Present,
+    bound_parts,
+    check_parts,
+    gaps,
+    missions_in,
+    parts_of,
+    split,
+)
+from analysis.results.manifest import Selected
+from analysis.results.store import Failure, Store, sources
 from analysis.results.tables import Results, results_of
-from analysis.study.cheapest import Cheapest
+from analysis.study.cheapest import Setting
+from analysis.study.stopping import Samples
 from analysis.study.study import Study, load_study
 from dess import InputError
 from policies.registry import load_team
 
 # Bounds of a chunk: few, since each takes seconds.
 BOUNDS_CHUNK = 5
-
-Counts = list[list[int]]  # missions of every team and design point
 
 
 class Round(NamedTuple):
@@ -129,80 +135,79 @@ class _Run:
         Raises:
             ChunkError: If a chunk could not be computed, after the other chunks of the round.
         """
-        teams, points = range(len(self.study.policies)), range(len(self.study.points))
-        before: Counts = [[0 for _ in points] for _ in teams]
-        wanted: Counts = [[self.study.first for _ in points] for _ in teams]
-        logs = self._log_jobs()
+        manifest, teams = self.store.manifest, range(len(self.study.policies))
+        points = len(self.study.points)
+        before, wanted = [[0] * points for _ in teams], [[self.study.first] * points for _ in teams]
+        logs = [parts_of(manifest, team, [self.study.logged] * points) for team in teams]
+        asked: Present = defaultdict(list)
         while wanted != before:
-            self._round(new_parts(self.store.manifest.cells, before, wanted), logs)
+            parts = new_parts((parts_of(manifest, team, wanted[team]) for team in teams), asked)
+            self._round(parts, new_parts(logs, defaultdict(list)))
             before, logs = wanted, []
             wanted = [self._more(team, wanted[team]) for team in teams]
         selected = [self._select(team, wanted[team]) for team in teams]
-        manifest = self.store.manifest.model_copy(update={"selected": selected})
-        checks = [part for team in teams for part in check_parts(manifest, team)]
-        if any(part.replications for part in checks):
-            self._round(checks, [])
-        if self.study.bounds:
-            self._bounds([max(counts) for counts in zip(*wanted, strict=True)])
+        chosen = manifest.model_copy(update={"selected": selected})
+        self._round([part for team in teams for part in check_parts(chosen, team)])
+        self._make((BoundsJob, new_parts([bound_parts(manifest, wanted)], asked)))
         self.store.finish(wanted, selected)
 
     def _more(self, team: int, counts: list[int]) -> list[int]:
         """How many missions the rule needs at each point of a team, given those present."""
         rule = self.study.rule
-        if isinstance(rule, Cheapest):
-            return rule.wanted(self._samples(team, counts), self.store.manifest.settings)
-        return rule.wanted(self._samples(team, counts)) if rule else counts
+        return rule.wanted(*self._samples(team, counts)) if rule else counts
 
     def _select(self, team: int, counts: list[int]) -> Selected:
         """What is selected for a team; None if the study selects nothing."""
         rule = self.study.selection
-        if isinstance(rule, Cheapest):
-            return rule.choice(self._samples(team, counts), self.store.manifest.settings).selected
-        return rule.choice(self._samples(team, counts)).best if rule else None
+        return rule.choice(*self._samples(team, counts)).selected if rule else None
 
-    def _samples(self, team: int, counts: list[int]) -> list[dict[str, np.ndarray]]:
-        return self.store.samples(parts_of(self.store.manifest, team, counts))
+    def _samples(self, team: int, counts: list[int]) -> tuple[Samples, Sequence[Setting]]:
+        """The missions and the settings of all design points, by which a rule decides."""
+        manifest = self.store.manifest
+        return self.store.samples(parts_of(manifest, team, counts)), manifest.settings
 
-    def _round(self, parts: Sequence[Part], logs: Sequence[Job]) -> None:
-        """Simulate the missing missions of a round with these parts, then make the event logs.
+    def _round(self, parts: Sequence[Part], logs: Sequence[Part] = ()) -> None:
+        """Simulate the missing missions of a round with these parts, then make the event logs."""
+        if self.reuse and self.store.missing("missions", parts):
+            for source in self._sources:
+                self.store.take_over(source, parts)
+        self._make((MissionsJob, parts), (LogJob, logs))
+
+    @cached_property
+    def _sources(self) -> list[Store]:
+        return sources(self.reuse, self.store.manifest)
+
+    def _make(self, *works: tuple[type[Job], Sequence[Part]]) -> None:
+        """One kind of work after the other: find what is missing of its parts, run and store it.
 
         Raises:
             ChunkError: If some could not be computed, after all others.
         """
-        self._take_over(parts)
-        jobs, present = [], 0
-        for chunk in self._chunks(parts):
-            missing = self.store.missing(chunk)
-            present += chunk.missions - (missing.missions if missing else 0)
-            if missing:
-                jobs.append(self._missions_job(missing))
-        self._begin(missions_in(parts), present)
-        failures = self._do(jobs)
-        if logs:
-            self._begin(len(logs), 0, "event logs")
-            failures |= self._do(logs)
+        failures: dict[Path, Failure] = {}
+        for kind, parts in works:
+            if needed := missions_in(parts):
+                jobs = [*self._jobs(kind, parts)]
+                self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
+                failures |= self._do(jobs)
         if failures:
             raise ChunkError(failures)
 
-    def _chunks(self, parts: Sequence[Part]) -> Iterator[Chunk]:
-        """The parts, in the order of their teams, as chunks of the size that suits the team."""
+    def _jobs(self, kind: type[Job], parts: Sequence[Part]) -> Iterator[Job]:
+        """The jobs for what is missing of some parts, cut as if nothing were present."""
+        study = self.study
         for team, of_team in groupby(parts, lambda part: part.cell.team):
-            policies = load_team(self.study.policies[team])
-            own = (policy.chunk for policy in policies if hasattr(policy, "chunk"))
-            yield from split(of_team, min([CHUNK[self.study.engine], *own]))
+            policy = "the upper bound" if kind is BoundsJob else study.policies[team]
+            for chunk in split(of_team, self._size(kind, policy)):
+                if missing := tuple(self.store.missing(kind.kind, chunk.parts)):
+                    spaces = tuple(study.points[part.cell.point].scenario for part in missing)
+                    yield kind(Chunk(team, missing), spaces, policy, study.seed, study.engine)
 
-    def _bounds(self, counts: list[int]) -> None:
-        """Compute the missing bounds of as many missions of every design point."""
-        cells = self.store.manifest.bound_cells
-        parts, jobs = new_parts([cells], [[0] * len(cells)], [counts]), []
-        for chunk in filter(None, map(self.store.bounds.missing, split(parts, BOUNDS_CHUNK))):
-            spaces = (self.study.points[part.cell.point].scenario for part in chunk.parts)
-            jobs.append(BoundsJob(chunk, tuple(spaces), self.study.seed))
-        missing = sum(job.missions for job in jobs)
-        count = missions_in(parts)
-        self._begin(count, count - missing, "bounds")
-        if failures := self._do(jobs):
-            raise ChunkError(failures)
+    def _size(self, kind: type[Job], policy: str) -> int:
+        """The number of missions of a chunk."""
+        if kind is not MissionsJob:
+            return BOUNDS_CHUNK if kind is BoundsJob else 1
+        own = (member.chunk for member in load_team(policy) if hasattr(member, "chunk"))
+        return min([CHUNK[self.study.engine], *own])
 
     def _begin(self, count: int, present: int, work: str = "") -> None:
         """Tell that a round begins, of how many missions, and how many of them are present."""
@@ -212,39 +217,6 @@ class _Run:
         self.rounds += not work
         if self.progress:
             self.progress(present)
-
-    def _take_over(self, parts: Sequence[Part]) -> None:
-        """Copy missing missions of the parts from the other folders, as far as they have them."""
-        if self.reuse and any(map(self.store.missing, self._chunks(parts))):
-            for source in self._sources:
-                self.store.take_over(source, parts)
-
-    @cached_property
-    def _sources(self) -> list[Store]:
-        return sources(self.reuse, self.store.manifest)
-
-    def _log_jobs(self) -> list[Job]:
-        """The jobs for missions whose event logs are needed and missing."""
-        return [
-            LogJob(
-                Chunk(cell.team, (Part(cell, range(replication, replication + 1)),)),
-                self.study.points[cell.point].scenario,
-                self.study.policies[cell.team],
-                self.study.seed,
-            )
-            for cells in self.store.manifest.cells
-            for cell in cells
-            for replication in self.store.missing_logs(cell, self.study.logged)
-        ]
-
-    def _missions_job(self, chunk: Chunk) -> MissionsJob:
-        return MissionsJob(
-            chunk,
-            tuple(self.study.points[part.cell.point].scenario for part in chunk.parts),
-            self.study.policies[chunk.team],
-            self.study.seed,
-            self.study.engine,
-        )
 
     def _do(self, jobs: Sequence[Job]) -> dict[Path, Failure]:
         """Run the jobs and store their results; what could not be computed."""
@@ -277,19 +249,17 @@ class _Run:
         return Failure(job.policy, job.missions, problem.error, command, problem.traceback)
 
 
-def missions_in(parts: Sequence[Part]) -> int:
-    """The number of missions in some parts."""
-    return sum(len(part.replications) for part in parts)
+def new_parts(wanted: Iterable[Iterable[Part]], asked: Present) -> list[Part]:
+    """The missions that are needed in addition to those asked for before, each once, in order.
 
-
-def new_parts(all_cells: Sequence[Sequence[Cell]], before: Counts, wanted: Counts) -> list[Part]:
-    """The missions that are needed in addition to earlier ones, each once, in the study's order."""
-    parts: list[Part] = []
-    asked: dict[tuple[int, str], list[range]] = defaultdict(list)  # points may share a cell
-    for cells, begins, ends in zip(all_cells, before, wanted, strict=True):
-        for cell, begin, end in zip(cells, begins, ends, strict=True):
-            earlier = asked[cell.team, cell.key]
-            new = gaps(range(cell.first + begin, cell.first + end), earlier)
-            parts += [Part(cell, gap) for gap in new]
-            earlier += new
+    Args:
+        wanted: For each team, the parts that it needs.
+        asked: The missions asked for before; points may share a cell. The new ones are added.
+    """
+    parts = []
+    for part in (part for of_team in wanted for part in of_team):
+        earlier = asked[part.cell.key]
+        new = gaps(part.replications, earlier)
+        parts += [Part(part.cell, gap) for gap in new]
+        earlier += new
     return parts

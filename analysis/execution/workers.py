@@ -8,13 +8,12 @@ import os
 import signal
 import warnings
 from abc import abstractmethod
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from analysis.execution.jobs import Job, Problem, Progress, attempt
+from analysis.execution.jobs import Job, Problem, Progress, attempt, first_failing
 from analysis.execution.orphans import live_and_die_with
-from analysis.results.chunks import Part
 
 Finished = Generator[tuple[int, Any], None, None]  # numbers and results of jobs
 
@@ -22,26 +21,46 @@ DEATHS = 2  # a job is given up after this many deaths of workers that ran only 
 
 
 class Pool(AbstractContextManager["Pool"]):
-    """A pool that runs jobs, to be used in a ``with`` block."""
+    """A pool that runs jobs, to be used in a ``with`` block.
 
-    @abstractmethod
+    Attributes:
+        attempts: How often a job is run alone before it is given up because its workers die.
+    """
+
+    attempts = DEATHS
+
     def run(self, jobs: Sequence[Job], progress: Progress | None = None) -> Finished:
         """Run the jobs; yield their numbers and results as they come in."""
+        waiting = dict(enumerate(jobs))
+        while waiting:
+            suspects: set[int] = set()
+            for number, result in self._finished(waiting, suspects):
+                yield number, reported(waiting.pop(number), result, progress)
+            # Workers died, and one of these jobs caused it.
+            for number in sorted(suspects & waiting.keys()):
+                yield number, reported(waiting[number], self._alone(waiting.pop(number)), progress)
 
     @abstractmethod
+    def _finished(self, jobs: Mapping[int, Job], suspects: set[int]) -> Iterator[tuple[int, Any]]:
+        """Results by job number as they come in, until a worker dies.
+
+        Args:
+            jobs: The jobs by their numbers.
+            suspects: Gets the numbers of those that may have killed the worker.
+        """
+
+    def _alone(self, job: Job) -> Any:
+        """The result of a job that may have killed its worker, while no other job is running."""
+        for _ in range(self.attempts):
+            if (result := self._once(job)) is not None:
+                return result
+        line = "its workers died: killed, out of memory, or crashed"
+        deadly = first_failing(job, lambda single: self._once(single) is None)
+        return Problem(line, mission=deadly)
+
     def _once(self, job: Job) -> Any:
         """The result of a job; None if its worker dies."""
-
-    def _given_up(self, job: Job) -> Problem:
-        """The problem of a job whose workers died, while no other job is running."""
-        line = "its workers died: killed, out of memory, or crashed"
-        return Problem(line, mission=self._deadly(job))
-
-    def _deadly(self, job: Job) -> Part | None:
-        """The first mission of a job that kills its worker when it is simulated alone."""
-        singles = (single for single in job.alone() if self._once(single) is None)
-        single = next(singles, None)
-        return single.chunk.parts[0] if single else None
+        return next((result for _, result in [*self._finished({0: job}, set())]), None)
 
 
 class Here(Pool):
@@ -59,29 +78,11 @@ class Here(Pool):
             for number, job in enumerate(jobs):
                 yield number, _in_turn(job, progress)
             return
-        _compile(jobs)
-        waiting = dict(enumerate(jobs))
-        while waiting:
-            started: set[int] = set()
-            for number, result in self._finished(waiting, started):
-                yield number, reported(waiting.pop(number), result, progress)
-            # A worker died, and one of the jobs that were running caused it.
-            for number in sorted(started & waiting.keys()):
-                yield number, reported(waiting[number], self._alone(waiting.pop(number)), progress)
+        for job in {type(job): job for job in jobs}.values():
+            job.warm_up()  # compiles once in this process, so that the workers only load it
+        yield from super().run(jobs, progress)
 
-    def _alone(self, job: Job) -> Any:
-        """Run a job that may have killed its worker, while no other job is running."""
-        for _ in range(DEATHS):
-            if (result := self._once(job)) is not None:
-                return result
-        return self._given_up(job)
-
-    def _once(self, job: Job) -> Any:
-        results = [result for _, result in self._finished({0: job}, set())]
-        return results[0] if results else None
-
-    def _finished(self, jobs: dict[int, Job], started: set[int]) -> Iterator[tuple[int, Any]]:
-        """Results by job number as they come in, until a worker dies; ``started`` is updated."""
+    def _finished(self, jobs: Mapping[int, Job], suspects: set[int]) -> Iterator[tuple[int, Any]]:
         from joblib import Parallel, delayed
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
@@ -95,7 +96,7 @@ class Here(Pool):
 
         def tasks() -> Iterator[Any]:
             for number, job in [*jobs.items()]:
-                started.add(number)
+                suspects.add(number)  # from now on it may be running
                 yield delayed(_numbered)(number, job)
 
         try:
@@ -175,12 +176,6 @@ def reported(job: Job, result: Any, progress: Progress | None) -> Any:
     if progress:
         progress(job.missions)
     return result
-
-
-def _compile(jobs: Sequence[Job]) -> None:
-    """Compile what the jobs need once in this process, so that the workers only load it."""
-    for job in {type(job): job for job in jobs}.values():
-        job.warm_up()
 
 
 def _numbered(number: int, job: Job) -> tuple[int, Any]:

@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 from analysis import numbers
 from analysis.questions.head_to_head import Pair
 from analysis.questions.missions import FOLDER
-from analysis.results.documents import Count, Finite
+from analysis.results.provenance import Count, Finite
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from dess import InputError, simulate

@@ -1,10 +1,12 @@
-"""Chunks: missions that are computed and stored together, and how studies are split into them.
+"""Units of work: replications of cells that are computed and stored together, as one chunk.
 
-``rows_of`` puts the rows of their tables into the order of the parts of a study.
+A part is a team at a design point with a range of replications. A chunk is some parts of one team;
+the name of its file is a hash of them. Missions, event logs and bounds are asked for as parts.
 """
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
@@ -16,6 +18,8 @@ import pyarrow as pa
 from analysis.results.manifest import Cell, Manifest
 from analysis.study.study import CHECK
 from dess import InputError
+
+Present = defaultdict[str, list[range]]  # replications by the key of their cell
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Chunk:
     @property
     def missions(self) -> int:
         """The number of missions in the chunk."""
-        return sum(len(part.replications) for part in self.parts)
+        return missions_in(self.parts)
 
     @property
     def rows(self) -> list[tuple[str, int, int]]:
@@ -49,38 +53,30 @@ class Chunk:
         return name_of(self.rows)
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A chunk that could not be computed.
-
-    Attributes:
-        policy: The team.
-        missions: Number of missions that are missing because of it.
-        error: What went wrong, in one line.
-        command: A command that reproduces the error.
-        traceback: Where it went wrong.
-    """
-
-    policy: str
-    missions: int
-    error: str
-    command: str
-    traceback: str
+def missions_in(parts: Iterable[Part]) -> int:
+    """The number of missions in some parts."""
+    return sum(len(part.replications) for part in parts)
 
 
 def parts_of(manifest: Manifest, team: int, counts: Sequence[int] | None = None) -> list[Part]:
     """The first missions of every cell of a team: ``counts`` of them, or as the manifest says."""
-    cells, counts = manifest.cells[team], counts or manifest.missions[team]
+    return _first(manifest.cells[team], counts or manifest.missions[team])
+
+
+def bound_parts(manifest: Manifest, counts: Sequence[Sequence[int]] | None = None) -> list[Part]:
+    """The missions that need bounds: at every design point those of any team; none without them.
+
+    Args:
+        manifest: What the folder is about.
+        counts: The missions of every team and design point; by default as the manifest says.
+    """
+    if not manifest.bound_cells:
+        return []
+    return _first(manifest.bound_cells, np.max(counts or manifest.missions, axis=0).tolist())
+
+
+def _first(cells: Sequence[Cell], counts: Sequence[int]) -> list[Part]:
     return [Part(c, range(c.first, c.first + n)) for c, n in zip(cells, counts, strict=True)]
-
-
-def bound_parts(manifest: Manifest) -> list[Part]:
-    """The missions that need bounds: at every design point those of any team; none without them."""
-    counts = [max(of_point) for of_point in zip(*manifest.missions, strict=True)]
-    return [
-        Part(cell, range(cell.first, cell.first + counts[cell.point]))
-        for cell in manifest.bound_cells
-    ]
 
 
 def check_parts(manifest: Manifest, team: int) -> list[Part]:
@@ -94,13 +90,10 @@ def check_parts(manifest: Manifest, team: int) -> list[Part]:
 
 
 def split(parts: Iterable[Part], size: int) -> Iterator[Chunk]:
-    """Split parts, in their order, into chunks of ``size`` missions; a chunk has one team."""
+    """Split the parts of one team, in their order, into chunks of ``size`` missions."""
     waiting: list[Part] = []
     room = size
     for part in parts:
-        if waiting and waiting[0].cell.team != part.cell.team:
-            yield Chunk(waiting[0].cell.team, tuple(waiting))
-            waiting, room = [], size
         rest = part.replications
         while len(rest):
             waiting.append(Part(part.cell, rest[:room]))
@@ -124,19 +117,9 @@ def gaps(wanted: range, present: list[range]) -> list[range]:
     return [gap for gap in [*missing, range(begin, wanted.stop)] if len(gap)]
 
 
-def absent(chunk: Chunk, present: Mapping[tuple[int, str], list[range]]) -> Chunk | None:
-    """The part of a chunk that is not present; None if all of it is.
-
-    Args:
-        chunk: The chunk.
-        present: The replications that are present, by the team and the key of their cell.
-    """
-    parts = tuple(
-        Part(part.cell, gap)
-        for part in chunk.parts
-        for gap in gaps(part.replications, present.get((chunk.team, part.cell.key), []))
-    )
-    return Chunk(chunk.team, parts) if parts else None
+def absent(parts: Iterable[Part], present: Present) -> list[Part]:
+    """What of some parts is not present."""
+    return [Part(p.cell, gap) for p in parts for gap in gaps(p.replications, present[p.cell.key])]
 
 
 def name_of(rows: Sequence[Sequence[Any]]) -> str:
@@ -150,30 +133,26 @@ def short_hash(content: bytes) -> str:
 
 
 def rows_of(parts: Sequence[Part], tables: Sequence[pa.Table]) -> pd.DataFrame:
-    """The rows of the missions of the parts, with the ``point`` of each.
+    """The rows of the missions of the parts, with the ``point`` and ``cell`` of each.
 
     Args:
-        parts: Parts of one team; the tables must contain all of them.
+        parts: The parts; the tables must contain all of them.
         tables: Tables with the columns ``cell`` and ``replication``.
 
     Raises:
         InputError: If two tables have different rows for the same mission.
     """
-    stacked = _stacked(tables)
-    rows = _wanted(parts).merge(stacked, on=["cell", "replication"], how="left")
-    return rows[["point", *(name for name in stacked if name != "cell")]]
-
-
-def _wanted(parts: Sequence[Part]) -> pd.DataFrame:
-    """A table with the design point, cell and replication of every mission of the parts."""
     lengths = [len(part.replications) for part in parts]
-    return pd.DataFrame(
+    wanted = pd.DataFrame(
         {
             "point": np.repeat([part.cell.point for part in parts], lengths),
             "cell": np.repeat([part.cell.key for part in parts], lengths),
             "replication": np.concatenate([part.replications for part in parts]),
         }
     )
+    stacked = _stacked(tables)
+    rows = wanted.merge(stacked, on=["cell", "replication"], how="left")
+    return rows[["point", *stacked]]
 
 
 def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
@@ -181,9 +160,13 @@ def _stacked(tables: Sequence[pa.Table]) -> pd.DataFrame:
     frame = pa.concat_tables(tables, promote_options="default").to_pandas().astype({"cell": str})
     one = [name for name in ("cell", "replication", "uav") if name in frame]
     if frame.duplicated(one).any():  # such as after files of two folders were merged
-        frame = frame.drop_duplicates()
+        frame = frame[~frame.map(_hashable).duplicated()]
         if frame.duplicated(one).any():
             raise InputError(
                 "results: two files have different records of a mission; allowed: one of them"
             )
     return frame
+
+
+def _hashable(value: Any) -> Any:
+    return value.tobytes() if isinstance(value, np.ndarray) else value

@@ -14,8 +14,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, model_validator
 
-from analysis.results.documents import Count, Finite, Key, Replication
-from analysis.results.provenance import Origin
+from analysis.results.provenance import Count, Finite, Key, Origin, Replication
 from analysis.results.resimulate import recorded
 from analysis.results.tables import Results
 from analysis.study.stopping import Text

@@ -9,9 +9,9 @@ from typing import Annotated, Any, NamedTuple, Self
 from pydantic import Field, model_validator
 
 import dess
-from analysis.results.documents import Hash
 from analysis.results.provenance import (
     Acceptance,
+    Hash,
     Origin,
     bound_code,
     code_behind,
@@ -229,12 +229,11 @@ class Manifest(Origin):
 
     @cached_property
     def settings(self) -> list[Setting]:
-        """The design points of a study with prices, for the search for the cheapest setting."""
-        assert self.costs is not None
-        return [
-            Setting.of(values, space, self.costs)
-            for values, space in zip(self.values, self.scenarios, strict=True)
-        ]
+        """The design points, for the search for the cheapest setting; none without prices."""
+        if not self.costs:
+            return []
+        points = zip(self.values, self.scenarios, strict=True)
+        return [Setting.of(values, space, self.costs) for values, space in points]
 
     @cached_property
     def values(self) -> list[dict[str, Any]]:

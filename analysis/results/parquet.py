@@ -8,23 +8,23 @@ bytes, by which a damaged file is noticed.
 import json
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import Field, TypeAdapter
 
+from analysis.bound import Bound
 from analysis.results.chunks import Chunk, name_of, short_hash
-from analysis.results.documents import Key, Replication
+from analysis.results.provenance import Key, Replication
 from dess import InputError
 from dess.files.reading import paths_in, read_bytes
 from dess.files.tables import LIMIT, check_size, parquet_of
 from dess.files.writing import write_file
-from dess.record import EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
+from dess.record import EVENT_COLUMNS, EVENT_NAMES, MISSION_RECORD, OPERATIONS, UAV_RECORD, Records
 from dess.scenario import MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS
 from dess.state import END_NAMES
 from dess.streams import MAX_REPLICATION
@@ -34,6 +34,7 @@ PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in 
 KEY = pa.dictionary(pa.int32(), pa.string())
 Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
+MEASURED = OPERATIONS.names or ()  # nan where a mission lacks it
 # The columns of words, and the words.
 WORDS = {"end": END_NAMES, "event": EVENT_NAMES}
 
@@ -51,22 +52,44 @@ UAVS = pa.schema(
     [("cell", KEY), ("replication", pa.int64()), ("uav", pa.int64()), *_columns(UAV_RECORD)]
 )
 UAVS = UAVS.set(UAVS.get_field_index("end"), pa.field("end", pa.string()))
-EVENTS = pa.schema(
+# ``prices`` has a value for every cut and node, the nodes of the first cut first.
+BOUNDS = pa.schema(
     [
-        ("time", pa.float64()),
-        ("event", pa.string()),
-        ("uav", pa.int64()),
-        ("node", pa.int64()),
-        *((name, pa.float64()) for name in ("value", "x", "y")),
-        ("battery", pa.int64()),
-        ("other", pa.int64()),
-        ("snr", pa.float64()),
-        ("packet", pa.int64()),
-        ("generated", pa.float64()),
+        ("cell", KEY),
+        ("replication", pa.int64()),
+        ("ratio", pa.float64()),
+        ("iterations", pa.int64()),
+        ("cuts", pa.list_(pa.int64())),
+        ("prices", pa.list_(pa.float64())),
     ]
 )
-# Event logs of before had the first columns only.
-FORMER_EVENTS = pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])
+EVENTS = pa.schema(
+    (name, pa.string() if kind is object else pa.from_numpy_dtype(kind))
+    for name, kind in EVENT_COLUMNS.items()
+)
+# The schemas that files may have; event logs of before had the first columns only.
+SCHEMAS = {
+    "missions": [MISSIONS, EXTENDED_MISSIONS],
+    "uavs": [UAVS],
+    "bounds": [BOUNDS],
+    "events": [EVENTS, pa.schema([EVENTS.field(name) for name in EVENTS.names[:7]])],
+}
+# The least and the largest value of columns; both ends are numbers, so that no value is nan or inf.
+_MOST = float(np.finfo(float).max)
+_REWARD = {"reward": (-_MOST, _MOST)}
+_NUMBERS = [name for name in (*EXTENDED_MISSIONS.names, *UAVS.names) if name not in ("cell", "end")]
+RECORD_LIMITS = dict.fromkeys(_NUMBERS, (0, _MOST)) | _REWARD
+BOUND_LIMITS = {"ratio": (0, 1), "iterations": (0, _MOST)}
+EVENT_LIMITS = {
+    "time": (0, MOST_SLOTS),
+    "uav": (-1, MOST_UAVS - 1),
+    "node": (-1, MOST_NODES - 1),
+    "value": (-_MOST, _MOST),
+    "x": (-1, MOST_CELLS),
+    "y": (-1, MOST_CELLS),
+    "battery": (-1, 100),
+    "other": (-1, MOST_UAVS - 1),
+}
 
 
 class Tables(NamedTuple):
@@ -78,8 +101,7 @@ class Tables(NamedTuple):
 
 def tables_of(chunk: Chunk, records: Records) -> Tables:
     """The records of the missions of a chunk as tables, with their parts as metadata."""
-    keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
-    cells = np.repeat(keys, lengths)
+    cells = _cells(chunk)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     if len(records.operations):
         missions |= {n: records.operations[n] for n in OPERATIONS.names or ()}
@@ -92,32 +114,37 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
     }
     uavs |= {name: records.uavs[name][present] for name in UAV_RECORD.names or ()}
     uavs["end"] = np.array(END_NAMES)[uavs["end"]]
-    return Tables(_missions_table(missions, chunk), _table(uavs, UAVS, chunk))
+    return tables_with(chunk, missions, uavs)
 
 
-def tables_with(chunk: Chunk, missions: pd.DataFrame, uavs: pd.DataFrame) -> Tables:
-    """The tables of a chunk from the rows of its missions, as ``rows_of`` returns them."""
-    keys = {part.cell.point: part.cell.key for part in chunk.parts}
-
-    def columns_of(rows: pd.DataFrame) -> dict[str, np.ndarray]:
-        columns = {str(name): rows[name].to_numpy() for name in rows if name != "point"}
-        return columns | {"cell": rows["point"].map(keys).to_numpy()}
-
-    return Tables(
-        _missions_table(columns_of(missions), chunk), _table(columns_of(uavs), UAVS, chunk)
-    )
+def tables_with(chunk: Chunk, missions: Mapping[str, Any], uavs: Mapping[str, Any]) -> Tables:
+    """The tables of a chunk from their columns, such as those of ``rows_of``."""
+    is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
+    schema = EXTENDED_MISSIONS if is_extended else MISSIONS
+    return Tables(_table(missions, schema, chunk), _table(uavs, UAVS, chunk))
 
 
-def _missions_table(columns: dict[str, np.ndarray], chunk: Chunk) -> pa.Table:
-    """The table of the missions of a chunk: an extended one, if anything beyond was measured."""
-    names = [name for name in OPERATIONS.names or () if name in columns]
-    if any(not np.isnan(columns[name]).all() for name in names):
-        return _table(columns, EXTENDED_MISSIONS, chunk)
-    return _table({n: v for n, v in columns.items() if n not in names}, MISSIONS, chunk)
+def table_of_bounds(chunk: Chunk, bounds: Sequence[Bound]) -> pa.Table:
+    """The bounds of the missions of a chunk as a table, with their parts as metadata."""
+    columns = {
+        "cell": _cells(chunk),
+        "replication": np.concatenate([part.replications for part in chunk.parts]),
+        "ratio": [bound.ratio for bound in bounds],
+        "iterations": [bound.iterations for bound in bounds],
+        "cuts": [bound.cuts.tolist() for bound in bounds],
+        "prices": [bound.prices.ravel().tolist() for bound in bounds],
+    }
+    return _table(columns, BOUNDS, chunk)
 
 
-def _table(columns: dict[str, np.ndarray], schema: pa.Schema, chunk: Chunk) -> pa.Table:
-    arrays = {name: pa.array(np.ascontiguousarray(values)) for name, values in columns.items()}
+def _cells(chunk: Chunk) -> np.ndarray:
+    """The key of the cell of every mission."""
+    keys, lengths = zip(*((p.cell.key, len(p.replications)) for p in chunk.parts), strict=True)
+    return np.repeat(keys, lengths)
+
+
+def _table(columns: Mapping[str, Any], schema: pa.Schema, chunk: Chunk) -> pa.Table:
+    arrays = {name: pa.array(columns[name]) for name in schema.names}
     arrays["cell"] = arrays["cell"].dictionary_encode()
     return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
 
@@ -134,54 +161,73 @@ def check(tables: Tables, rows: Sequence[Row], seed: int) -> None:
         ValueError: If the records are those of other missions, or a value is out of range.
     """
     missions, uavs = tables
-    keys, lengths = [key for key, _, _ in rows], [stop - start for _, start, stop in rows]
-    wanted = np.concatenate([range(start, stop) for _, start, stop in rows])
-    replications = missions["replication"].to_numpy()
-    if not np.array_equal(replications, wanted):
-        raise ValueError("the records are not those of the requested replications")
+    _check_values(missions, RECORD_LIMITS)
+    _check_values(uavs, RECORD_LIMITS)
+    _check_missions(missions, rows)
     if (missions["seed"].to_numpy() != seed).any():
         raise ValueError(f"the records are not of seed {seed}")
-    _check_numbers(missions)
-    _check_numbers(uavs)
     fleet = missions["uavs"].to_numpy()
     if fleet.min() < 1 or fleet.max() > MOST_UAVS or fleet.sum() != len(uavs):
         raise ValueError("the records are not those of all UAVs")
+    _check_missions(uavs, rows, fleet)
     first = np.repeat(np.cumsum(fleet) - fleet, fleet)
-    if not (
-        np.array_equal(uavs["replication"], np.repeat(replications, fleet))
-        and np.array_equal(uavs["uav"], np.arange(len(uavs)) - first)
-    ):
+    if not np.array_equal(uavs["uav"], np.arange(len(uavs)) - first):
         raise ValueError("the records are not those of all UAVs")
-    cells = np.repeat(np.arange(len(rows)), lengths)
-    _check_cells(missions, keys, cells)
-    _check_cells(uavs, keys, np.repeat(cells, fleet))
 
 
-def _check_numbers(table: pa.Table) -> None:
-    """Check that the numbers are finite, or not measured, and none but a reward is below 0."""
+def check_bounds(table: pa.Table, rows: Sequence[Row], nodes: Mapping[str, int]) -> None:
+    """Check that a table has the bounds of some parts, and no value that no bound can have.
+
+    Args:
+        table: The bounds, such as those of a file that anybody may have written.
+        rows: The key, start and stop of every part, in the order of the bounds.
+        nodes: The number of nodes of the scenario of a cell, by the key of the cell. Cells that
+            are not among them belong to no design point.
+
+    Raises:
+        ValueError: If the bounds are those of other missions, or a value is out of range.
+    """
+    _check_values(table, BOUND_LIMITS)
+    _check_missions(table, rows)
+    for row in table.to_pylist():
+        cuts, prices = np.array(row["cuts"], np.int64), np.array(row["prices"], float)
+        if not len(cuts) or (np.diff(cuts, prepend=-1) <= 0).any():
+            raise ValueError("the bounds have cuts that do not follow each other")
+        if len(prices) != len(cuts) * nodes.get(row["cell"], len(prices) // len(cuts)):
+            raise ValueError("the bounds do not have a price for every cut and node")
+        if not (np.isfinite(prices) & (prices >= 0)).all():  # a missing value is nan here
+            raise ValueError("the bounds have a price that is not a number from 0 on")
+
+
+def _check_values(table: pa.Table, limits: Mapping[str, tuple[float, float]]) -> None:
+    """Check that no value is missing, and those of some columns are within limits.
+
+    What extended scenarios measure may be nan.
+    """
     for name, column in zip(table.column_names, table.columns, strict=True):
         if column.null_count:
             raise ValueError(f"the records have no {name}")
-        values = column.to_numpy() if pa.types.is_floating(column.type) else np.zeros(0)
-        if name in (OPERATIONS.names or ()):
-            values = values[~np.isnan(values)]
-        if not np.isfinite(values).all():
-            raise ValueError(f"the records have a {name} that is not a number")
-        is_number = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
-        if is_number and name != "reward" and (column.to_numpy() < 0).any():
-            raise ValueError(f"the records have a {name} below 0")
+        if name in limits:
+            (low, high), values = limits[name], column.to_numpy()
+            within = (values >= low) & (values <= high)
+            if not (within | np.isnan(values) if name in MEASURED else within).all():
+                raise ValueError(f"the records have a {name} that is out of range")
 
 
-def _check_cells(table: pa.Table, keys: Sequence[str], wanted: np.ndarray) -> None:
-    """Check that the cell of every row is the wanted one, by its place among the keys."""
-    places = {key: place for place, key in reversed([*enumerate(keys)])}
-    numbers = [places[keys[place]] for place in range(len(keys))]
+def _check_missions(table: pa.Table, rows: Sequence[Row], counts: Any = 1) -> None:
+    """Check that a table has the missions of some parts in their order, each in ``counts`` rows."""
+    keys, starts, stops = zip(*rows, strict=True)
+    cells = np.repeat(np.array(keys, object), np.subtract(stops, starts))
+    replications = np.concatenate([*map(np.arange, starts, stops)])
     found = [
-        np.array([places.get(key, -1) for key in chunk.dictionary.to_pylist()], int)[chunk.indices]
-        for chunk in table["cell"].chunks
+        np.array(chunk.dictionary.to_pylist(), object)[chunk.indices]
+        for chunk in table["cell"].chunks  # texts are not repeated: a long one may be in every row
     ]
-    if not np.array_equal(np.concatenate(found), np.array(numbers)[wanted]):
-        raise ValueError("the records are not those of the requested cells")
+    if not (
+        np.array_equal(table["replication"], np.repeat(replications, counts))
+        and np.array_equal(np.concatenate(found), np.repeat(cells, counts))
+    ):
+        raise ValueError("the records are not those of the requested missions")
 
 
 def parts_in(table: pa.Table) -> list[Row]:
@@ -213,14 +259,12 @@ def write(folder: Path, name: str, table: pa.Table) -> Path:
     return path
 
 
-def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
+def read(path: Path, kind: str = "events") -> pa.Table | None:
     """Read a table; the result is None if the file is damaged or has another schema.
 
     Args:
         path: The file.
-        schema: The schema; by default that of an event log, whose values are checked as well. The
-            schema of missions stands for that of extended missions too, and that of event logs
-            for that of before.
+        kind: One of ``SCHEMAS``; by default an event log, whose values are checked as well.
 
     Raises:
         InputError: If it cannot be read, or takes more memory than there is.
@@ -228,27 +272,26 @@ def read(path: Path, schema: pa.Schema = EVENTS) -> pa.Table | None:
     content = read_bytes(path, LIMIT, "a file of results")
     if short_hash(content) != path.stem.rpartition("-")[2]:
         return None
-    words = [name for name in schema.names if name in WORDS]
+    schemas = SCHEMAS[kind]
+    words = [name for name in schemas[0].names if name in WORDS]
     try:
         # Texts stay numbers until it is known that they are few: a long one may be in every row.
         file = pq.ParquetFile(pa.BufferReader(content), read_dictionary=words)
-        if schema is MISSIONS and file.schema_arrow.names == EXTENDED_MISSIONS.names:
-            schema = EXTENDED_MISSIONS
-        if schema is EVENTS and file.schema_arrow.names == FORMER_EVENTS.names:
-            schema = FORMER_EVENTS
-        if file.schema_arrow.names != schema.names:
+        if file.schema_arrow.names not in [schema.names for schema in schemas]:
             return None
         check_size(path, file.metadata)
         table = file.read(use_threads=False)
         for name in words:
             table = table.set_column(*_spelled(table, name))
+        if not any(map(table.schema.equals, schemas)):
+            return None
+        if kind == "events":
+            _check_log(table)
     except InputError:
         raise
     except (OSError, KeyError, ValueError, pa.ArrowException):  # what pyarrow raises
         return None
-    if not table.schema.equals(schema):
-        return None
-    return table if schema not in (EVENTS, FORMER_EVENTS) or _is_log(table) else None
+    return table
 
 
 def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
@@ -264,21 +307,15 @@ def _spelled(table: pa.Table, name: str) -> tuple[int, str, pa.ChunkedArray]:
     return table.column_names.index(name), name, column.cast(pa.string())
 
 
-def _is_log(table: pa.Table) -> bool:
-    """Whether a table may be the event log of a mission, with a time and cells that exist."""
-    if not len(table) or any(column.null_count for column in table.columns):
-        return False
-    limits = {"uav": (-1, MOST_UAVS - 1), "node": (-1, MOST_NODES - 1), "time": (0, MOST_SLOTS)}
-    limits |= dict.fromkeys(("x", "y"), (-1, MOST_CELLS))
-    if "battery" in table.column_names:
-        limits |= {"battery": (-1, 100), "other": (-1, MOST_UAVS - 1)}
-    columns = {name: table[name].to_numpy() for name in limits}  # nan is in none of the limits
-    return (
-        all(low <= columns[name].min() for name, (low, _) in limits.items())
-        and all(columns[name].max() <= high for name, (_, high) in limits.items())
-        and bool(np.isfinite(table["value"]).all())
-        and "mission_end" in table["event"].to_pylist()
-    )
+def _check_log(table: pa.Table) -> None:
+    """Check that a table may be the event log of a mission, with a time and cells that exist.
+
+    Raises:
+        ValueError: If it may not.
+    """
+    _check_values(table, EVENT_LIMITS)
+    if "mission_end" not in table["event"].to_pylist():
+        raise ValueError("event: has no end of the mission")
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -287,26 +324,27 @@ def files_in(folder: Path) -> list[Path]:
     return [path for path in paths if path.is_file() and not path.is_symlink()]
 
 
-def tables_in(folder: Path, schema: pa.Schema) -> tuple[dict[str, pa.Table], list[Path]]:
+def tables_in(folder: Path, kind: str) -> tuple[dict[str, pa.Table], list[Path]]:
     """The tables in a folder, by the hash of their content, and the damaged files in it.
 
     A file is damaged if its content is not what its name says. Two files with different records of
     the same missions both count as damaged, since it is unknown which one is right.
     """
-    tables, damaged = {}, []
-    sound: dict[str, list[tuple[Path, pa.Table]]] = defaultdict(list)
+    damaged = []
+    sound: dict[str, dict[Path, pa.Table]] = defaultdict(dict)
     for path in files_in(folder):
-        table = read(path, schema)
+        table = read(path, kind)
         if table is not None and _name_in(table) == content_hash(path):
-            sound[content_hash(path)].append((path, table))
+            sound[content_hash(path)][path] = table
         else:
             damaged.append(path)
+    tables = {}
     for name, files in sound.items():
-        first = files[0][1]
-        if all(_are_equal(table, first) for _, table in files):
+        first, *others = files.values()
+        if all(_are_equal(other, first) for other in others):
             tables[name] = first
         else:
-            damaged += [path for path, _ in files]
+            damaged += files
     return tables, damaged
 
 
@@ -326,4 +364,4 @@ def _name_in(table: pa.Table) -> str:
 def missions_in(folder: Path) -> int:
     """The number of missions in a results folder, without those in damaged files."""
     files = (path for part in paths_in(folder, "missions/policy=*") for path in files_in(part))
-    return sum(len(table) for path in files if (table := read(path, MISSIONS)) is not None)
+    return sum(len(table) for path in files if (table := read(path, "missions")) is not None)

@@ -14,33 +14,38 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 from platform import python_version
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 import dess
-from analysis.results.documents import (
-    Class,
-    Commit,
-    Count,
-    Hash,
-    Library,
-    Module,
-    Seed,
-    Version,
-)
 from analysis.study.stopping import Text
 from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import InputError, validation_line
 from dess.files.documents import Document
 from dess.scenario import ScenarioSpace, fields_of, merged
+from dess.streams import MAX_REPLICATION, MAX_SEED
 from policies.base import Policy
 from policies.registry import TypedByUser, confirmed, load_team
 
 ENGINES = ("dess.batch", "dess.mission")
 BOUND = ("analysis.bound",)
 LIBRARIES = ("numpy", "numba", "simpy", "scipy", "torch", "pandas", "pyarrow")
+
+# Strings of a known form: a hash of code, a module, a class, a library, a version.
+Hash = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+Module = Annotated[str, Field(pattern=r"^[\w.]+$", max_length=500)]
+Class = Annotated[str, Field(pattern=r"^[\w.]+:[\w.<>]+$", max_length=1000)]
+Library = Annotated[str, Field(pattern=r"^[\w.-]+$", max_length=100)]
+Version = Annotated[str, Field(pattern=r"^[\w.+!-]+$", max_length=100)]
+Commit = Annotated[str, Field(pattern=r"^[0-9a-f]{40,64}$")]
+# What the key of a study and of a cell is: the beginning of a hash.
+Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
+Replication = Annotated[int, Field(ge=0, le=MAX_REPLICATION)]
+Count = Annotated[int, Field(ge=0, le=2**53)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Member(Document):

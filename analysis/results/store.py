@@ -11,29 +11,54 @@ or by how many workers it was computed.
 
 import json
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from itertools import groupby
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from analysis.bound import Bound
 from analysis.results import files, parquet
-from analysis.results.bounds.kept import BoundFiles
-from analysis.results.chunks import Chunk, Failure, Part, absent, gaps, rows_of, split
+from analysis.results.chunks import Chunk, Part, Present, absent, rows_of
 from analysis.results.files import FOLDERS, LOCK, MANIFEST
-from analysis.results.manifest import Cell, Manifest, Selected
+from analysis.results.manifest import NO_TEAM, Cell, Manifest, Selected
 from analysis.study.study import Study
 from dess import InputError
 from dess.files.locks import locked
 from dess.files.reading import paths_in
 from dess.files.writing import check_folder, delete, make_folder, write_file
-from dess.record import Records
 
 _BUSY = "in use by another run; allowed: another --out, or wait for its end"
+
+# The folders of the tables of each kind of work; a chunk is present when the first one is.
+TABLES = {"missions": ("missions", "uavs"), "bounds": ("bounds",), "events": ("events",)}
+
+Place = tuple[int, int]  # a design point and a replication
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A chunk that could not be computed.
+
+    Attributes:
+        policy: The team.
+        missions: Number of missions that are missing because of it.
+        error: What went wrong, in one line.
+        command: A command that reproduces the error.
+        traceback: Where it went wrong.
+    """
+
+    policy: str
+    missions: int
+    error: str
+    command: str
+    traceback: str
 
 
 class Store:
@@ -43,17 +68,16 @@ class Store:
         folder: The folder.
         manifest: The manifest of the folder.
         damaged: The files whose content is not what their names say.
-        bounds: The upper bounds of the missions, if the study has them.
     """
 
     def __init__(self, folder: Path, manifest: Manifest):
         self.folder, self.manifest = folder, manifest
         self._lock = ExitStack()  # what holds it
-        self._tables: dict[tuple[int, str], parquet.Tables] = {}  # by team and name of the chunk
-        self._present: dict[tuple[int, str], list[range]] = defaultdict(list)
-        self._logs: dict[tuple[int, str], Path] = {}  # by team, cell and replication
+        self._present: dict[str, Present] = {kind: defaultdict(list) for kind in TABLES}
+        # By kind and key of a cell, the tables that contain it: missions and UAVs, or bounds alone.
+        self._tables: dict[tuple[str, str], list[Sequence[pa.Table]]] = defaultdict(list)
+        self._logs: dict[tuple[str, int], Path] = {}  # by the key of a cell and the replication
         self.damaged: list[Path] = []
-        self.bounds = BoundFiles(folder / files.BOUNDS)
 
     @classmethod
     def open(cls, study: Study, out: str | Path, accept_code: bool = False) -> Self:
@@ -123,65 +147,101 @@ class Store:
             delete(self.damaged.pop())
 
     def _scan(self) -> None:
-        """Find out which missions are present, and which files are damaged."""
-        for team in range(len(self.manifest.policies)):
-            uavs, damaged_uavs = parquet.tables_in(self._partition("uavs", team), parquet.UAVS)
-            missions, damaged = parquet.tables_in(
-                self._partition("missions", team), parquet.MISSIONS
-            )
-            self.damaged += damaged_uavs + damaged
-            for name in sorted(missions.keys() & uavs.keys()):
-                self._examine(team, name, parquet.Tables(missions[name], uavs[name]))
-            for path in parquet.files_in(self._partition("events", team)):
+        """Find out what is present, and which files are damaged."""
+        teams = range(len(self.manifest.policies))
+        for kind, team in [*(("missions", team) for team in teams), ("bounds", NO_TEAM)]:
+            found = [parquet.tables_in(*place) for place in self._places(kind, team)]
+            self.damaged += [path for _, damaged in found for path in damaged]
+            for name in sorted(set.intersection(*(set(tables) for tables, _ in found))):
+                self._examine(kind, team, name, [tables[name] for tables, _ in found])
+        for place, _ in (place for team in teams for place in self._places("events", team)):
+            for path in parquet.files_in(place):
+                key, _, number = parquet.content_hash(path).partition("-")
                 if parquet.read(path) is None:
                     self.damaged.append(path)
-                else:
-                    self._logs[team, parquet.content_hash(path)] = path
-        self.damaged += self.bounds.scan(self.manifest)
+                elif number:
+                    self._enter_log(key, int(number), path)
 
-    def _examine(self, team: int, name: str, tables: parquet.Tables) -> None:
+    def _places(self, kind: str, team: int) -> list[tuple[Path, str]]:
+        """The folders of a team's tables of a kind of work, with their names in ``SCHEMAS``."""
+        if team == NO_TEAM:
+            return [(self.folder / files.BOUNDS, files.BOUNDS)]
+        of_team = files.partition(self.manifest.policies[team].policy)
+        return [(self.folder / name / of_team, name) for name in TABLES[kind]]
+
+    def _examine(self, kind: str, team: int, name: str, tables: Sequence[pa.Table]) -> None:
         """Keep the tables of a chunk, or count its files as damaged, if they are no records."""
         try:
-            parquet.check(tables, parquet.parts_in(tables.missions), self.manifest.seed)
+            rows = parquet.parts_in(tables[0])
+            self._check(kind, tables, rows)
         except ValueError:
-            for kind in ("missions", "uavs"):
-                paths = parquet.files_in(self._partition(kind, team))
+            for folder, _ in self._places(kind, team):
+                paths = parquet.files_in(folder)
                 self.damaged += [path for path in paths if parquet.content_hash(path) == name]
         else:
-            self._enter(team, name, tables)
+            self._enter(kind, rows, tables)
 
-    def _enter(self, team: int, name: str, tables: parquet.Tables) -> None:
-        self._tables[team, name] = tables
-        for key, start, stop in parquet.parts_in(tables.missions):
-            self._present[team, key].append(range(start, stop))
+    def _check(self, kind: str, tables: Sequence[pa.Table], rows: Sequence[parquet.Row]) -> None:
+        """Check that tables are those of some parts.
 
-    def _partition(self, kind: str, team: int) -> Path:
-        return self.folder / kind / files.partition(self.manifest.policies[team].policy)
+        Raises:
+            ValueError: If they are not.
+        """
+        if kind == "bounds":
+            parquet.check_bounds(tables[0], rows, self._nodes)
+        else:
+            parquet.check(parquet.Tables(*tables), rows, self.manifest.seed)
+
+    @cached_property
+    def _nodes(self) -> dict[str, int]:
+        """The number of nodes at every cell of bounds, by its key."""
+        cells = zip(self.manifest.bound_cells, self.manifest.scenarios, strict=False)
+        return {cell.key: len(space.nodes) for cell, space in cells}
+
+    def _enter(self, kind: str, rows: Sequence[parquet.Row], tables: Sequence[pa.Table]) -> None:
+        for key, start, stop in rows:
+            self._tables[kind, key].append(tables)
+            self._present[kind][key].append(range(start, stop))
+
+    def _enter_log(self, key: str, replication: int, path: Path) -> None:
+        self._logs[key, replication] = path
+        self._present["events"][key].append(range(replication, replication + 1))
 
     @property
     def files(self) -> list[Path]:
         """The files of records, event logs and bounds, the damaged ones included."""
-        folders = [*paths_in(self.folder, "*/policy=*"), self.bounds.folder]
+        folders = [*paths_in(self.folder, "*/policy=*"), self.folder / files.BOUNDS]
         return [path for folder in folders for path in parquet.files_in(folder)]
 
-    def missing(self, chunk: Chunk) -> Chunk | None:
-        """The part of a chunk that is missing; None if all of it is present."""
-        return absent(chunk, self._present)
+    def missing(self, kind: str, parts: Iterable[Part]) -> list[Part]:
+        """What of some parts is missing.
 
-    def missing_logs(self, cell: Cell, logged: int) -> list[int]:
-        """Those of the first ``logged`` replications whose event log is missing."""
-        wanted = range(cell.first, cell.first + logged)
-        return [r for r in wanted if self.load_log(cell, r) is None]
+        Args:
+            kind: ``missions``, ``bounds`` or ``events``.
+            parts: The parts.
+        """
+        return absent(parts, self._present[kind])
 
-    def write(self, chunk: Chunk, records: Records) -> None:
-        """Store the records of a chunk.
+    def keep(self, kind: str, chunk: Chunk, tables: Sequence[pa.Table]) -> None:
+        """Store the tables of a chunk.
 
         Raises:
             ValueError: If they are not those of the chunk.
         """
-        self._keep(chunk, parquet.tables_of(chunk, records))
+        self._check(kind, tables, chunk.rows)
+        places = self._places(kind, chunk.team)
+        for (folder, _), table in [*zip(places, tables, strict=True)][::-1]:
+            parquet.write(folder, chunk.name, table)
+        self._enter(kind, chunk.rows, tables)
+        delete(self._failure(chunk))
 
-    def take_over(self, other: "Store", parts: Sequence[Part]) -> None:
+    def keep_log(self, cell: Cell, replication: int, columns: dict[str, Any]) -> None:
+        """Store the event log of a replication of a cell."""
+        ((folder, _),) = self._places("events", cell.team)
+        path = parquet.write(folder, f"{cell.key}-{replication:06}", pa.table(columns))
+        self._enter_log(cell.key, replication, path)
+
+    def take_over(self, other: "Store", parts: Iterable[Part]) -> None:
         """Copy missing missions of some parts from another folder, as far as it has them.
 
         Cells with equal keys have equal records, so this only saves time. Nothing is copied from a
@@ -191,54 +251,28 @@ class Store:
             other: The other results folder, of any study.
             parts: Parts of the study of this folder.
         """
-        whose = {key: team for team, key in other._present}
-        for chunk in split(parts, sum(len(part.replications) for part in parts)):
-            shared = other._shared(self.missing(chunk), whose)
-            if shared:
-                teams = {whose[part.cell.key] for part in shared.parts}
-                held = [tables for (team, _), tables in other._tables.items() if team in teams]
+        for team, of_team in groupby(self.missing("missions", parts), lambda part: part.cell.team):
+            if shared := other._held([*of_team]):
+                chunk = Chunk(team, tuple(shared))
+                tables = zip(*other._tables_with("missions", shared), strict=True)
                 try:
-                    missions, uavs = (rows_of(shared.parts, k) for k in zip(*held, strict=True))
+                    rows = [rows_of(shared, of_kind) for of_kind in tables]
                 except InputError:
                     return
-                self._keep(shared, parquet.tables_with(shared, missions, uavs))
+                columns = ({str(n): of_kind[n].to_numpy() for n in of_kind} for of_kind in rows)
+                self.keep("missions", chunk, parquet.tables_with(chunk, *columns))
+
+    def _held(self, parts: Sequence[Part]) -> list[Part]:
+        """What of the missions of some parts is present."""
+        missing: Present = defaultdict(list)
+        for part in self.missing("missions", parts):
+            missing[part.cell.key].append(part.replications)
+        return absent(parts, missing)
 
     def count(self, other: "Store") -> None:
         """Count the missions of another folder as if they were here, to plan a run."""
-        held = {key: present for (_, key), present in other._present.items()}
-        for cells in self.manifest.cells:
-            for cell in cells:
-                self._present[cell.team, cell.key] += held.get(cell.key, [])
-
-    def _shared(self, chunk: Chunk | None, whose: Mapping[str, int]) -> Chunk | None:
-        """The part of a chunk that another folder has; None if it has none of it.
-
-        Args:
-            chunk: The chunk; its cells have teams and points of the other folder.
-            whose: The team of every cell here, by its key.
-        """
-        parts = []
-        for part in chunk.parts if chunk else ():
-            key = part.cell.key
-            present = self._present[whose[key], key] if key in whose else []
-            absent = gaps(part.replications, present)
-            parts += [Part(part.cell, there) for there in gaps(part.replications, absent)]
-        return Chunk(chunk.team, tuple(parts)) if chunk and parts else None
-
-    def _keep(self, chunk: Chunk, tables: parquet.Tables) -> None:
-        """Write the tables of a chunk."""
-        parquet.check(tables, chunk.rows, self.manifest.seed)
-        # Missions last: a chunk is present when they are.
-        parquet.write(self._partition("uavs", chunk.team), chunk.name, tables.uavs)
-        parquet.write(self._partition("missions", chunk.team), chunk.name, tables.missions)
-        self._enter(chunk.team, chunk.name, tables)
-        delete(self._failure(chunk))
-
-    def write_log(self, cell: Cell, replication: int, columns: dict[str, np.ndarray]) -> None:
-        """Store the event log of a replication of a cell."""
-        name = f"{cell.key}-{replication:06}"
-        folder = self._partition("events", cell.team)
-        self._logs[cell.team, name] = parquet.write(folder, name, pa.table(columns))
+        for key, present in other._present["missions"].items():
+            self._present["missions"][key] += present
 
     def write_failure(self, chunk: Chunk, failure: Failure) -> Path:
         """Store why a chunk could not be computed, and return the path of the file."""
@@ -261,14 +295,14 @@ class Store:
             delete(path)
 
     def missions(self, parts: Sequence[Part]) -> pd.DataFrame:
-        """The missions of some parts of one team, with their ``point``, in the order of the parts.
+        """The missions of some parts, with their ``point``, in the order of the parts.
 
         If the study has prices, the missions have a ``cost``.
 
         Raises:
             InputError: If some are missing or damaged.
         """
-        missions = rows_of(parts, [tables.missions for tables in self._tables_with(parts)])
+        missions = self._rows("missions", parts)
         if costs := self.manifest.costs:
             cost = costs.parts(self.manifest.scenarios, missions, self.uavs(parts))
             missions["cost"] = sum(cost.values())
@@ -280,10 +314,28 @@ class Store:
         Raises:
             InputError: If some are missing or damaged.
         """
-        return rows_of(parts, [tables.uavs for tables in self._tables_with(parts)])
+        return self._rows("missions", parts, 1)
+
+    def bounds_of(self, parts: Sequence[Part]) -> dict[Place, Bound]:
+        """The bounds of some parts, by design point and replication.
+
+        Raises:
+            InputError: If some are missing or damaged, or two files differ.
+        """
+        if not parts:
+            return {}
+        return {
+            (row["point"], row["replication"]): Bound(
+                ratio=row["ratio"],
+                prices=np.reshape(row["prices"], (len(row["cuts"]), -1)),
+                cuts=np.array(row["cuts"], np.int64),
+                iterations=row["iterations"],
+            )
+            for row in self._rows("bounds", parts).to_dict("records")
+        }
 
     def samples(self, parts: Sequence[Part]) -> list[dict[str, np.ndarray]]:
-        """For each part of one team, the metrics of its missions.
+        """For each part, the metrics of its missions.
 
         Raises:
             InputError: If some are missing or damaged.
@@ -293,21 +345,27 @@ class Store:
         columns = {name: np.split(missions[name].to_numpy(), ends[:-1]) for name in missions}
         return [{name: values[k] for name, values in columns.items()} for k in range(len(parts))]
 
-    def _tables_with(self, parts: Sequence[Part]) -> list[parquet.Tables]:
-        """The tables that contain parts of one team, all of which must be present."""
-        for part in parts:
-            present = self._present[part.cell.team, part.cell.key]
-            for gap in gaps(part.replications, present)[:1]:
-                raise InputError(self._incomplete(part, gap))
-        team = parts[0].cell.team
-        return [tables for (whose, _), tables in self._tables.items() if whose == team]
+    def _rows(self, kind: str, parts: Sequence[Part], table: int = 0) -> pd.DataFrame:
+        """The rows of some parts, all of which must be present, in the tables of their kind."""
+        for gap in self.missing(kind, parts)[:1]:
+            whole = next(part for part in parts if part.cell == gap.cell)
+            raise InputError(self._incomplete(whole, gap.replications))
+        rows = rows_of(parts, [tables[table] for tables in self._tables_with(kind, parts)])
+        return rows.drop(columns="cell")
+
+    def _tables_with(self, kind: str, parts: Iterable[Part]) -> list[Sequence[pa.Table]]:
+        """The tables that contain some parts."""
+        found = (tables for part in parts for tables in self._tables[kind, part.cell.key])
+        return [*{id(tables): tables for tables in found}.values()]
 
     def _incomplete(self, part: Part, gap: range) -> str:
         team, values = part.cell.team, self.manifest.points[part.cell.point].values
         where = f" at {json.dumps(values)}" if values else ""
         present = f"the first {gap.start - part.replications.start} of {len(part.replications)}"
-        line = f"{self.folder}: incomplete, {present} missions of "
-        line += f"{self.manifest.policies[team].policy}{where}"
+        what = "bounds"
+        if team != NO_TEAM:
+            what = f"missions of {self.manifest.policies[team].policy}"
+        line = f"{self.folder}: incomplete, {present} {what}{where}"
         if self.damaged:
             line += f" (damaged: {self.damaged[0]})"
         if failed := self._failures():
@@ -317,13 +375,12 @@ class Store:
     @property
     def logged(self) -> list[tuple[Cell, int]]:
         """The missions whose event logs are present."""
-        cells = {(cell.team, cell.key): cell for cells in self.manifest.cells for cell in cells}
-        logs = [(team, *name.rpartition("-")) for team, name in self._logs]
-        return [(cells[t, key], int(number)) for t, key, _, number in logs if (t, key) in cells]
+        cells = {cell.key: cell for cells in self.manifest.cells for cell in cells}
+        return [(cells[key], number) for key, number in self._logs if key in cells]
 
     def load_log(self, cell: Cell, replication: int) -> pa.Table | None:
         """The event log of a replication of a cell, if it is present."""
-        path = self._logs.get((cell.team, f"{cell.key}-{replication:06}"))
+        path = self._logs.get((cell.key, replication))
         return parquet.read(path) if path else None
 
 
@@ -344,3 +401,27 @@ def _extended(folder: Path, manifest: Manifest, accept_code: bool) -> Manifest:
         return manifest
     held = Manifest.read(path)
     return held.extended_to(manifest, path, parquet.missions_in(folder) if accept_code else None)
+
+
+def sources(folders: Iterable[Path], manifest: Manifest) -> list[Store]:
+    """The folders that contain cells of a manifest: same code, scenario, policy and seed.
+
+    A folder that is not a results folder is left out. So is a folder whose missions were simulated
+    by several versions of the code, because the keys of its cells identify only the first version.
+    """
+    keys = _keys(manifest)
+    return [store for folder in folders if (store := _source(folder, keys))]
+
+
+def _source(folder: Path, keys: set[str]) -> Store | None:
+    try:
+        manifest = Manifest.read(folder / MANIFEST)
+        if manifest.accepted or not keys & _keys(manifest):
+            return None
+        return Store.read(folder)
+    except InputError:
+        return None
+
+
+def _keys(manifest: Manifest) -> set[str]:
+    return {cell.key for cells in manifest.cells for cell in cells}

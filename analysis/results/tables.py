@@ -13,10 +13,9 @@ import pandas as pd
 from analysis.bound import Bound
 from analysis.names import BOUND, GAP, PRODUCT, SWEEP, SWEEPS, measured_in
 from analysis.results import commands
-from analysis.results.bounds.tables import Place
 from analysis.results.chunks import bound_parts, check_parts, parts_of
 from analysis.results.manifest import Cell, Manifest
-from analysis.results.store import Store
+from analysis.results.store import Place, Store
 from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.selection import Choice, Selection
 from dess.errors import InputError, one_of
@@ -109,21 +108,20 @@ class Results:
 
     def choice(self, policy: str) -> Choice | None:
         """The design point that was selected as the best for a policy, with its guarantee."""
-        self.check_policy(policy)
-        rule = self.store.manifest.selection
-        return rule.choice(self._samples(policy)) if isinstance(rule, Selection) else None
+        return self._chosen(policy, Selection)
 
     def cheapest(self, policy: str) -> CheapestChoice | None:
         """The cheapest settings of a policy that meet the requirements of the study."""
-        self.check_policy(policy)
-        manifest = self.store.manifest
-        if not isinstance(manifest.selection, Cheapest):
-            return None
-        return manifest.selection.choice(self._samples(policy), manifest.settings)
+        return self._chosen(policy, Cheapest)
 
-    def _samples(self, policy: str) -> list[dict[str, np.ndarray]]:
-        manifest = self.store.manifest
-        return self.store.samples(parts_of(manifest, self.policies.index(policy)))
+    def _chosen(self, policy: str, kind: type) -> Any:
+        """What a rule of this kind has selected for a policy; None if the study has another."""
+        self.check_policy(policy)
+        manifest, rule = self.store.manifest, self.store.manifest.selection
+        if not rule or not isinstance(rule, kind):
+            return None
+        parts = parts_of(manifest, self.policies.index(policy))
+        return rule.choice(self.store.samples(parts), manifest.settings)
 
     def check_policy(self, policy: str) -> None:
         """Refuse a policy that is not in the study.
@@ -176,7 +174,7 @@ def results_of(store: Store) -> Results:
         raise InputError(f"{store.folder}: incomplete; allowed: run the study again to complete it")
     all_missions = _labelled(manifest, missions)
     all_checks = _labelled(manifest, checks) if checks else all_missions[:0]
-    bounds = store.bounds.load(bound_parts(manifest))
+    bounds = store.bounds_of(bound_parts(manifest))
     if bounds:
         all_missions = _with_gaps(all_missions, bounds)
     return Results(store, all_missions, _of_policies(uavs), all_checks, bounds)

@@ -46,8 +46,8 @@ from scipy.special import stdtrit
 from analysis.study.candidates import Answer, questions_about
 from analysis.study.costs import Costs
 from analysis.study.feasibility import MeanTest, Verdict
-from analysis.study.selection import Selection
-from analysis.study.stopping import MOST, StrictTable, of_its_kind
+from analysis.study.selection import Selection, based_on, check_begun, needed
+from analysis.study.stopping import MOST, Samples, StrictTable, of_its_kind
 from dess.scenario import Integer, Number, ScenarioSpace
 
 Share = Literal["success", "collection_ratio", "collection_ratio_and_communication"]
@@ -75,23 +75,26 @@ class CheapestChoice:
     """The result of the search for the cheapest setting.
 
     Attributes:
-        answers: One answer for every condition, in the order of the design and, if there are
-            several conditions, one for all of them together.
-        verdicts: For each design point, ``met``, ``missed`` or ``open``.
         counts: Number of missions per design point that the selection is based on.
-        missions: Number of all missions.
         rounds: Number of rounds of simulation.
         done: Whether the procedure needs no more missions.
         guarantee: What is guaranteed about the selection, in words.
+        answers: One answer for every condition, in the order of the design and, if there are
+            several conditions, one for all of them together.
+        verdicts: For each design point, ``met``, ``missed`` or ``open``.
     """
 
-    answers: tuple[Answer, ...]
-    verdicts: tuple[Verdict, ...]
     counts: tuple[int, ...]
-    missions: int
     rounds: int
     done: bool
     guarantee: str
+    answers: tuple[Answer, ...]
+    verdicts: tuple[Verdict, ...]
+
+    @property
+    def missions(self) -> int:
+        """Number of all missions."""
+        return sum(self.counts)
 
     @property
     def selected(self) -> list[int]:
@@ -144,25 +147,19 @@ class Cheapest(StrictTable):
                 )
         return self
 
-    def wanted(
-        self, samples: Sequence[Mapping[str, np.ndarray]], settings: Sequence[Setting]
-    ) -> list[int]:
+    def wanted(self, samples: Samples, settings: Sequence[Setting]) -> list[int]:
         """The number of missions that every design point needs.
 
         Args:
-            samples: For each design point a mapping from the metrics, ``cost`` among them, to their
-                (n,) values in replications 0..n-1.
+            samples: The missions of every design point, with ``cost`` among the metrics.
             settings: The design points.
 
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
-        counts = _Search(self, samples, settings).counts
-        return [max(len(s["cost"]), int(n)) for s, n in zip(samples, counts, strict=True)]
+        return needed(_Search(self, samples, settings).counts, samples)
 
-    def choice(
-        self, samples: Sequence[Mapping[str, np.ndarray]], settings: Sequence[Setting]
-    ) -> CheapestChoice:
+    def choice(self, samples: Samples, settings: Sequence[Setting]) -> CheapestChoice:
         """The selected settings, and what is guaranteed about them.
 
         Args:
@@ -172,18 +169,15 @@ class Cheapest(StrictTable):
         Raises:
             ValueError: If there is no design point, or one has fewer than ``first`` missions.
         """
-        if not samples or min(len(sample["cost"]) for sample in samples) < self.first:
-            raise ValueError(f"choice: needs points, with {self.first} or more missions each")
+        check_begun(samples, self.first)
         search = _Search(self, samples, settings)
-        counts = [min(int(n), len(s["cost"])) for s, n in zip(samples, search.counts, strict=True)]
         return CheapestChoice(
-            answers=tuple(question.answer for question in search.questions),
-            verdicts=tuple(search.verdicts),
-            counts=tuple(counts),
-            missions=sum(counts),
+            counts=based_on(search.counts, samples),
             rounds=search.rounds,
             done=search.done,
             guarantee=self._guarantee(search),
+            answers=tuple(question.answer for question in search.questions),
+            verdicts=tuple(search.verdicts),
         )
 
     def _guarantee(self, search: "_Search") -> str:
@@ -222,12 +216,7 @@ class _Search:
         done: Whether no more missions are needed: all questions are settled or the budget is spent.
     """
 
-    def __init__(
-        self,
-        rule: Cheapest,
-        samples: Sequence[Mapping[str, np.ndarray]],
-        settings: Sequence[Setting],
-    ):
+    def __init__(self, rule: Cheapest, samples: Samples, settings: Sequence[Setting]):
         self.rule, self.samples, self.settings = rule, samples, settings
         self.counts = np.full(len(samples), rule.first)
         self.verdicts: list[Verdict] = ["open"] * len(samples)
@@ -282,22 +271,18 @@ class _Search:
             self.rounds += 1
 
     def _test(self, points: Sequence[int], stage: int) -> None:
-        """Test the requirements of points on their first ``stage`` missions."""
+        """Test the requirements of points on their first ``stage`` missions.
+
+        The verdict on all requirements together is missed if one is missed, met if all are met.
+        """
         for point in points:
             if self.verdicts[point] != "open":
                 continue
             for metric, test in self._tests[point].items():
                 test.observe(np.asarray(self.samples[point][metric][self._seen : stage], float))
-            self.verdicts[point] = _verdict([*self._tests[point].values()])
+            found = {test.verdict for test in self._tests[point].values()}
+            self.verdicts[point] = min(found, key=["missed", "open", "met"].index)
         self._seen = stage
-
-
-def _verdict(tests: Sequence[MeanTest]) -> Verdict:
-    """The verdict on all requirements together: missed if one is missed, met if all are met."""
-    verdicts = {test.verdict for test in tests}
-    if "missed" in verdicts:
-        return "missed"
-    return "open" if "open" in verdicts else "met"
 
 
 def _in_words(requirements: Mapping[Share, float], shift: float) -> str:

@@ -7,7 +7,6 @@ function of the fields of the design, in the order in which these are written.
 
 import sys
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -108,14 +107,11 @@ class _Design(StrictTable):
         """
         if self.count > MAX_SIZE:
             raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
-        return tuple(self._points())
-
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number."""
-        return self.points[number]
+        return tuple(map(self.point, range(self.count)))
 
     @abstractmethod
-    def _points(self) -> Iterator[DesignPoint]: ...
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number; the others, which may be very many, are not made."""
 
 
 class Grid(_Design):
@@ -132,15 +128,12 @@ class Grid(_Design):
         return prod(map(len, self.values.values()))
 
     def point(self, number: int) -> DesignPoint:
-        """A design point by its number; the others, which may be very many, are not made."""
+        """A design point by its number."""
         chosen = {}
         for field, values in reversed(self.values.items()):
             number, place = divmod(number, len(values))
             chosen[field] = values[place]
         return DesignPoint({field: chosen[field] for field in self.values})
-
-    def _points(self) -> Iterator[DesignPoint]:
-        return map(self.point, range(self.count))
 
 
 class OneAtATime(_Design):
@@ -155,11 +148,15 @@ class OneAtATime(_Design):
     @property
     def count(self) -> int:
         """The sum of the numbers of values."""
-        return sum(map(len, self.values.values()))
+        return len(self._rows)
 
-    def _points(self) -> Iterator[DesignPoint]:
-        for field, values in self.values.items():
-            yield from (DesignPoint({field: value}) for value in values)
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number."""
+        return DesignPoint(self._rows[number])
+
+    @cached_property
+    def _rows(self) -> list[dict[str, Any]]:
+        return [{field: value} for field, values in self.values.items() for value in values]
 
 
 class Table(_Design):
@@ -173,8 +170,9 @@ class Table(_Design):
         """The number of rows."""
         return len(self.rows)
 
-    def _points(self) -> Iterator[DesignPoint]:
-        return map(DesignPoint, self.rows)
+    def point(self, number: int) -> DesignPoint:
+        """A design point by its number."""
+        return DesignPoint(self.rows[number])
 
 
 class _Sampled(_Design):
@@ -191,20 +189,14 @@ class _Sampled(_Design):
         """(count, ...) points of the unit cube, one for each design point."""
 
     def point(self, number: int) -> DesignPoint:
-        """A design point by its number; the others are not made."""
-        return self._at(self._sample[number])
-
-    def _points(self) -> Iterator[DesignPoint]:
-        return map(self._at, self._sample)
-
-    def _at(self, unit: np.ndarray) -> DesignPoint:
-        return self._point(unit)
-
-    def _point(self, unit: Iterable[float], replication: int = 0) -> DesignPoint:
-        """The design point that belongs to a point of the unit cube."""
-        places = zip(self.ranges.items(), unit, strict=True)
+        """A design point by its number."""
+        places = zip(self.ranges.items(), self._sample[number], strict=False)  # the noise is last
         values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
-        return DesignPoint(values, replication)
+        return DesignPoint(values, self._replication(number))
+
+    def _replication(self, number: int) -> int:
+        """The first replication of a design point."""
+        return 0
 
 
 class LatinHypercube(_Sampled):
@@ -276,9 +268,8 @@ class Saltelli(_Sampled):
 
         return sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
 
-    def _at(self, unit: np.ndarray) -> DesignPoint:
-        *fields, noise = unit
-        return self._point(fields, _scaled(noise, (0, self.replications - 1), True))
+    def _replication(self, number: int) -> int:
+        return _scaled(self._sample[number][-1], (0, self.replications - 1), True)
 
 
 def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:

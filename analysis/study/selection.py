@@ -35,13 +35,13 @@ Sources:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from analysis.names import BOUNDED, LESS_IS_BETTER, SHARES
-from analysis.study.stopping import MOST, Metric, StrictTable, values_in
+from analysis.study.stopping import MOST, Metric, Samples, StrictTable, values_in
 from dess import InputError
 from dess.scenario import Integer, Number
 
@@ -54,31 +54,59 @@ class Choice:
     """The result of a selection.
 
     Attributes:
+        counts: Number of missions per point that the selection is based on.
+        rounds: Number of rounds of simulation.
+        done: Whether the procedure needs no more missions.
+        guarantee: What is guaranteed about the selection, in words.
         best: Number of the selected design point.
         survivors: The points that were not ruled out, the selected one included.
-        counts: Number of missions per point that the selection is based on.
-        means: Means of the metric over these missions. The mean of the selected point tends to be
-            too high, because the point was selected for its high mean.
-        procedure: ``kn`` or ``kn-bounded``.
-        guarantee: What is guaranteed about the selection, in words.
         guaranteed: Whether the guarantee is a probability (and not that the budget has ended).
-        done: Whether the procedure needs no more missions.
         stage: Number of missions of the selected point when the selection ended.
-        rounds: Number of rounds of simulation.
-        missions: Number of all missions.
     """
 
+    counts: tuple[int, ...]
+    rounds: int
+    done: bool
+    guarantee: str
     best: int
     survivors: tuple[int, ...]
-    counts: tuple[int, ...]
-    means: tuple[float, ...]
-    procedure: str
-    guarantee: str
     guaranteed: bool
-    done: bool
     stage: int
-    rounds: int
-    missions: int
+
+    @property
+    def missions(self) -> int:
+        """Number of all missions."""
+        return sum(self.counts)
+
+    @property
+    def selected(self) -> int:
+        """The selected design point, as a manifest has it."""
+        return self.best
+
+
+def needed(counts: np.ndarray, samples: Samples) -> list[int]:
+    """How many missions design points need, if those that they have are kept."""
+    return [max(missions_of(s), int(n)) for s, n in zip(samples, counts, strict=True)]
+
+
+def based_on(counts: np.ndarray, samples: Samples) -> tuple[int, ...]:
+    """On how many of their missions a choice is based, which needs these counts."""
+    return tuple(min(missions_of(s), int(n)) for s, n in zip(samples, counts, strict=True))
+
+
+def missions_of(sample: Mapping[str, np.ndarray]) -> int:
+    """The number of missions of a design point."""
+    return len(next(iter(sample.values())))
+
+
+def check_begun(samples: Samples, first: int) -> None:
+    """Refuse samples without the missions of the first round.
+
+    Raises:
+        ValueError: If there is no design point, or one has fewer than ``first`` missions.
+    """
+    if not samples or min(map(missions_of, samples)) < first:
+        raise ValueError(f"choice: needs points, with {first} or more missions each")
 
 
 class Selection(StrictTable):
@@ -118,51 +146,42 @@ class Selection(StrictTable):
             raise ValueError(f"metric: {self.metric} is not bounded; allowed: procedure kn with it")
         return self
 
-    def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
+    def wanted(self, samples: Samples, settings: Sequence[Any] = ()) -> list[int]:
         """The number of missions that every design point needs.
 
         Args:
-            samples: For each design point, a mapping from metrics to their (n,) values in
-                replications 0..n-1.
+            samples: The missions of every design point.
+            settings: The design points; this rule does not need them.
 
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
-        values = self._values(samples)
-        counts = _Race(self, values).counts
-        return [max(len(sample), int(n)) for sample, n in zip(values, counts, strict=True)]
+        return needed(_Race(self, self._values(samples)).counts, samples)
 
-    def choice(self, samples: Sequence[Mapping[str, np.ndarray]]) -> Choice:
+    def choice(self, samples: Samples, settings: Sequence[Any] = ()) -> Choice:
         """The selected design point, and what is guaranteed about it.
 
         Args:
             samples: As for ``wanted``.
+            settings: As for ``wanted``.
 
         Raises:
             ValueError: If there is no design point, or one has fewer than ``first`` missions.
         """
-        values = self._values(samples)
-        if not values or min(map(len, values)) < self.first:
-            raise ValueError(f"choice: needs points, with {self.first} or more missions each")
-        race = _Race(self, values)
-        counts = [min(int(n), len(sample)) for n, sample in zip(race.counts, values, strict=True)]
+        check_begun(samples, self.first)
+        race = _Race(self, self._values(samples))
         return Choice(
+            counts=based_on(race.counts, samples),
+            rounds=race.rounds,
+            done=race.done,
+            guarantee=self._guarantee(race),
             best=race.best,
             survivors=tuple(map(int, race.alive)),
-            counts=tuple(counts),
-            means=tuple(
-                float(self._sign * x[:n].mean()) for n, x in zip(counts, values, strict=True)
-            ),
-            procedure=self.procedure,
-            guarantee=self._guarantee(race),
             guaranteed=race.over,
-            done=race.done,
             stage=race.stage,
-            rounds=race.rounds,
-            missions=sum(counts),
         )
 
-    def _values(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[np.ndarray]:
+    def _values(self, samples: Samples) -> list[np.ndarray]:
         """The values of the metric, negative if less is better: the best has the largest mean."""
         found = [values_in(sample, self.metric) for sample in samples]
         if any(np.isnan(values).any() for values in found):
@@ -170,11 +189,8 @@ class Selection(StrictTable):
                 f"selection.metric: {self.metric} is not measured in some missions; "
                 "allowed: a metric that every mission has"
             )
-        return [self._sign * values for values in found]
-
-    @property
-    def _sign(self) -> float:
-        return -1.0 if self.metric in LESS_IS_BETTER else 1.0
+        sign = -1.0 if self.metric in LESS_IS_BETTER else 1.0
+        return [sign * values for values in found]
 
     def _guarantee(self, race: "_Race") -> str:
         if len(race.values) == 1:

@@ -23,6 +23,9 @@ from dess.scenario import Integer, Number
 
 _METRICS = [*SHARES, *MEANS, *MEASURES]
 
+# For each design point a mapping from metrics to their (n,) values in replications 0..n-1.
+Samples = Sequence[Mapping[str, np.ndarray]]
+
 # The largest number of missions that a rule may ask for.
 MOST = 1_000_000_000
 # No round multiplies the number of missions of a cell by more than this.
@@ -172,19 +175,19 @@ class Precision(StrictTable):
             )
         return self
 
-    def wanted(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[int]:
+    def wanted(self, samples: Samples, settings: Sequence[Any] = ()) -> list[int]:
         """The number of missions that every design point needs.
 
         Args:
-            samples: For each design point, a mapping from metrics to their (n,) values in
-                replications 0..n-1.
+            samples: The missions of every design point.
+            settings: The design points; this rule does not need them.
 
         Returns:
             For each design point at least the n missions given; exactly n if no more are needed.
         """
         return [self._wanted(sample) for sample in samples]
 
-    def reached(self, samples: Sequence[Mapping[str, np.ndarray]]) -> list[Reached]:
+    def reached(self, samples: Samples) -> list[Reached]:
         """Whether the targets were met: a row per design point and metric.
 
         Args:

@@ -166,36 +166,23 @@ def sweep(
     """
     values = {field: values_of(field, given) for field, given in fields.items()}
     study = question(values, scenario, policies, missions, seed, prices, requirements, name)
-    if callable(progress):
-        results = ask(study, folder, workers, progress, yes=yes)
-    else:
-        with _bar(progress) as (bar, announce):
+    if progress is True:
+        with _bar() as (bar, announce):
             results = ask(study, folder, workers, bar, announce, yes)
+    else:
+        results = ask(study, folder, workers, progress or None, yes=yes)
     return Sweep(study, folder_of(study, folder), results)
 
 
 @contextmanager
-def _bar(shown: bool) -> Iterator[tuple[Progress, Callable[[Round], None]]]:
-    """A progress bar in missions, shown when some are simulated; its total may grow by a rule."""
+def _bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
+    """A progress bar in missions, shown if they take a second; its total may grow by a rule."""
     from tqdm.auto import tqdm
 
-    bars: list[tqdm] = []
-    done = 0
+    with tqdm(unit="mission", delay=1) as bar:
 
-    def begin(started: Round) -> None:
-        if shown and not bars and started.present < started.missions:
-            bars.append(tqdm(unit="mission", initial=done, delay=1))
-        for bar in bars:
+        def begin(started: Round) -> None:
             bar.total = started.missions
+            bar.initial += started.present  # took no time
 
-    def count(missions: int) -> None:
-        nonlocal done
-        done += missions
-        for bar in bars:
-            bar.update(missions)
-
-    try:
-        yield count, begin
-    finally:
-        for bar in bars:
-            bar.close()
+        yield bar.update, begin

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, create_model
 
 from analysis.questions.missions import FOLDER
-from analysis.results.documents import Key
+from analysis.results.provenance import Key
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
 from analysis.verification import lone_uav

@@ -8,6 +8,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from analysis.results import parquet
 from analysis.results.chunks import Chunk, Part, check_parts, parts_of, rows_of
 from analysis.results.files import FOLDERS
@@ -50,7 +52,7 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
         log = source.load_log(cell, replication)
         assert log is not None
         columns = dict(zip(log.column_names, log.columns, strict=True))
-        store.write_log(manifest.cells[cell.team][cell.point], replication, columns)
+        store.keep_log(manifest.cells[cell.team][cell.point], replication, columns)
     (into / "manifest.json").write_text(manifest.text, "utf-8")
     _add_files(into, text)
     return into
@@ -97,9 +99,13 @@ def _copy(source: Store, store: Store, parts: list[Part], cells: Any) -> None:
         parts[0].cell.team,
         tuple(Part(cell, p.replications) for cell, p in zip(cells, parts, strict=True)),
     )
-    held = [tables for (team, _), tables in source._tables.items() if team == chunk.team]
-    rows = [rows_of(parts, kind) for kind in zip(*held, strict=True)]
-    store._keep(chunk, parquet.tables_with(chunk, *rows))
+    rows = [
+        rows_of(parts, kind) for kind in zip(*source._tables_with("missions", parts), strict=True)
+    ]
+    keys = {part.cell.key: cell.key for part, cell in zip(parts, cells, strict=True)}
+    columns = [{str(n): of[n].to_numpy() for n in of} for of in rows]
+    columns = [of | {"cell": np.array([keys[key] for key in of["cell"]])} for of in columns]
+    store.keep("missions", chunk, parquet.tables_with(chunk, *columns))
 
 
 def _add_files(folder: Path, text: str) -> None:

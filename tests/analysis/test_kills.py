@@ -80,16 +80,3 @@ def test_twenty_thousand_missions_survive_ten_kills(tmp_path, monkeypatch):
     generator = random.Random(20)
     run_with_kills(tmp_path / "study.toml", tmp_path / "out", 2, 20_000, 10, generator)
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
-
-
-@pytest.mark.slow
-def test_twenty_thousand_missions_are_the_same_on_one_worker_two_and_dask(tmp_path, monkeypatch):
-    distributed = pytest.importorskip("distributed")
-    monkeypatch.setitem(CHUNK, "batch", 500)
-    study = load_study("table4", policies=["greedy"], missions=20_000)
-    run_study(study, tmp_path / "1", workers=1)
-    run_study(study, tmp_path / "2", workers=2)
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
-    with distributed.LocalCluster(**options) as cluster:
-        run_study(study, tmp_path / "dask", scheduler=cluster.scheduler_address)
-    assert files_of(tmp_path / "1") == files_of(tmp_path / "2") == files_of(tmp_path / "dask")

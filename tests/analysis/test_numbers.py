@@ -19,20 +19,11 @@ def test_differences_are_in_points_with_a_sign() -> None:
     assert numbers.points(0.01, -0.002, 0.0222) == "+1.0 [−0.2, +2.2]"
 
 
-def test_a_margin_is_in_words() -> None:
-    assert [numbers.margin(share) for share in (0.01, 0.005)] == ["1 point", "0.5 points"]
-
-
 @pytest.mark.parametrize(
     ("values", "text"), [([300, 300], "300"), ([1200, 20, 300], "20 to 1,200"), ([7], "7")]
 )
 def test_a_span_is_one_number_where_all_are_alike(values: list[int], text: str) -> None:
     assert numbers.span(values) == text
-
-
-def test_names_are_joined_as_in_a_sentence() -> None:
-    assert numbers.words(["a"]) == "a"
-    assert numbers.words(["a", "b", "c"]) == "a, b and c"
 
 
 def test_a_wide_table_keeps_the_order_of_appearance() -> None:
@@ -52,13 +43,6 @@ def test_a_wide_table_keeps_the_order_of_appearance() -> None:
 )
 def test_a_time_has_three_digits_in_its_unit(time: float, text: str) -> None:
     assert numbers.seconds(time) == text
-
-
-def test_a_table_may_have_two_rows_of_heads() -> None:
-    table = numbers.headed([{("", "Policy"): "a", ("Calls", "n"): "3"}])
-    assert table.columns.tolist() == [("", "Policy"), ("Calls", "n")]
-    assert table.to_numpy().tolist() == [["a", "3"]]
-    assert numbers.headed([]).empty
 
 
 @pytest.mark.parametrize(

@@ -155,11 +155,6 @@ def test_a_worker_that_cannot_run_a_job_is_one_line(tmp_path, monkeypatch):
 
 ADDRESSES = {
     "nonsense": "missing port number",
-    "http://127.0.0.1:80": "unknown address scheme",
-    "inproc://": "cannot be reached",
-    "tls://127.0.0.1:80": "TLS expects",
-    "tcp://[::1:4": "ipv6 needs brackets",
-    "tcp://127.0.0.1:99999": "cannot be reached",
     "silent": "no scheduler answers within",
     "worker": "is a Worker; allowed: tcp://HOST:PORT of a scheduler",
 }

@@ -113,19 +113,6 @@ def test_very_many_points_are_not_made(tmp_path):
     assert "points" not in study.__dict__
 
 
-@pytest.mark.parametrize("kind", ["latin-hypercube", "saltelli"])
-def test_very_many_points_are_planned_without_making_them(kind, tmp_path):
-    size = {"size": 2**20} if kind == "latin-hypercube" else {"base": 2**17}
-    design = {"kind": kind, "ranges": {"quota": [1, 50], "arrival_rate": [0.0, 0.1]}} | size
-    study = small_study(tmp_path, design=design, policies=["random"], missions=1)
-    plan = plan_study(study, tmp_path / "out")
-    assert plan.missions == plan.points == study.size
-    assert study.size > 600_000
-    with pytest.raises(InputError, match=f"{study.size:,} missions to simulate .*--yes, or less"):
-        check_effort(study, tmp_path / "out")
-    assert "points" not in study.__dict__ | study.design.__dict__
-
-
 def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     study = small_study(tmp_path, missions=10**9)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**40)
@@ -135,15 +122,6 @@ def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     assert plan_study(study, tmp_path / "out").missions == 2 * 10**9
 
 
-def test_event_logs_take_time_too(tmp_path):
-    study = small_study(tmp_path, missions=6000, logged=6000, policies=["random"])
-    with pytest.raises(InputError, match="6,000 missions to simulate .*about 20 hours"):
-        check_effort(study, tmp_path / "out", clock=Clock(6.0))
-    check_effort(study, tmp_path / "out", clock=Clock(6.0), yes=True)
-    few = small_study(tmp_path, missions=6000, policies=["random"])
-    check_effort(few, tmp_path / "out", clock=Clock(6.0))
-
-
 def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path, monkeypatch):
     monkeypatch.setattr(dry_run, "upper_bound", lambda *_, **__: None)
     study = small_study(tmp_path, bounds=True)
@@ -151,13 +129,3 @@ def test_bounds_are_part_of_the_plan_and_of_the_time(tmp_path, monkeypatch):
     assert (plan.bounds.missions, plan.bounds.present, plan.bounds.seconds) == (10, 0, 600.0)
     assert plan.seconds == pytest.approx(sum(p.seconds for p in plan.policies) + 600.0)
     assert plan_study(small_study(tmp_path), tmp_path / "out").bounds is None
-
-
-def test_bounds_that_take_long_are_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(dry_run, "upper_bound", lambda *_, **__: None)
-    monkeypatch.setattr(dry_run, "FEW_BOUNDS", 9)
-    study = small_study(tmp_path, bounds=True)
-    with pytest.raises(InputError, match="about 100 minutes; allowed: --yes"):
-        check_effort(study, tmp_path / "out", clock=Clock(600.0))
-    assert check_effort(study, tmp_path / "out", clock=Clock(6.0)) == 20
-    assert check_effort(study, tmp_path / "out", clock=Clock(600.0), yes=True) == 20

@@ -13,19 +13,14 @@ from analysis.execution import effort
 from analysis.execution.effort import (
     EVENT,
     MAX_WORKERS,
-    TRIAL,
-    are_few,
     check_missions,
-    check_time,
     check_workers,
     check_workers_memory,
     mission_memory,
-    seconds_per_mission,
 )
 from dess import InputError, load_scenario, simulate
 from dess.channel import world_of
 from dess.code import memory
-from dess.scenario.limits import MOST_PACKETS
 from policies import load_team
 from tests.analysis.small import environment
 
@@ -74,39 +69,6 @@ def test_workers_need_the_memory_that_is_available(monkeypatch):
         check_workers_memory("an evaluation", 4, [wide], 0.0, are_processes=False)
 
 
-def test_few_missions_are_few_where_they_are_short():
-    assert are_few(10_000, PAPER)
-    assert not are_few(10_001, PAPER)
-    assert not are_few(100, load_scenario("paper", uavs=16, max_slots=100_000))
-
-
-def test_more_than_an_hour_is_refused():
-    check_time("a study", 3600.0)
-    with pytest.raises(InputError, match="a study, about 2 hours; allowed: --yes, or less"):
-        check_time("a study", 7200.0)
-
-
-def test_packets_count(monkeypatch):
-    busy = load_scenario("paper", arrival_rate=40, **CONTINUOUS)
-    assert busy.packets == 25 * 40 * 500 and PAPER.packets == 0
-    assert mission_memory(busy) > mission_memory(PAPER)
-    assert not are_few(100, busy)
-    with pytest.raises(InputError, match="a study: 200 missions to simulate, about 84 minutes"):
-        check_missions("a study", [busy] * 200)
-
-
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"max_slots": 100_000, "arrival_rate": 100, "arrivals.schedule": [[0, 0], [99_999, 100]]},
-        {"max_slots": 500, "arrival_rate": 100, "arrivals.schedule": [[0, 100]]},
-    ],
-)
-def test_more_packets_than_a_mission_can_have_are_refused(fields):
-    with pytest.raises(InputError, match=rf"arrivals: .* packets .*; allowed: {MOST_PACKETS:,}"):
-        load_scenario("paper", **fields, **CONTINUOUS)
-
-
 @settings(max_examples=60, deadline=None)
 @given(st.fixed_dictionaries({}, optional={n: st.sampled_from(v) for n, v in EXTREME.items()}))
 def test_every_mission_ends_or_is_refused(fields):
@@ -146,18 +108,3 @@ def test_a_worker_ends_with_a_killed_parent_before_it_has_loaded_anything():
         capture_output=True, text=True, check=True, env=environment(),
     )  # fmt: skip
     assert not {"numpy", "numba", "pandas", "joblib"} & {*loaded.stdout.split()}
-
-
-def test_a_slow_mission_is_tried_alone(monkeypatch):
-    asked, times = [], iter([0.0, 0.0, 0.0, 20.0])
-
-    def spaces(missions):
-        asked.append(missions)
-        return [load_scenario("paper", quota=1)] * missions
-
-    team = load_team("random")
-    assert seconds_per_mission(spaces, team, clock=lambda: next(times)) == 20.0
-    assert asked == [1, 1]
-    times = iter([0.0, 0.0, 0.0, 1.0, 0.0, 4.8])
-    assert seconds_per_mission(spaces, team, "events", lambda: next(times)) == 4.8 / TRIAL
-    assert effort.LONG_RUN == 3600.0

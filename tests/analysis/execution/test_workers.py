@@ -51,16 +51,6 @@ def test_a_chunk_that_raises_is_recorded_and_the_rest_goes_on(workers, plugin, t
     check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
 
 
-def test_a_policy_that_raises_leaves_the_others_whole(plugin, tmp_path):
-    study = small_study(tmp_path, policies=["greedy", "raising"])
-    failing(study, tmp_path / "out")
-    run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "alone")
-    ours, alone = (
-        files_of(tmp_path / folder / "missions" / "policy=greedy") for folder in ("out", "alone")
-    )
-    assert ours == alone
-
-
 def test_what_the_store_refuses_is_a_failure_of_its_chunk(tmp_path, monkeypatch):
     keys = set()  # of the cell of either team
 

@@ -94,15 +94,6 @@ def test_ages_of_a_log_are_those_of_the_record_and_those_that_policies_see(
     assert of_nodes.loc[duration(log)].mean() == pytest.approx(age[-1], abs=1e-9)
 
 
-def test_steps_are_one_cell_long_and_join() -> None:
-    slots = uav_slots(logged("greedy", uavs=3)[1])
-    length = (slots["x"] - slots["from_x"]).abs() + (slots["y"] - slots["from_y"]).abs()
-    assert (length == slots["moved"]).all()
-    for _, steps in slots.groupby("uav"):
-        assert steps["slot"].tolist() == list(range(len(steps)))
-        assert (steps["from_x"].iloc[1:].to_numpy() == steps["x"].iloc[:-1].to_numpy()).all()
-
-
 def test_the_node_of_a_slot_is_the_one_served_most_and_last() -> None:
     log = {
         "time": [0, 0, 0, 0.25, 0.5, 0.75, 1.0, 1, 1.25, 1.5, 1.75, 2.0, 2, 3],
@@ -130,11 +121,3 @@ def test_batteries_start_full_and_move_by_a_flight_or_a_charge() -> None:
         steps = curve["battery"].diff().iloc[1:]
         assert (steps == -1).sum() == record.uavs["slots_flying"][uav]
         assert (steps > 0).sum() == record.uavs["slots_charging"][uav]
-
-
-def test_residual_data_starts_with_the_initial_and_ends_with_the_rest() -> None:
-    record, log = logged("greedy")
-    total = residual_data(log).sum(axis=1)
-    assert len(total) == record.slots + 1
-    assert total.iloc[0] == pytest.approx(record.initial, abs=1e-9)
-    assert total.iloc[-1] == pytest.approx(record.residual, abs=1e-9)

@@ -125,18 +125,3 @@ def test_more_missions_than_the_study_asks_for_are_refused(
             assert refused and "fewer or more than those of the study" in str(error)
         else:
             assert not refused
-
-
-def test_claims_that_no_file_supports_are_refused_at_once(sound: Path, tmp_path: Path) -> None:
-    document = json.loads((sound / "manifest.json").read_text())
-    claims: dict[str, Any] = {
-        "missions": [[10**9] * 2] * 2,
-        "selected": [None, None],
-        "points": [{"values": {"uavs": 1}, "replication": 0}] * 2,
-        "study": document["study"] | {"design": grid(uavs=[*range(1000)], quota=[*range(1000)])},
-    }
-    for field, claim in claims.items():
-        folder = tmp_path / field
-        folder.mkdir()
-        (folder / "manifest.json").write_text(json.dumps(document | {field: claim}))
-        assert main(["study", "show", str(folder)]) == 2

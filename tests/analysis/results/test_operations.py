@@ -4,21 +4,20 @@ import math
 import shlex
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from analysis import load_results, run_study, summary
 from analysis.execution.evaluation import means
 from analysis.names import MEASURES, measured_in
-from analysis.questions import settings
 from analysis.questions.diff import diff
 from analysis.results.resimulate import difference, recorded, resimulate
 from analysis.stats.intervals import interval_of
 from analysis.stats.paired import compare
 from dess import load_scenario, simulate_batch
-from dess.record import OPERATIONS
 from policies import load
 from reports.cli.settings import load_space
-from tests.analysis.small import files_of, grid, small_study
+from tests.analysis.small import grid, small_study
 
 MEASURED = {"charging.measured": True, "age.measured": True}
 
@@ -31,10 +30,6 @@ def results(tmp_path_factory):
     return run_study(small_study(folder, set=MEASURED, design=design), folder / "out")
 
 
-def test_every_column_has_a_name_and_a_unit():
-    assert {*MEASURES} == {*OPERATIONS.names}
-
-
 def test_stored_values_are_those_of_the_engine(results):
     for point in range(4):
         rows = results.missions.query("policy == 'greedy' and point == @point")
@@ -42,11 +37,6 @@ def test_stored_values_are_those_of_the_engine(results):
         for name in measured_in(results.missions):
             np.testing.assert_array_equal(rows[name], records.operations[name])
     assert {"age", "queue", "utilisation", "failures"} <= {*measured_in(results.missions)}
-
-
-def test_a_mission_that_measures_nothing_has_nan(results):
-    at = results.missions.groupby("failures.uav_rate")["failures"]
-    assert at.apply(lambda values: values.isna().all()).tolist() == [True, False]
 
 
 def test_loaded_results_are_the_same_and_none_counts_as_damaged(results):
@@ -59,7 +49,8 @@ def test_loaded_results_are_the_same_and_none_counts_as_damaged(results):
 def test_a_plain_study_stores_no_column_of_them(tmp_path):
     plain = run_study(small_study(tmp_path), tmp_path / "out")
     assert measured_in(plain.missions) == []
-    assert all(len(t.missions.schema) == 17 for t in plain.store._tables.values())
+    paths = (plain.store.folder / "missions").rglob("*.parquet")
+    assert {len(pq.read_schema(path)) for path in paths} == {17}
 
 
 def test_a_resumed_study_and_one_that_takes_over_missions_have_them(tmp_path, results):
@@ -93,12 +84,6 @@ def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results)
     assert table["n"].tolist() == [9]
 
 
-def test_less_age_ranks_first(results):
-    table = settings.ranked(results, "age")
-    assert table["age"].is_monotonic_increasing
-    assert table["tied"].iloc[0]
-
-
 def test_evaluations_have_them_beside_the_metrics_of_the_paper():
     space = load_scenario("paper", quota=30, **MEASURED)
     found = means(space, "greedy", 20, 5)
@@ -120,15 +105,6 @@ def test_tables_of_sections_are_fields_of_a_study(tmp_path):
     assert all(point.scenario.charging.measured for point in nested.points)
 
 
-def test_points_that_do_not_set_a_section_have_its_default(tmp_path):
-    rows = [{"pads": 1}, {"failures.uav_rate": 0.01}, {"fleet": [{"slots_per_cell": 2}]}]
-    study = small_study(tmp_path, design={"kind": "table", "rows": rows}, missions=2)
-    table = settings.points(run_study(study, tmp_path / "out"))
-    assert table["failures.uav_rate"].tolist() == [0.0, 0.01, 0.0]
-    assert table["fleet"].tolist()[:2] == ["none", "none"]
-    assert "slots_per_cell 2" in table["fleet"][2]
-
-
 def test_the_command_of_a_mission_sets_sections_and_fleets(tmp_path):
     rows = [
         {"fleet": [{"slots_per_cell": 2}, {"quota": 5}], "charging": {"order": "lowest-battery"}}
@@ -138,10 +114,3 @@ def test_the_command_of_a_mission_sets_sections_and_fleets(tmp_path):
     words = shlex.split(results.command("greedy", 0, 1))
     fields = [words[n + 1] for n, word in enumerate(words) if word == "--set"]
     assert load_space("paper", fields) == results.scenario(0)
-
-
-def test_workers_change_no_file(tmp_path):
-    study = small_study(tmp_path, set=MEASURED, design=grid(**{"failures.uav_rate": [0.0, 0.01]}))
-    run_study(study, tmp_path / "one")
-    run_study(study, tmp_path / "two", workers=2)
-    assert files_of(tmp_path / "one") == files_of(tmp_path / "two")

@@ -65,30 +65,20 @@ KEY = "0123456789abcdef"
 FORGERIES: dict[str, tuple[str, Forge]] = {
     "parts that are no JSON": ("missions uavs", parts(b"{")),
     "parts that are nested": ("missions uavs", parts(b"[" * 10_000)),
-    "parts of the wrong form": ("missions uavs", parts({"a": 1})),
     "parts of other types": ("missions uavs", parts([[5, "0", None]])),
-    "no parts": ("missions uavs", parts([])),
-    "long parts": ("missions uavs", parts([[KEY, 0, 10**18]])),
     "parts without end": ("missions uavs", parts([[KEY, 5, 2]])),
-    "parts below 0": ("missions uavs", parts([[KEY, -4, 0]])),
     "other parts": ("missions uavs", parts([[KEY, 0, 4]])),
     "parts that overlap": ("missions uavs", parts([[KEY, 0, 2], [KEY, 0, 2]])),
     "counts below 0": ("missions", column("slots", lambda v: -v)),
     "no number": ("missions", column("collected", lambda v: v * np.nan)),
-    "no value": ("missions", column("collected", lambda v: [None, *v[1:]])),
     "another seed": ("missions", column("seed", lambda v: (v + 1).astype(np.uint64))),
     "many UAVs": ("missions", column("uavs", lambda v: v + 10**9)),
-    "another type": ("missions", column("slots", lambda v: v.astype(float))),
     "another column": ("missions", lambda table: table.rename_columns({"slots": "x"})),
-    "a column less": ("missions", lambda table: table.drop_columns(["slots"])),
-    "a row less": ("missions", lambda table: table[:-1]),
     "a UAV less": ("uavs", lambda table: table[:-1]),
     "an end that there is not": ("uavs", column("end", lambda v: ["<script>"] * len(v))),
     "a UAV twice": ("uavs", column("uav", lambda v: v * 0)),
     "an event that there is not": ("events", column("event", lambda v: ["<b>"] * len(v))),
     "a time without end": ("events", column("time", lambda v: v + 1e15)),
-    "a UAV that there is not": ("events", column("uav", lambda v: v + 10**9)),
-    "a log without rows": ("events", lambda table: table[:0]),
 }
 
 
@@ -113,7 +103,7 @@ def test_event_logs_of_before_are_read_and_verified(sound: Path, tmp_path: Path)
 
     def former(table: pa.Table) -> pa.Table:
         rows = [name not in PARAMETER_EVENTS for name in table["event"].to_pylist()]
-        return table.filter(pa.array(rows)).select(parquet.FORMER_EVENTS.names)
+        return table.filter(pa.array(rows)).select(parquet.SCHEMAS["events"][1].names)
 
     folder = forged(sound, tmp_path / "out", "events", former)
     log = load_results(folder).events("greedy")

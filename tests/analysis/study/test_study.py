@@ -37,10 +37,6 @@ def test_the_papers_studies_run_every_heuristic_and_learned_policy():
         assert load_study(name).policies == (*guarded, *once)
 
 
-def test_policies_are_compared_by_all_their_trainings():
-    assert {*trained_names()} <= {*load_study("comparison").policies}
-
-
 def test_fig5_moves_one_parameter_of_table_2_at_a_time():
     study, space = load_study("fig5"), load_scenario("paper")
     assert study.missions == 300
@@ -67,67 +63,29 @@ def test_a_rule_decides_how_many_missions_there_are(tmp_path):
     assert small_study(tmp_path).first == 10
 
 
-def test_design_points_are_the_product_in_the_given_order(tmp_path):
-    study = small_study(tmp_path, design=grid(uavs=[2, 1], quota=[30, 20]), set={"pads": 1})
-    designs = [(point.values["uavs"], point.values["quota"]) for point in study.points]
-    assert designs == [(2, 30), (2, 20), (1, 30), (1, 20)]
-    for point in study.points:
-        assert point.scenario.uavs == (point.values["uavs"],) * 2
-        assert point.scenario.quota == point.values["quota"]
-        assert point.scenario.pads == 1
-
-
-def test_without_a_sweep_there_is_one_point(tmp_path):
-    (point,) = small_study(tmp_path).points
-    assert point.values == {}
-    assert point.scenario.grid == 8
-
-
-def test_a_file_names_its_study_and_finds_its_scenario_beside_it(tmp_path, monkeypatch):
-    monkeypatch.chdir("/")
-    assert small_study(tmp_path).name == "trial"
-
-
 def test_teams_are_written_alike(tmp_path):
     assert small_study(tmp_path, policies=["greedy , tour"]).policies == ("greedy,tour",)
 
 
 BAD = {
-    "nonsense = 1": ["nonsense: unknown key", "policies", "missions"],
     "missions = 0": ["missions: 0 is out of range; allowed: an integer 1.."],
-    "missions = '9'": ["missions: '9' is not an integer"],
     "missions = true": ["missions: True is not an integer"],
     "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
-    "engine = 'fast'": ["engine: 'fast' is unknown; allowed: batch, events"],
     "logged = 2000": ["logged: 2000", "0..1000"],
-    "name = 'a/b'": ["name: 'a/b' has the wrong form"],
-    "policies = []": ["policies"],
     "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "nearest, greedy, tour"],
     "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
-    "policies = 'greedy'": ["policies"],
-    "scenario = 'nope'": ["nope: no such scenario", "paper"],
     "set.uavs = 99": ["uavs: 99", "1..16"],
     "set.uavz = 2": ["uavz: unknown key (did you mean uavs?)"],
     "design = {kind = 'grid', values.uavs = [1, 20]}": ["at uavs=20", "1..16"],
-    "design = {kind = 'grid', values.uavs = []}": ["uavs has no values"],
-    "design = {kind = 'grid', values.uavs = 2}": ["values.uavs"],
-    "design = {kind = 'grid', values.uavs = [1, 2, 1]}": ["uavs=1 is listed twice"],
     "design = {kind = 'grid', values.uavs = [[1, 1], 1]}": ["uavs=1 is listed twice"],
-    "design = {kind = 'grid', values.arrival_rate = [1, 1.0]}": ["arrival_rate=1.0 is listed"],
     "design = {kind = 'one-at-a-time', values.arrival_rate = [0.0, -0.0]}": ["is listed twice"],
-    "design = {kind = 'table', rows = [{quota = 1, uavs = 1}, {uavs = 1, quota = 1}]}": [
-        "uavs=1, quota=1 is listed twice"
-    ],
-    "design = {kind = 'grid', values.uavz = [1, 2]}": ["at uavz=1", "uavz: unknown key"],
     "design = {kind = 'cube', values.uavs = [1]}": ["kind: 'cube' is unknown", "grid", "saltelli"],
-    "design = {values.uavs = [1]}": ["design", "kind"],
     "design = {kind = 'saltelli', base = 2, ranges.uavs = [1, 2]}": ["missions = 1"],
     "set.uavs = 1\ndesign = {kind = 'grid', values.uavs = [1, 2]}": ["uavs is also in set"],
     "design = {kind = 'grid', values.charge_start = [30, 70]}": [
         "at charge_start=70",
         "charge_complete",
     ],
-    "sweep.uavs = [1, 2]": ["sweep: unknown key", "design"],
     "missions = 9\nprecision.targets.success.absolute = 0.1": [
         "missions: are decided by precision"
     ],
@@ -136,32 +94,13 @@ BAD = {
     ],
     "selection = {procedure = 'kn', indifference = 0.1}\n"
     "precision.targets.success.absolute = 0.1": ["precision: selection is also given"],
-    "selection = {procedure = 'kn', indifference = -0.1}": [
-        "selection: kn: indifference: -0.1 is out of range; allowed: a number 1e-09..1,000,000,000",
-    ],
     "selection = {procedure = 'kn', indifference = 0.1, first = 9, budget = 8}": [
         "selection.budget: 8",
         "9 or more",
     ],
-    "selection.procedure = 'best'": ["selection: procedure: 'best'", "kn, kn-bounded, cheapest"],
     "selection = {procedure = 'cheapest', requirements.success = 0.99, indifference = 1}": [
         "costs: are missing; allowed: a table of prices"
     ],
-    "costs.uav = 1\nselection = {procedure = 'cheapest', requirements.success = 0.99}": [
-        "selection: cheapest: indifference: is missing; allowed: a number 1e-09.."
-    ],
-    "costs.uav = 1\n"
-    "selection = {procedure = 'cheapest', requirements.success = 1.0, indifference = 1}": [
-        "requirements.success: 1 is out of range; allowed: between 0.005 and 0.995"
-    ],
-    "costs.uav = 1\n"
-    "selection = {procedure = 'cheapest', requirements.speed = 0.9, indifference = 1}": [
-        "selection: cheapest: requirements.speed",
-        "'success', 'collection_ratio' or 'collection_ratio_and_communication'",
-    ],
-    "costs.uav = -1": ["costs.uav", "-1 is out of range; allowed: a number 0..1,000,000,000,000"],
-    "precision.targets.speed.absolute = 0.1": ["precision.targets", "speed"],
-    "missions = ": ["not valid TOML"],
     "missions = 1\n[design": ["not valid TOML"],
 }
 

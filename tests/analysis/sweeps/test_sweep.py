@@ -41,22 +41,6 @@ def test_settings_are_ranked(asking):
     assert answer.guarantee == ""
 
 
-def test_prices_add_their_cost(tmp_path):
-    prices = {"uav": 7, "pad": 2}
-    answer = sweep(
-        write_scenario(tmp_path),
-        missions=4,
-        folder=tmp_path,
-        prices=prices,
-        progress=False,
-        uavs=[1, 2],
-        pads=[1, 3],
-    )
-    table = answer.table("cost")
-    assert [*table["cost"]] == [9.0, 13.0, 16.0, 20.0]
-    assert [*table["cost"]] == [*(7 * table["uavs"] + 2 * table["pads"])]
-
-
 def test_the_cheapest_settings_are_the_best(tmp_path):
     about = {"missions": 5, "folder": tmp_path, "prices": {"uav": 7}, "progress": False}
     answer = sweep(

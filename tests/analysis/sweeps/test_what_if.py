@@ -48,12 +48,6 @@ def test_the_answer_has_the_difference_of_every_policy(asked: WhatIf) -> None:
     assert asked._repr_markdown_() == asked.answer()  # what Jupyter shows
 
 
-def test_it_knows_what_was_asked(asked: WhatIf) -> None:
-    assert (asked.missions, asked.scenario) == (MISSIONS, "small.toml")
-    assert asked.fields()["Field"].tolist()[:2] == ["uavs", "pads"]
-    assert "--set pads=1" in asked.command() and "rows" in asked.as_toml()
-
-
 def test_figures_are_drawn(asked: WhatIf) -> None:
     drawn = [asked.plot(), asked.plot_spread(), *map(asked.plot_means, METRICS)]
     assert all(isinstance(figure, Figure) for figure in drawn)

@@ -1,1 +1,0 @@
-"""Upper bounds of the missions of a study, as files of its results folder."""
