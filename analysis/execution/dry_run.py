@@ -58,38 +58,13 @@ class Planned:
         return self.missions - self.present
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a run of a study would do.
-
-    Attributes:
-        policies: What the run would do for every policy.
-        points: Number of design points.
-        at_most: Largest number of missions that a rule may ask for, over all policies; None without
-            a rule.
-        seconds: Estimated time of what is missing with all workers [s].
-        bounds: What the run would do for the upper bounds; None if the study has none.
-    """
-
-    policies: tuple[Planned, ...]
-    points: int
-    at_most: int | None
-    seconds: float
-    bounds: Planned | None = None
-
-    @property
-    def missions(self) -> int:
-        """Number of missions needed of all policies, without those that a rule adds."""
-        return sum(planned.missions for planned in self.policies)
-
-
 def plan_study(
     study: Study,
     out: str | Path,
     workers: int = 1,
     clock: Clock = time.perf_counter,
     accept_code: bool = False,
-) -> Plan:
+) -> list[Planned]:
     """Plan a run; nothing is written.
 
     Args:
@@ -98,6 +73,9 @@ def plan_study(
         workers: Number of processes.
         clock: Returns the time [s].
         accept_code: Whether missions that other code has simulated count as present.
+
+    Returns:
+        What the run would do for every policy and, if the study has bounds, for these.
 
     Raises:
         InputError: If the folder contains something else, or ``workers`` is below 1.
@@ -108,11 +86,7 @@ def plan_study(
             f"study {study.name}: {study.size:,} design points; allowed: {MAX_SIZE:,} at most"
         )
     counted = _counted(study, _folder(study, out, accept_code))
-    parts = [replace(p, seconds=_seconds(study, p, clock)) for p in counted]
-    rows = tuple(parts[: len(study.policies)])
-    at_most = len(study.policies) * _budget(study) if study.rule else None
-    seconds = sum(planned.seconds for planned in parts) / workers
-    return Plan(rows, study.size, at_most, seconds, parts[-1] if study.bounds else None)
+    return [replace(planned, seconds=_seconds(study, planned, clock)) for planned in counted]
 
 
 def check_run(
@@ -238,13 +212,13 @@ def _counted(study: Study, store: Store | None) -> list[Planned]:
     return plan
 
 
-def _budget(study: Study) -> int:
-    """Largest number of missions of a policy that the rule of a study may ask for."""
+def budget(study: Study) -> int:
+    """Largest number of missions that a study may need, which a rule decides if it has one."""
+    each = study.most * study.size
     if study.selection:
         checked = study.size if isinstance(study.selection, Cheapest) else 1
-        return study.selection.budget + study.selection.check * checked
-    assert study.precision
-    return study.precision.budget * study.size
+        each = study.selection.budget + study.selection.check * checked
+    return len(study.policies) * each
 
 
 def _seconds(study: Study, planned: Planned, clock: Clock) -> float:

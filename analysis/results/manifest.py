@@ -253,32 +253,32 @@ class Manifest(Origin):
 
     @cached_property
     def _point_keys(self) -> list[str]:
-        texts = (space.model_dump_json() for space in self.scenarios)
-        return [f"{text} {p.replication}" for text, p in zip(texts, self.points, strict=True)]
+        points = zip(self._scenario_texts, self.points, strict=True)
+        return [f"{text} {point.replication}" for text, point in points]
 
     @cached_property
     def cells(self) -> tuple[tuple[Cell, ...], ...]:
         """The cells of every team, in the order of the design points."""
         run = {"version": self.version, "code": self.engine_code, "seed": self.seed}
-        scenarios = [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
-        teams = []
-        for number, team in enumerate(self.policies):
-            members = [member.model_dump(mode="json", by_alias=True) for member in team.members]
-            whose = _canonical(run | {"members": members})
-            keys = (sha256((whose + text).encode()).hexdigest()[:16] for text in scenarios)
-            teams.append(
-                tuple(Cell(number, p, k, self.points[p].replication) for p, k in enumerate(keys))
-            )
-        return tuple(teams)
+        members = [team.data["members"] for team in self.policies]
+        return tuple(self._cells(n, run | {"members": of}) for n, of in enumerate(members))
 
     @cached_property
     def bound_cells(self) -> tuple[Cell, ...]:
         """The cells of the bounds, in the order of the design points; none without bounds."""
         run = {"version": self.version, "bound": self.bound_code, "seed": self.seed}
-        scenarios = [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
-        keys = [sha256((_canonical(run) + text).encode()).hexdigest()[:16] for text in scenarios]
-        cells = [Cell(NO_TEAM, p, k, self.points[p].replication) for p, k in enumerate(keys)]
-        return tuple(cells) if self.bound_code else ()
+        return self._cells(NO_TEAM, run) if self.bound_code else ()
+
+    def _cells(self, team: int, run: dict[str, Any]) -> tuple[Cell, ...]:
+        """The cells of what is made with the same code and seed at every design point."""
+        texts = (_canonical(run) + text for text in self._scenario_texts)
+        keys = (sha256(text.encode()).hexdigest()[:16] for text in texts)
+        points = enumerate(zip(keys, self.points, strict=True))
+        return tuple(Cell(team, p, key, point.replication) for p, (key, point) in points)
+
+    @cached_property
+    def _scenario_texts(self) -> list[str]:
+        return [_canonical(space.model_dump(mode="json")) for space in self.scenarios]
 
     @property
     def text(self) -> str:
@@ -299,7 +299,7 @@ def _suits(selected: Selected, study: StudyData, complete: bool) -> bool:
     return isinstance(selected, list) == isinstance(study.selection, Cheapest)
 
 
-_ALLOWED = "another --out, or remove the folder"
+_ALLOWED = "another --out or name, or remove the folder"
 
 
 def _canonical(data: Any) -> str:

@@ -26,7 +26,6 @@ from analysis.execution.runner import Round, run_study
 from analysis.names import ALIASES, METRICS, SWEEP, SWEEPS
 from analysis.results.chunks import short_hash
 from analysis.results.files import MANIFEST
-from analysis.results.manifest import Manifest
 from analysis.results.provenance import engine_code, team_of
 from analysis.results.tables import Results
 from analysis.study.cheapest import Cheapest
@@ -160,7 +159,6 @@ def ask(
     """
     out = folder_of(study, folder)
     others = [path.parent for path in paths_in(out.parent, f"*/{MANIFEST}") if path.parent != out]
-    _check_name(study, out)
     check_run(study, out, workers, reuse=others, yes=yes)
     write(study, folder)
     return run_study(study, out, workers, None, progress, announce, reuse=others)
@@ -235,14 +233,3 @@ def _name_of(study: Study, fields: Iterable[str]) -> str:
     }
     key = short_hash(json.dumps(about, sort_keys=True).encode())
     return f"{'-'.join(fields)[:LONGEST] or 'sweep'}-{key}"
-
-
-def _check_name(study: Study, out: Path) -> None:
-    """Refuse a name that belongs to another question."""
-    path = out / MANIFEST
-    if path.exists():
-        try:
-            Manifest.read(path).extended_to(Manifest.of(study), path, None)
-        except InputError as error:
-            what = str(error).partition("; allowed:")[0]
-            raise InputError(f"{what}; allowed: another name, or remove the folder") from None

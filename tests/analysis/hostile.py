@@ -38,7 +38,7 @@ def hostile_folder(sound: Path, into: Path, text: str) -> Path:
     source = Store.read(sound)
     # Nothing is validated, so that texts that reading refuses reach the folder as well.
     manifest = source.manifest.model_copy(update=_changed(source.manifest, text))
-    for name in ("cells", "scenarios", "values", "costs", "selection", "settings"):
+    for name in ("cells", "bound_cells", "scenarios", "values", "costs", "selection", "settings"):
         manifest.__dict__.pop(name, None)  # cached properties of the original
     into.mkdir(parents=True)
     store = Store(into, manifest)

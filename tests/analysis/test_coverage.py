@@ -2,8 +2,8 @@
 
 A 95 % interval covers in 93 to 97 % of the trials. Of 2000 trials the share covered has a standard
 deviation of 0.49 %, so an interval that keeps its level leaves that band with a chance below 1e-4;
-where fewer trials are run, the band is widened to 4 standard deviations. Wilson's interval and the
-quantile's depend on a binomial count only, so their coverage is summed, not drawn.
+where fewer trials are run, the band is widened to 4 standard deviations. The quantile's interval
+depends on a binomial count only, so its coverage is summed, not drawn.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -14,11 +14,10 @@ import pytest
 from scipy import stats
 
 from analysis.names import PRODUCT
-from analysis.stats.bootstrap import bootstrap_interval
 from analysis.stats.bounded import bounded_ends
 from analysis.stats.correction import adjust
 from analysis.stats.distribution import quantile_interval
-from analysis.stats.intervals import mean_interval, stratified, wilson
+from analysis.stats.intervals import mean_interval, stratified
 from analysis.stats.learners import crossed
 from analysis.stats.paired import paired
 
@@ -46,47 +45,6 @@ def error(trials: int, share: float = 0.95) -> float:
 def holds(coverage: float, trials: int = TRIALS) -> bool:
     margin = max(0.02, error(trials))
     return 0.95 - margin <= coverage <= 0.95 + margin
-
-
-# Shares
-
-
-def wilson_coverages(shares: np.ndarray, n: int) -> np.ndarray:
-    counts = np.arange(n + 1)
-    low, high = np.array([wilson(k, n)[1:] for k in counts]).T
-    p = shares[:, None]
-    return np.sum(stats.binom.pmf(counts, n, p) * ((low <= p) & (p <= high)), axis=1)
-
-
-@pytest.mark.parametrize("n", [30, 100, 300])
-def test_wilson_holds_from_some_failures_on(n):
-    coverages = wilson_coverages(np.linspace(10 / n, 1 - 10 / n, 20), n)
-    assert all(map(holds, coverages))
-    assert np.mean(coverages) == pytest.approx(0.95, abs=0.005)
-
-
-# Means
-
-
-def failing(generator: np.random.Generator, size: int | tuple[int, ...]) -> np.ndarray:
-    """Like the product of a policy that fails one mission in twenty, of mean 0.95 x 0.8."""
-    return np.where(generator.random(size) < 0.05, 0.0, generator.beta(8, 2, size))
-
-
-MEANS: dict[str, tuple[Callable, float, int]] = {
-    "normal-5": (lambda g, n: g.normal(3, 2, n), 3.0, 5),
-    "failing-300": (failing, 0.76, 300),
-    "exponential-300": (lambda g, n: g.exponential(size=n), 1.0, 300),
-}
-
-
-@pytest.mark.parametrize("trials", QUICK)
-@pytest.mark.parametrize(("draw", "mean", "n"), MEANS.values(), ids=MEANS)
-def test_student_covers_the_mean(draw, mean, n, trials):
-    generator = rng(1)
-    assert holds(
-        covered((mean_interval(draw(generator, n))[1:] for _ in range(trials)), mean), trials
-    )
 
 
 # Means of values from 0 to 1
@@ -197,16 +155,6 @@ def test_stratified_intervals_cover_the_mean_over_the_points(shared, trials):
     assert covered(intervals, 0.9 * means.mean()) >= 0.95 - max(0.02, error(trials))
 
 
-@pytest.mark.parametrize("trials", QUICK)
-@pytest.mark.parametrize("name", ["failing-300", "exponential-300"])
-def test_bca_covers_the_mean_of_skewed_values(name, trials):
-    draw, mean, n = MEANS[name]
-    generator = rng(2)
-    samples = (draw(generator, n) for _ in range(trials))
-    intervals = (bootstrap_interval(x, np.mean, generator, resamples=499)[1:] for x in samples)
-    assert holds(covered(intervals, mean), trials)
-
-
 # Distributions
 
 
@@ -258,20 +206,6 @@ def test_holm_bounds_the_chance_of_a_false_claim():
     assert np.mean(families.min(axis=1) <= 0.05) > 0.3  # without
     false = [adjust(p, "holm").min() <= 0.05 for p in families]
     assert 0.01 < np.mean(false) <= 0.05 + error(TRIALS, 0.05)
-
-
-def test_fdr_bounds_the_share_of_false_claims():
-    true = np.repeat([0.0, 3.0], 10)
-    families = p_values(true, TRIALS)
-
-    def share(claims: np.ndarray) -> float:
-        return float(np.mean(claims[:, :10].sum(axis=1) / np.maximum(claims.sum(axis=1), 1)))
-
-    claims = np.array([adjust(p, "fdr") <= 0.05 for p in families])
-    assert 0.01 < share(claims) <= 0.05
-    assert share(families <= 0.05) > 0.05  # without
-    holm = np.array([adjust(p, "holm") <= 0.05 for p in families])
-    assert claims[:, 10:].mean() > holm[:, 10:].mean() + 0.1  # what it is for
 
 
 # Learners

@@ -13,7 +13,7 @@ from reports.cli.settings import PAGES, RESULTS, WorkersOption
 from reports.folders import PREFIX, check_pages
 
 if TYPE_CHECKING:
-    from analysis.execution.dry_run import Plan
+    from analysis.execution.dry_run import Planned
     from analysis.study.study import Study
 
 
@@ -96,20 +96,20 @@ def run(
             console.say(render_study(out, PAGES, progress))
 
 
-def _print_plan(plan: "Plan", study: "Study", out: Path, workers: int) -> None:
+def _print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:
     """Print the missions that a run would simulate, and an estimate of the time."""
-    rows = [
-        [p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"]
-        for p in (*plan.policies, *filter(None, [plan.bounds]))
-    ]
+    from analysis.execution.dry_run import budget
+
+    rows = [[p.policy, f"{p.missions:,}", f"{p.present:,}", f"{p.seconds:,.0f} s"] for p in plan]
     console.print_table(["policy", "missions", "present", "time on one core"], rows)
-    per_cell = f"{study.first} replications"
-    if plan.at_most is not None:
-        rule = "selection" if study.selection else "precision"
-        per_cell += f" and more, up to {plan.at_most:,} missions, as {rule} asks"
+    per_cell, more = f"{study.first} replications", ""
+    if study.rule:
+        rule, more = "selection" if study.selection else "precision", "at least "
+        per_cell += f" and more, up to {budget(study):,} missions, as {rule} asks"
+    missions = sum(p.missions for p in plan[: len(study.policies)])
     console.say(
-        f"{out}: {plan.missions:,} missions of study {study.name} ({len(study.policies)} policies "
-        f"x {plan.points:,} design points x {per_cell})"
+        f"{out}: {missions:,} missions of study {study.name} ({len(study.policies)} policies "
+        f"x {study.size:,} design points x {per_cell})"
     )
-    more = "at least " if plan.at_most is not None else ""
-    console.say(f"about {more}{plan.seconds:,.0f} s with {workers} at work")
+    seconds = sum(p.seconds for p in plan) / workers
+    console.say(f"about {more}{seconds:,.0f} s with {workers} at work")

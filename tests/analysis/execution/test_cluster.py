@@ -23,7 +23,7 @@ from analysis.results.provenance import engine_code, members_of
 from dess import InputError
 from reports import cli
 from tests.analysis import troublesome
-from tests.analysis.execution.test_workers import check_that_the_rest_is_there, failing
+from tests.analysis.execution.test_workers import failing
 from tests.analysis.small import environment, files_of, small_study
 
 distributed = pytest.importorskip("distributed")
@@ -72,13 +72,6 @@ def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     for others in (("0" * 64, members), (code, members_of("random"))):
         with pytest.raises(InputError, match="a worker has other code"):
             _checked(job, *others)
-
-
-def test_dask_records_a_chunk_that_raises(plugin, cluster, tmp_path):
-    study = small_study(tmp_path, policies=["raising", "greedy"])
-    failure = failing(study, tmp_path / "out", scheduler=cluster)
-    assert failure.error == "ZeroDivisionError: nothing to divide by"
-    check_that_the_rest_is_there(study, tmp_path / "out", "raising", 4)
 
 
 @pytest.mark.slow

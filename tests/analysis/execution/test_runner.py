@@ -163,18 +163,6 @@ def test_event_logs_are_those_of_the_missions(tmp_path):
     assert ends["value"].sum() == pytest.approx(row["residual"].item(), abs=1e-9)
 
 
-def test_evaluate_counts_and_times_the_missions_alone(tmp_path):
-    scenario = small_study(tmp_path).points[0].scenario
-    ticks, done = iter([100.0, 102.5]), []
-    batch = evaluate(scenario, "greedy", 30, 7, progress=done.append, clock=lambda: next(ticks))
-    assert batch.seconds == 2.5
-    assert sum(done) == 30
-    assert batch.uav_slots == batch.records.missions["uav_slots"].sum() > 0
-    study = run_study(small_study(tmp_path, missions=30), tmp_path / "out").missions
-    greedy = study[study["policy"] == "greedy"]
-    assert (batch.records.missions["reward"] == greedy["reward"].to_numpy()).all()
-
-
 def test_a_chunk_gives_every_design_point_its_own_missions(tmp_path):
     study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[2, 1]), missions=3)
     missions = run_study(study, tmp_path / "out").missions

@@ -100,6 +100,14 @@ def test_bounds_can_be_added_to_a_study_and_more_missions_to_bounds(tmp_path):
         run_study(plain, tmp_path / "out")
 
 
+def test_bounds_are_as_many_as_the_missions_of_any_policy(tmp_path):
+    targets = {"success": {"absolute": 0.2}, "reward": {"relative": 0.2}}
+    rule = {"first": 5, "look_ahead": 3, "budget": 60, "targets": targets}
+    results = run_study(small_study(tmp_path, bounds=True, precision=rule), tmp_path / "out")
+    counts = [n for (n,) in results.manifest["missions"]]
+    assert len(results.bounds) == max(counts) > min(counts)
+
+
 def test_progress_counts_missions_logs_and_bounds(tmp_path):
     done, rounds = [], []
     study = bounded(tmp_path, logged=2)

@@ -132,7 +132,7 @@ def test_a_name_is_of_one_question(asking, tmp_path):
     assert asking(name="mine")[2] == 24
     assert asking({**FIELDS, "uavs": [1, 2, 3]}, name="mine")[2] == 12
     before = files_of(tmp_path)
-    line = "mine/manifest.json: holds other scenarios .*; allowed: another name, or remove"
+    line = "mine/manifest.json: holds other scenarios .*; allowed: another --out or name, or remove"
     with pytest.raises(InputError, match=line):
         asking({**FIELDS, "uavs": [2]}, name="mine")
     assert files_of(tmp_path) == before
