@@ -20,7 +20,7 @@ EXTRAS = {
     "reports": (
         *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
         *("jinja2", "jupyter_client", "jupytext", "markupsafe"),
-        *("nbclient", "nbconvert", "nbformat", "packaging", "pygments", "rocrate"),
+        *("nbclient", "nbconvert", "nbformat", "packaging", "pygments"),
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
