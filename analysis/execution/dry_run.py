@@ -5,10 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from analysis import numbers
 from analysis.bound import upper_bound
 from analysis.execution.effort import (
-    CONFIRMED,
     FEW,
     TRIAL_SEED,
     Clock,
@@ -20,10 +18,9 @@ from analysis.execution.effort import (
 )
 from analysis.execution.engines import simulate_missions
 from analysis.results.chunks import bound_parts, check_parts, missions_in, parts_of
-from analysis.results.store import MANIFEST, Store, sources
+from analysis.results.store import Store, sources
 from analysis.study.cheapest import Cheapest
-from analysis.study.design import MAX_SIZE
-from analysis.study.study import MANY_POINTS, Study
+from analysis.study.study import Study
 from dess import InputError
 from dess.scenario import ScenarioSpace
 from policies.registry import load_team
@@ -81,11 +78,7 @@ def plan_study(
         InputError: If the folder contains something else, or ``workers`` is below 1.
     """
     check_workers(workers)
-    if study.size > MAX_SIZE:
-        raise InputError(
-            f"study {study.name}: {study.size:,} design points; allowed: {MAX_SIZE:,} at most"
-        )
-    counted = _counted(study, _folder(study, out, accept_code))
+    counted = _counted(study, Store.peek(study, out, accept_code))
     return [replace(planned, seconds=_seconds(study, planned, clock)) for planned in counted]
 
 
@@ -118,7 +111,7 @@ def check_effort(
     reuse: Sequence[Path] = (),
     yes: bool = False,
 ) -> int:
-    """Refuse a run that takes too much time or memory, before the design points are made.
+    """Refuse a run that takes too much time or memory.
 
     Args:
         study: The study.
@@ -134,13 +127,13 @@ def check_effort(
 
     Raises:
         InputError: If the run would take long or more memory than is available (the message has
-            the number of missions and the estimate), has too many design points, the folder
-            contains something else, or ``workers`` is out of range.
+            the number of missions and the estimate), the folder contains something else, or
+            ``workers`` is out of range.
     """
     check_workers(workers)
-    store, teams = _folder(study, out, accept_code), len(study.policies)
+    store, teams = Store.peek(study, out, accept_code), len(study.policies)
     parts = _counted(study, store)
-    if store and sum(planned.missing for planned in parts[:teams]) > FEW:
+    if sum(planned.missing for planned in parts[:teams]) > FEW:
         for source in sources(reuse, store.manifest):
             store.count(source)
         parts = _counted(study, store)
@@ -149,19 +142,15 @@ def check_effort(
         f"study {study.name}: {'at least ' if study.rule else ''}{missing:,} missions to "
         f"simulate (policies: {teams}, design points: {study.size:,}, workers: {workers:,})"
     )
-    if study.size > MAX_SIZE:
-        raise InputError(f"{what}; allowed: {MAX_SIZE:,} design points")
     work = sum(planned.missing + planned.logs for planned in parts)
     if yes or not work:
         return missing
-    ends = [study.point(number).scenario for number in {0, study.size - 1}]
+    ends = [study.points[number].scenario for number in (0, -1)]
     bounds = parts[-1].missing if study.bounds else 0
-    few = study.size <= MANY_POINTS and all(are_few(work - bounds, space) for space in ends)
+    few = all(are_few(work - bounds, space) for space in ends)
     estimated = [] if few else parts[:teams]
     estimated += parts[teams:] if bounds > FEW_BOUNDS else []
     seconds = sum(_seconds(study, planned, clock) for planned in estimated) / workers
-    if not store:
-        raise InputError(f"{what}, about {numbers.duration(seconds)}; allowed: {CONFIRMED}")
     check_time(what, seconds)
     held = study.size * (POINT_MEMORY + study.first * teams * MISSION_MEMORY)
     check_workers_memory(what, workers, ends, held)
@@ -185,19 +174,8 @@ def _check_policies(study: Study) -> None:
             continue
 
 
-def _folder(study: Study, out: str | Path, accept_code: bool) -> Store | None:
-    """The folder, to count what is missing; None for a new study of too many points to make."""
-    if study.size > MANY_POINTS and not (Path(out) / MANIFEST).exists():
-        return None
-    return Store.peek(study, out, accept_code)
-
-
-def _counted(study: Study, store: Store | None) -> list[Planned]:
+def _counted(study: Study, store: Store) -> list[Planned]:
     """What is needed for now, and what of it is present: of every policy, then of the bounds."""
-    of_policy = study.size * study.first
-    names = [*study.policies, *(["upper bounds"] if study.bounds else [])]
-    if store is None:
-        return [Planned(name, of_policy, 0, study.size * study.logged) for name in names]
     manifest, logged = store.manifest, [study.logged] * study.size
     plan = []
     for team, policy in enumerate(study.policies):
@@ -230,7 +208,7 @@ def _seconds(study: Study, planned: Planned, clock: Clock) -> float:
     def spaces_of(missions: int) -> list[ScenarioSpace]:
         """The scenarios of missions that are spread over the design points."""
         places = [(n * study.size) // missions for n in range(missions)]
-        return [study.point(place).scenario for place in places]
+        return [study.points[place].scenario for place in places]
 
     return sum(
         count * seconds_per_mission(spaces_of, team, engine, clock)
@@ -241,7 +219,7 @@ def _seconds(study: Study, planned: Planned, clock: Clock) -> float:
 
 def _seconds_per_bound(study: Study, clock: Clock) -> float:
     """The time of an upper bound [s], measured on one."""
-    space = study.point(0).scenario
+    space = study.points[0].scenario
     upper_bound(space, TRIAL_SEED, 0, iterations=1)  # compiles
     begin = clock()
     upper_bound(space, TRIAL_SEED, 0)

@@ -7,8 +7,10 @@ function of the fields of the design, in the order in which these are written.
 
 import sys
 from abc import abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from math import prod
 from typing import Annotated, Any, Literal, Self
 
@@ -24,7 +26,7 @@ from dess.streams import MAX_REPLICATION, MAX_SEED
 # The factor of a Saltelli design that is not a field of the scenario: the replication.
 NOISE = "replication (noise)"
 
-MAX_SIZE = 2**20
+MAX_SIZE = 100_000  # design points; each takes some 12 kB of memory during a run
 
 # Fields whose values are integers. A name that is not a field is refused when the study is loaded.
 INTEGERS = {
@@ -107,11 +109,10 @@ class _Design(StrictTable):
         """
         if self.count > MAX_SIZE:
             raise InputError(f"design: {self.count:,} points; allowed: {MAX_SIZE:,} at most")
-        return tuple(map(self.point, range(self.count)))
+        return tuple(self._points())
 
     @abstractmethod
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number; the others, which may be very many, are not made."""
+    def _points(self) -> Iterator[DesignPoint]: ...
 
 
 class Grid(_Design):
@@ -127,13 +128,9 @@ class Grid(_Design):
         """The product of the numbers of values."""
         return prod(map(len, self.values.values()))
 
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number."""
-        chosen = {}
-        for field, values in reversed(self.values.items()):
-            number, place = divmod(number, len(values))
-            chosen[field] = values[place]
-        return DesignPoint({field: chosen[field] for field in self.values})
+    def _points(self) -> Iterator[DesignPoint]:
+        for row in product(*self.values.values()):
+            yield DesignPoint(dict(zip(self.values, row, strict=True)))
 
 
 class OneAtATime(_Design):
@@ -148,15 +145,11 @@ class OneAtATime(_Design):
     @property
     def count(self) -> int:
         """The sum of the numbers of values."""
-        return len(self._rows)
+        return sum(map(len, self.values.values()))
 
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number."""
-        return DesignPoint(self._rows[number])
-
-    @cached_property
-    def _rows(self) -> list[dict[str, Any]]:
-        return [{field: value} for field, values in self.values.items() for value in values]
+    def _points(self) -> Iterator[DesignPoint]:
+        for field, values in self.values.items():
+            yield from (DesignPoint({field: value}) for value in values)
 
 
 class Table(_Design):
@@ -170,9 +163,8 @@ class Table(_Design):
         """The number of rows."""
         return len(self.rows)
 
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number."""
-        return DesignPoint(self.rows[number])
+    def _points(self) -> Iterator[DesignPoint]:
+        return map(DesignPoint, self.rows)
 
 
 class _Sampled(_Design):
@@ -188,14 +180,14 @@ class _Sampled(_Design):
     def _sample(self) -> np.ndarray:
         """(count, ...) points of the unit cube, one for each design point."""
 
-    def point(self, number: int) -> DesignPoint:
-        """A design point by its number."""
-        places = zip(self.ranges.items(), self._sample[number], strict=False)  # the noise is last
-        values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
-        return DesignPoint(values, self._replication(number))
+    def _points(self) -> Iterator[DesignPoint]:
+        for unit in self._sample:
+            places = zip(self.ranges.items(), unit, strict=False)  # the noise is last
+            values = {field: _scaled(u, ends, field in INTEGERS) for (field, ends), u in places}
+            yield DesignPoint(values, self._replication(unit))
 
-    def _replication(self, number: int) -> int:
-        """The first replication of a design point."""
+    def _replication(self, unit: np.ndarray) -> int:
+        """The first replication of a design point, by its point of the unit cube."""
         return 0
 
 
@@ -268,8 +260,8 @@ class Saltelli(_Sampled):
 
         return sobol.sample(self.problem, self.base, calc_second_order=False, seed=self.seed)
 
-    def _replication(self, number: int) -> int:
-        return _scaled(self._sample[number][-1], (0, self.replications - 1), True)
+    def _replication(self, unit: np.ndarray) -> int:
+        return _scaled(unit[-1], (0, self.replications - 1), True)
 
 
 def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:

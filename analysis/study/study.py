@@ -37,9 +37,6 @@ _STUDIES = Shipped("study", "analysis.study", "shipped")
 # The longest name of a study, which is part of the names of files.
 MOST_CHARACTERS = 100
 
-# A study with more design points checks each point when it is used, not when the study is made.
-MANY_POINTS = 100_000
-
 # The first replication of the missions that check a selected setting. They are independent of the
 # missions on which the selection was based.
 CHECK = MOST
@@ -163,10 +160,7 @@ class Study(StudyData):
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
         self._check_rule()
-        if self.size <= MANY_POINTS:
-            self.points  # noqa: B018 - they are checked when they are made
-        else:
-            self.point(0)
+        self.points  # noqa: B018 - they are checked when they are made
         self._check_metrics()
         self._choose_engine()
         if self.logged > self.first:
@@ -189,9 +183,7 @@ class Study(StudyData):
 
     @property
     def _spaces(self) -> list[ScenarioSpace]:
-        """The scenarios of the design points; of very many, only the first."""
-        if self.size > MANY_POINTS:
-            return [self.point(0).scenario]
+        """The scenarios of the design points."""
         return [point.scenario for point in self.points]
 
     def _choose_engine(self) -> None:
@@ -242,8 +234,6 @@ class Study(StudyData):
 
     def _check_teams(self) -> None:
         """No policy of a team may be without a UAV at every design point."""
-        if self.size > MANY_POINTS:
-            return
         fleet = max(point.scenario.uavs[1] for point in self.points)
         for team in self.policies:
             if team.count(",") >= fleet:
@@ -276,7 +266,6 @@ class Study(StudyData):
 
         Raises:
             InputError: If there are too many points, one is listed twice or has no valid scenario.
-                Studies with at most ``MANY_POINTS`` points raise these errors when they are made.
         """
         points = tuple(map(self._point, self.design.points if self.design else [DesignPoint({})]))
         if not hasattr(self.design, "ranges"):  # sampled integers may be equal by chance
@@ -287,14 +276,6 @@ class Study(StudyData):
                     raise InputError(f"design: {shown} is listed twice; allowed: once")
                 found.add(point.key)
         return points
-
-    def point(self, number: int) -> Point:
-        """A design point by its number; the other points are not made.
-
-        Raises:
-            InputError: If its scenario is not valid.
-        """
-        return self._point(self.design.point(number) if self.design else DesignPoint({}))
 
     def _point(self, row: DesignPoint) -> Point:
         if both := sorted(self.set.keys() & row.values.keys()):

@@ -35,7 +35,7 @@ from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
-from dess.scenario import ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import load_scenario, scenario_names
 from policies.registry import typed
 
 LONGEST = 60  # largest number of characters for the fields in a name
@@ -43,7 +43,6 @@ LONGEST = 60  # largest number of characters for the fields in a name
 # Missions in the search for the cheapest setting: at most, per setting on average and over all
 # settings; and with how many of every setting it begins.
 BUDGET, ALL, FIRST = 2_000, 1_000_000, 20
-FLEET = ("uavs", "pads", "zone")  # fields on which the numbers of UAVs and pads depend
 LITTLE = 0.01  # as a share of the prices: a saving that does not matter
 
 
@@ -193,7 +192,7 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
             allowed = one_of(metric, [*METRICS, *ALIASES])
             raise InputError(f"requirements: {metric!r} is unknown{allowed}")
         least[full] = share
-    spaces = _spaces(study)
+    spaces = [point.scenario for point in study.points]
     fleet = prices.uav * max(space.uavs[1] for space in spaces)
     fleet += prices.pad * max(space.charging_pads for space in spaces)
     running = prices.missions * (prices.charge + prices.hour + prices.lost_uav)
@@ -207,18 +206,6 @@ def _cheapest(requirements: Mapping[str, float], missions: int, study: Study) ->
         "first": FIRST,
         "check": missions,
     }
-
-
-def _spaces(study: Study) -> list[ScenarioSpace]:
-    """A scenario for every value of the fields on which the fleet depends, one at a time."""
-    design = study.design
-    assert isinstance(design, Grid)
-    numbers, step = [0], design.count
-    for field, values in design.values.items():
-        step //= len(values)
-        if field in FLEET:
-            numbers += [step * place for place in range(1, len(values))]
-    return [study.point(number).scenario for number in numbers]
 
 
 def _name_of(study: Study, fields: Iterable[str]) -> str:

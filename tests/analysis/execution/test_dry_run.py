@@ -97,19 +97,6 @@ def test_a_long_run_has_to_be_confirmed(tmp_path, monkeypatch):
     check_effort(study, out, clock=Clock(1e9))  # all of it is there
 
 
-def test_very_many_points_are_not_made(tmp_path):
-    study = small_study(
-        tmp_path, design=grid(**dict.fromkeys(("quota", "max_slots"), [*range(1, 401)]))
-    )
-    with pytest.raises(InputError, match="3,200,000 missions .* design points: 160,000"):
-        check_effort(study, tmp_path / "out")
-    four = dict.fromkeys(("quota", "max_slots", "cell_size", "altitude"), [*range(1, 1001)])
-    study = small_study(tmp_path, design=grid(**four))
-    with pytest.raises(InputError, match="20,000,000,000,000 missions .*: 1,048,576 design points"):
-        check_effort(study, tmp_path / "out", yes=True)
-    assert "points" not in study.__dict__
-
-
 def test_missions_are_counted_and_not_listed(tmp_path, monkeypatch):
     study = small_study(tmp_path, missions=10**9)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**40)

@@ -163,15 +163,6 @@ def test_event_logs_are_those_of_the_missions(tmp_path):
     assert ends["value"].sum() == pytest.approx(row["residual"].item(), abs=1e-9)
 
 
-def test_a_chunk_gives_every_design_point_its_own_missions(tmp_path):
-    study = small_study(tmp_path, design=grid(quota=[20, 60], uavs=[2, 1]), missions=3)
-    missions = run_study(study, tmp_path / "out").missions
-    for row in missions.sample(12, random_state=1).itertuples():
-        space = study.points[row.point].scenario
-        alone = simulate(space, load_team(row.policy), study.seed, row.replication)
-        assert (alone.metrics["reward"], alone.uavs.size) == (row.reward, row.uavs)
-
-
 def precise(folder, **changes):
     """A study that runs until the success of every cell is known well enough."""
     targets = {"success": {"absolute": 0.2}, "reward": {"relative": 0.2}}

@@ -116,6 +116,7 @@ def test_batteries_start_full_and_move_by_a_flight_or_a_charge() -> None:
     record, log = logged("greedy", uavs=3)
     levels = battery_levels(log)
     for uav, curve in levels.groupby("uav"):
+        assert curve["time"].tolist() == [*range(len(curve))]
         assert curve["battery"].iloc[0] == record.flying_time
         assert curve["battery"].iloc[-1] == record.uavs["battery"][uav]
         steps = curve["battery"].diff().iloc[1:]

@@ -7,10 +7,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from analysis import load_results, run_study, summary
+from analysis import run_study, summary
 from analysis.execution.evaluation import means
 from analysis.names import MEASURES, measured_in
-from analysis.questions.diff import diff
 from analysis.results.resimulate import difference, recorded, resimulate
 from analysis.stats.intervals import interval_of
 from analysis.stats.paired import compare
@@ -37,13 +36,6 @@ def test_stored_values_are_those_of_the_engine(results):
         for name in measured_in(results.missions):
             np.testing.assert_array_equal(rows[name], records.operations[name])
     assert {"age", "queue", "utilisation", "failures"} <= {*measured_in(results.missions)}
-
-
-def test_loaded_results_are_the_same_and_none_counts_as_damaged(results):
-    again = load_results(results.store.folder)
-    assert again.store.damaged == []
-    assert again.missions.equals(results.missions)
-    assert diff(results, again).identical
 
 
 def test_a_plain_study_stores_no_column_of_them(tmp_path):

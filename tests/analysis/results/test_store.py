@@ -167,12 +167,6 @@ def test_a_policy_depends_on_the_modules_of_what_it_holds():
     assert "policies.ddqn.training" not in learned
 
 
-def test_no_results_folder(tmp_path):
-    for path in (tmp_path, tmp_path / "none", write_scenario(tmp_path)):
-        with pytest.raises(InputError, match="no such file; allowed: a results folder"):
-            load_results(path)
-
-
 def test_an_output_that_cannot_be_written(tmp_path):
     study = small_study(tmp_path)
     before = files_of(tmp_path)

@@ -3,7 +3,6 @@
 from typing import Any
 
 import pytest
-from pydantic import ValidationError
 
 from analysis import load_study
 from analysis.results.manifest import Manifest
@@ -11,22 +10,10 @@ from analysis.study.costs import PARTS, Costs
 from dess.scenario import ScenarioSpace, load_scenario
 
 
-@pytest.mark.parametrize("name", ["", "x" * 17, "x" * 4000])
-def test_a_currency_has_a_short_name(name: str) -> None:
-    with pytest.raises(ValidationError, match="currency"):
-        Costs(currency=name)
-
-
 def test_prices_change_no_key_of_a_mission() -> None:
     free = Manifest.of(load_study("table4", missions=2, policies=["greedy"]))
     study = load_study("table4", missions=2, policies=["greedy"], costs={"uav": 20_000})
     assert Manifest.of(study).cells == free.cells
-
-
-def test_a_manifest_without_prices_is_read() -> None:
-    data = Manifest.of(load_study("table4", missions=2, policies=["greedy"])).data
-    del data["study"]["costs"]
-    assert Manifest.model_validate(data).study["costs"] is None
 
 
 def space(**fields: Any) -> ScenarioSpace:

@@ -76,7 +76,6 @@ def test_every_kind_is_written_in_toml_and_makes_scenarios(kind):
     assert design.kind == kind
     assert design.points
     assert design.count == len(design.points)
-    assert tuple(map(design.point, range(design.count))) == design.points
     for point in design.points:
         load_scenario("paper", **point.values)
         hash(tuple(point.values.values()))  # values group missions
@@ -213,13 +212,12 @@ def test_a_grid_of_very_many_points_is_counted_without_making_them():
     values = {field: range(1, 1001) for field in ("quota", "max_slots", "cell_size", "altitude")}
     design = Grid(values={field: tuple(of_field) for field, of_field in values.items()})
     assert design.count == 10**12
-    assert [*design.point(10**12 - 2).values.values()] == [1000, 1000, 1000, 999]
-    with pytest.raises(InputError, match="design: 1,000,000,000,000 points; allowed: 1,048,576"):
+    with pytest.raises(InputError, match="design: 1,000,000,000,000 points; allowed: 100,000"):
         len(design.points)
 
 
 def test_a_saltelli_design_has_no_more_points_than_others():
     text = '[design]\nkind = "saltelli"\nranges = {quota = [1, 9], uavs = [1, 2]}\nbase = '
-    assert plan(text + str(2**17)).count == 5 * 2**17
-    with pytest.raises(ValidationError, match="gives 1,310,720 design points; allowed: 131,072 at"):
-        plan(text + str(2**18))
+    assert plan(text + str(2**14)).count == 5 * 2**14
+    with pytest.raises(ValidationError, match="gives 163,840 design points; allowed: 16,384 at"):
+        plan(text + str(2**15))

@@ -6,8 +6,7 @@ from pydantic import ValidationError
 
 from analysis import load_study, study_names
 from analysis.study.study import Study, budget_of
-from dess import InputError, load_scenario
-from dess.scenario import SAMPLED
+from dess import InputError
 from policies.registry import HEURISTICS, TypedByUser, load_team, trained_names
 from tests.analysis.small import grid, small_study, write_scenario
 
@@ -35,23 +34,6 @@ def test_the_papers_studies_run_every_heuristic_and_learned_policy():
     guarded = [name for name in heuristics if name != "random-unguarded"]
     for name in ("fig4", "fig5", "sweet-spot"):
         assert load_study(name).policies == (*guarded, *once)
-
-
-def test_fig5_moves_one_parameter_of_table_2_at_a_time():
-    study, space = load_study("fig5"), load_scenario("paper")
-    assert study.missions == 300
-    fields = dict.fromkeys(field for point in study.points for field in point.values)
-    assert set(fields) == {*SAMPLED, "initial_data"}
-    for point in study.points:
-        (field,) = point.values
-        low, high = getattr(space, field)
-        ours = getattr(point.scenario, field)
-        assert low <= ours[0] <= ours[1] <= high
-        others = set(fields) - {field}
-        assert all(getattr(point.scenario, f) == getattr(space, f) for f in others)
-    for field in fields:  # both ends are visited
-        seen = [getattr(p.scenario, field) for p in study.points if field in p.values]
-        assert (min(low for low, _ in seen), max(high for _, high in seen)) == getattr(space, field)
 
 
 def test_a_rule_decides_how_many_missions_there_are(tmp_path):

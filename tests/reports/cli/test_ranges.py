@@ -54,10 +54,10 @@ REFUSED = {
     "uavs=2..5:1": "has no number of values; allowed: 2 to",
     "uavs=2..5:x": "has no number of values; allowed: 2 to",
     "uavs=2..5:-3": "has no number of values; allowed: 2 to",
-    "arrival_rate=0..1:1000000000": "has no number of values; allowed: 2 to 1,048,576",
+    "arrival_rate=0..1:1000000000": "has no number of values; allowed: 2 to 100,000",
     "quota=2..5:3": "has 3 values that are not integers",
     "quota=1..1e30": "quota: has 1,000,000,000,000,000,000,000,000,000,000 values; allowed: 1 to",
-    "quota=1..99999999999": "quota: has 99,999,999,999 values; allowed: 1 to 1,048,576",
+    "quota=1..99999999999": "quota: has 99,999,999,999 values; allowed: 1 to 100,000",
 }
 
 
