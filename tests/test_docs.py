@@ -139,7 +139,7 @@ def test_commands_are_accepted(arguments: list[str]) -> None:
     elif "scenario" in given:
         assert settings.load_space(given["scenario"], given["settings"])
     if arguments[:2] == ["study", "run"]:
-        assert load_study(given["name"])
+        assert all(map(load_study, given["names"]))
 
 
 def test_commands_in_the_text_exist() -> None:

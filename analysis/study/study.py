@@ -351,10 +351,12 @@ def study_descriptions() -> dict[str, str]:
 
 
 def budget_of(study: Mapping[str, Any]) -> str:
-    """In words, how a study differs from the shipped study of the same name."""
-    if study["name"] not in study_names():
+    """In words, how a study differs from the shipped study of the same name; none is loaded."""
+    if (name := study["name"]) not in study_names():
         return "as asked"
-    shipped = load_study(study["name"]).model_dump(mode="json")
+    shipped = StudyData.model_validate({"name": name, **_STUDIES.load(name)[1]}).model_dump(
+        mode="json"
+    )
     policies, missions = study["policies"], study["missions"]
     words = []
     if {*policies} < {*shipped["policies"]}:
@@ -363,8 +365,8 @@ def budget_of(study: Mapping[str, Any]) -> str:
         words.append("other policies")
     if missions != shipped["missions"]:
         words.append(f"{missions:,} instead of {shipped['missions']:,} missions")
-    others = [key for key in shipped if key not in ("policies", "missions", "description")]
-    words += [f"another {key}" for key in others if study[key] != shipped[key]]
+    others = shipped.keys() - {"policies", "missions", "description", "engine"}
+    words += [f"another {key}" for key in sorted(others) if study[key] != shipped[key]]
     return ", ".join(words) or "full"
 
 

@@ -18,9 +18,8 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "ipykernel"),
-        *("jinja2", "jupyter_client", "jupytext", "markupsafe"),
-        *("nbclient", "nbconvert", "nbformat", "packaging", "pygments"),
+        *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "jinja2"),
+        *("jupytext", "markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),

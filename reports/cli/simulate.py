@@ -259,15 +259,26 @@ def _draw(mission: _Mission, path: Path, kind: str) -> None:
 
 
 def _animate(mission: _Mission, path: Path, kind: str) -> None:
-    from dess.files.writing import fill
-    from reports.pages.mission import mission_page
     from reports.player.animation import write_animation
 
     if kind == "html":
-        page = mission_page(mission.log, mission.scenario, mission.title, mission.outcome)
-        fill(path, page)
+        _write_page(mission, path)
     else:
         write_animation(mission.log, mission.scenario, path, kind, mission.title)
+
+
+def _write_page(mission: _Mission, path: Path) -> None:
+    """Write a page with the player of the mission; the same mission gives the same bytes."""
+    from dess.files import writing
+    from reports import player
+    from reports.pages.template import fill
+
+    caption = player.reading(mission.scenario)
+    played = player.player(mission.log, mission.scenario, "mission", caption=caption)
+    parts = {"library": player.library().data, "player": played.data}
+    title, outcome = mission.title, mission.outcome
+    page = fill("mission.html", scripts=True, title=title, outcome=outcome, **parts)
+    writing.fill(path, page)
 
 
 def _print_mission(record: "MissionRecord") -> None:

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [table4, fig4]
+#     optional: [gap]
 #   jupytext:
 #     text_representation:
 #       extension: .py

@@ -1,7 +1,7 @@
 # ---
 # jupyter:
 #   dess:
-#     studies: []
+#     studies: [.]
 #   jupytext:
 #     text_representation:
 #       extension: .py

@@ -2,6 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [verification]
+#     optional: ["*"]
 #   jupytext:
 #     text_representation:
 #       extension: .py

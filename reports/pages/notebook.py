@@ -56,10 +56,11 @@ class Report:
         title: Its heading.
         description: The paragraph below the heading.
         studies: Names of the results folders that it reads.
+        optional: Patterns of the names of further ones, which it reads if they are there.
         scripts: Whether the page has scripts, such as those of sliders.
         original: The complete notebook, as in its file.
         notebook: The cells of the page, with values for the parameters.
-        begun: Id of the cell that was begun last.
+        key: What its page depends on; empty if it has other parameters than by default.
         done: Number of cells that have been run.
         failure: The cell that failed and its error, if one did.
         traceback: The traceback of the error.
@@ -69,10 +70,11 @@ class Report:
     title: str
     description: str
     studies: list[str]
+    optional: list[str]
     scripts: bool
     original: NotebookNode
     notebook: NotebookNode
-    begun: str = ""
+    key: str = ""
     done: int = 0
     failure: str = ""
     traceback: str = ""
@@ -147,9 +149,9 @@ def report_of(name: str, original: NotebookNode) -> Report:
     notebook = deepcopy(original)
     del notebook.cells[0]  # the header of the page shows them
     about = original.metadata["dess"]
-    studies, scripts = about["studies"], about.get("scripts", False)
+    results, scripts = (about["studies"], about.get("optional", [])), about.get("scripts", False)
     description = " ".join(description.split())
-    return Report(name, title, description, studies, scripts, original, notebook)
+    return Report(name, title, description, *results, scripts, original, notebook)
 
 
 def check_parameters(reports: Iterable[Report], names: Iterable[str]) -> None:

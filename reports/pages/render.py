@@ -22,11 +22,13 @@ from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from dess import InputError
 from dess.files.locks import locked
+from dess.files.reading import paths_in
 from dess.files.writing import delete, write_files
 from reports.folders import INDEX, LOCK, check_pages
-from reports.pages import missions
+from reports.pages import kernels, missions
 from reports.pages.index import index_of, pages_in
-from reports.pages.kernels import Kernels, Progress
+from reports.pages.kernels import Progress
+from reports.pages.keys import has_key, key_of
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read
 from reports.pages.parameters import with_paths
 from reports.pages.study.sections import report_of
@@ -56,7 +58,8 @@ def render(
 ) -> Path:
     """Run reports on the results of studies and write their pages, their notebooks and an index.
 
-    The index shows all pages in the folder, also those of earlier calls.
+    The index shows all pages in the folder, also those of earlier calls. A page that is there and
+    would be the same is not rendered again.
 
     Args:
         names: The reports. If empty, all whose results are there; the index and a line in the log
@@ -137,9 +140,12 @@ def _write(
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
     check_pages(out, *(report.name for report in reports))
-    missions.make([report.name for report in reports], results, values, progress)
-    Kernels(progress).run(reports)
-    files = {report.page: _page(report) for report in reports}
+    for report in reports:
+        report.key = "" if values else key_of(report, _folders(report, results))
+    changed = [report for report in reports if not has_key(out / report.page, report.key)]
+    missions.make([report.name for report in changed], results, values, progress)
+    kernels.run(changed, progress)
+    files = {report.page: _page(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
     shown = [read(name, notebooks) for name in names_in(notebooks)]
@@ -151,6 +157,13 @@ def _write(
     if failed := [report for report in reports if report.failure]:
         lines = [f"{r.failure}; partial page: {out / r.page}" for r in failed]
         raise ReportError("; ".join(lines))
+
+
+def _folders(report: Report, results: Path) -> dict[str, Path]:
+    """The results folders that a report reads, by name."""
+    found = (paths_in(results, f"{name}/{MANIFEST}") for name in report.optional)
+    others = [path.parent.name for paths in found for path in paths]
+    return {name: results / name for name in (*report.studies, *others)}
 
 
 def _lacking(report: Report, results: Path) -> dict[str, InputError]:

@@ -1,6 +1,6 @@
-"""Runs the notebooks of reports in the process of a case: the start of a kernel takes seconds.
+"""Runs the notebooks of reports in the process of a case: the start of another takes seconds.
 
-Errors end as those of a kernel do. A share of the cases has real kernels.
+Errors end as those of another process do. A share of the cases has other processes.
 """
 
 import ast
@@ -14,21 +14,21 @@ import IPython.display
 from nbformat.v4 import new_output
 
 from dess import InputError
-from reports.pages import html
-from reports.pages.kernels import Kernels
+from reports.pages import html, kernels
+from reports.pages.kernels import Progress
 from reports.pages.notebook import Report
 
 
 def run_here() -> None:
-    """Let the commands of this process run notebooks without kernels."""
-    Kernels.run = _run  # type: ignore[method-assign]
+    """Let the commands of this process run notebooks in it."""
+    kernels.run = _run
     html.svg = lambda drawing: b""
 
 
-def _run(kernels: Kernels, reports: Sequence[Report]) -> None:
+def _run(reports: Sequence[Report], progress: Progress | None = None) -> None:
     for report in reports:
         try:
-            # As a kernel, not among the files of the case, and without bars and drawings.
+            # As another process, not among the files of the case, and without bars and drawings.
             with TemporaryDirectory() as folder, chdir(folder), redirect_stderr(io.StringIO()):
                 _execute(report)
         except InputError as error:

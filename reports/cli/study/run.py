@@ -1,4 +1,4 @@
-"""``dess study run``: a study into a results folder, or the plan of the run."""
+"""``dess study run``: studies, each into a results folder, or the plans of the runs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,17 +18,21 @@ if TYPE_CHECKING:
 
 
 def run(
-    name: Annotated[
-        str,
+    names: Annotated[
+        list[str],
         typer.Argument(
-            metavar="NAME|FILE",
-            help="The name of a shipped study, or a TOML file.",
+            metavar="NAME|FILE...",
+            help="The names of shipped studies, or TOML files.",
             autocompletion=completion.studies,
         ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help=f"Results folder.  [default: {RESULTS}/NAME]"),
+        typer.Option(
+            metavar="DIR",
+            help="Results folder; of several studies, the folder of their results folders.  "
+            f"[default: {RESULTS}/NAME]",
+        ),
     ] = None,
     workers: WorkersOption = 1,
     scheduler: Annotated[
@@ -64,36 +68,51 @@ def run(
 ) -> None:
     """Run a study into a results folder; run it again to resume it or to add missions."""
     from analysis.execution.dry_run import check_run, plan_study
-    from analysis.execution.runner import run_study
     from analysis.study.study import load_study
-    from reports.cli.study.tables import print_summary
 
     changes = {"missions": missions, "policies": policy}
-    study = load_study(name, **{key: value for key, value in changes.items() if value is not None})
-    out = out or RESULTS / study.name
+    given = {key: value for key, value in changes.items() if value is not None}
+    studies = [load_study(name, **given) for name in names]
+    if out and len(studies) == 1:
+        folders = [out]
+    else:
+        folders = [(out or RESULTS) / study.name for study in studies]
+    runs = [*zip(studies, folders, strict=True)]
     if dry_run:
         with console.compile_notice():
-            plan = plan_study(study, out, workers, accept_code=accept_code)
-            _print_plan(plan, study, out, workers)
+            for study, folder in runs:
+                plan = plan_study(study, folder, workers, accept_code=accept_code)
+                _print_plan(plan, study, folder, workers)
         return
     if page:
         needs("reports", "--report")
-        check_pages(PAGES, f"{PREFIX}{study.name}")
+        check_pages(PAGES, *(f"{PREFIX}{study.name}" for study in studies))
     with console.compile_notice():
-        check_run(study, out, workers, accept_code=accept_code, yes=yes)
-    results = complete(
-        study.name,
-        lambda progress, announce: run_study(
-            study, out, workers, scheduler, progress, announce, accept_code
-        ),
-    )
-    print_summary(results, out, short=True)
-    console.say(f"more: dess study show {out}")
+        for study, folder in runs:
+            check_run(study, folder, workers, accept_code=accept_code, yes=yes)
+    for study, folder in runs:
+        _run(study, folder, workers, scheduler, accept_code)
     if page:
         from reports.pages.render import render_study
 
         with rendering() as progress:
-            console.say(render_study(out, PAGES, progress))
+            for folder in folders:
+                console.say(render_study(folder, PAGES, progress))
+
+
+def _run(study: "Study", out: Path, workers: int, scheduler: str | None, accept: bool) -> None:
+    """Run a study, and print its summary."""
+    from analysis.execution.runner import run_study
+    from reports.cli.study.tables import print_summary
+
+    results = complete(
+        study.name,
+        lambda progress, announce: run_study(
+            study, out, workers, scheduler, progress, announce, accept
+        ),
+    )
+    print_summary(results, out, short=True)
+    console.say(f"more: dess study show {out}")
 
 
 def _print_plan(plan: "list[Planned]", study: "Study", out: Path, workers: int) -> None:

@@ -169,10 +169,10 @@ def a_page(folder, results):
 
 
 def renderings(command):
-    """When the last kernel began [ns]; 0 before the first."""
+    """When notebooks were run last [ns]; 0 before the first."""
     with suppress(FileNotFoundError):  # gone in the meantime
-        kernels = command.temporary.glob("dess-kernel-*")
-        return max((path.stat().st_ctime_ns for path in kernels), default=0)
+        folders = command.temporary.glob("dess-pages-*")
+        return max((path.stat().st_ctime_ns for path in folders), default=0)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Nothing in a results folder is ever code: neither for the kernels, nor for their templates."""
+"""Nothing in a results folder is ever code: neither for notebooks, nor for their templates."""
 
 import os
 import subprocess

@@ -10,22 +10,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import nbformat
 import pytest
-from jupyter_client.manager import AsyncKernelManager
-from jupyter_client.provisioning import LocalProvisioner
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 
 from analysis import load_results, run_study
 from dess import InputError
-from reports.pages import kernels
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
 from reports.pages.render import ReportError, html_of, render, with_indices
@@ -423,63 +418,21 @@ def test_shipped_notebooks_have_a_heading_and_a_description(name: str) -> None:
     assert len(report.description.split()) > 10
 
 
-# --- kernels ---
+# --- processes ---
 
 
-@pytest.mark.parametrize(("deaths", "runs"), [(1, 2), (2, 2)])
-def test_a_kernel_that_dies_at_its_start_is_started_once_more(
-    results: Path, notebooks: Path, monkeypatch: pytest.MonkeyPatch, deaths: int, runs: int
-) -> None:
-    clients = []
-
-    def die(client: Any, _: Any) -> None:
-        clients.append(client)
-        if len(clients) <= deaths:
-            raise RuntimeError("Kernel died before replying to kernel_info")
-
-    monkeypatch.setattr(kernels, "_run", die)
-    report = read("mission", notebooks)
-    kernels.Kernels().run([report])
-    assert len(clients) == runs
-    assert bool(report.failure) == (deaths > 1)
-    if report.failure:
-        assert re.match(r"report mission: cell 1 of \d+ \(.*\): Kernel died", report.failure)
-
-
-def test_a_kernel_may_end_while_the_others_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its process is taken away by another thread, at any moment."""
-    report: Future = Future()
-    processes = [SimpleNamespace(kill=lambda: report.set_result(None)), None]
-
-    class Ending(LocalProvisioner):
-        @property
-        def process(self) -> Any:
-            return processes.pop(0)
-
-    manager = AsyncKernelManager()
-    manager.provisioner = Ending()
-    runner = kernels.Kernels()
-    monkeypatch.setattr(runner, "_clients", [SimpleNamespace(km=manager)])
-    report.set_running_or_notify_cancel()
-    runner._stop([report])
-    assert report.done()
-
-
-def test_a_kernel_that_dies_in_a_cell_is_not_started_again(results: Path, tmp_path: Path) -> None:
-    source = FAILING.replace("raise", "import os; os._exit(1) #")
-    notebooks = write_notebooks(tmp_path / "notebooks", mission=source)
-    with pytest.raises(ReportError, match=r"^report mission: cell 3 of 4 \(import os.*Kernel died"):
-        render(["mission"], results, tmp_path, notebooks=notebooks)
-
-
-def test_what_a_kernel_reports_is_part_of_the_failure(
+def test_what_a_process_reports_before_it_dies_is_part_of_the_failure(
     results: Path, tmp_path: Path, capfd: pytest.CaptureFixture
 ) -> None:
+    """The other pages are rendered nevertheless."""
     source = FAILING.replace("raise", r"import os; os.write(2, b'one\nmemory\n'); os._exit(1) #")
-    notebooks = write_notebooks(tmp_path / "notebooks", mission=source)
-    with pytest.raises(ReportError, match="Kernel died: memory; partial page"):
-        render(["mission"], results, tmp_path, notebooks=notebooks)
+    notebooks = write_notebooks(tmp_path / "notebooks", mission=source, scorecard=SCORECARD)
+    line = r"^report mission: cell 3 of 4 \(import os.*\): its process ended: memory; partial page"
+    with pytest.raises(ReportError, match=line):
+        render([], results, tmp_path, notebooks=notebooks)
     assert capfd.readouterr().err == ""
+    assert "the cell before" in words_of((tmp_path / "mission.partial.html").read_text("utf-8"))
+    assert (tmp_path / "scorecard.html").exists()
 
 
 def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(

@@ -1,0 +1,102 @@
+"""A page is rendered again if and only if something that it depends on has changed."""
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from analysis import run_study
+from reports.pages import kernels, keys
+from reports.pages.render import render, render_study
+from tests.analysis.small import small_study
+from tests.reports.pages.test_render import MISSION, SCORECARD, results, write_notebooks
+
+__all__ = ["results"]
+
+WITHOUT_STUDIES = SCORECARD.replace("studies: []", "studies: []\n#     optional: [extra]")
+
+
+@pytest.fixture
+def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the pages that are rendered, each with a cell that shows a number."""
+    names: list[str] = []
+    monkeypatch.setattr(
+        kernels, "run", lambda reports, progress: names.extend(report.name for report in reports)
+    )
+    return names
+
+
+class Folder:
+    """Results, notebooks and pages, and what was rendered since the last call."""
+
+    def __init__(self, place: Path, results: Path, rendered: list[str]):
+        self.results = shutil.copytree(results, place / "results")
+        self.notebooks = write_notebooks(place / "n", mission=MISSION, scorecard=WITHOUT_STUDIES)
+        self.out, self.rendered = place / "out", rendered
+
+    def render(self, **parameters: str) -> set[str]:
+        self.rendered.clear()
+        render([], self.results, self.out, parameters=parameters, notebooks=self.notebooks)
+        return {*self.rendered}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, results: Path, rendered: list[str]) -> Iterator[Folder]:
+    """Pages that were rendered; one reads a study, the other one only if it is there."""
+    folder = Folder(tmp_path, results, rendered)
+    assert folder.render() == {"mission", "scorecard"}
+    yield folder
+
+
+def test_unchanged_pages_are_not_rendered_again(folder: Folder) -> None:
+    before = {path.name: path.read_bytes() for path in folder.out.iterdir()}
+    assert folder.render() == set()
+    assert {path.name: path.read_bytes() for path in folder.out.iterdir()} == before
+
+
+def test_other_results_change_the_pages_that_read_them(folder: Folder, tmp_path: Path) -> None:
+    shutil.rmtree(folder.results / "trial")
+    run_study(small_study(tmp_path, missions=11), folder.results / "trial")
+    assert folder.render() == {"mission"}
+    run_study(small_study(tmp_path, missions=3), folder.results / "extra")
+    assert folder.render() == {"scorecard"}
+
+
+def test_another_notebook_changes_its_page(folder: Folder) -> None:
+    write_notebooks(folder.notebooks, mission=MISSION.replace("head(3)", "head(4)"))
+    assert folder.render() == {"mission"}
+
+
+@pytest.mark.parametrize("what", ["code", "library"])
+def test_other_code_and_libraries_change_all_pages(
+    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    keys._software.cache_clear()
+    if what == "library":
+        monkeypatch.setattr(keys.metadata, "distributions", list)
+    else:
+        root = shutil.copytree(keys.PACKAGES / "reports", tmp_path / "code" / "reports").parent
+        (root / "reports" / "templates" / "style.css").write_text("")
+        monkeypatch.setattr(keys, "PACKAGES", root)
+    assert folder.render() == {"mission", "scorecard"}
+    keys._software.cache_clear()
+
+
+def test_pages_that_are_altered_or_gone_are_rendered_again(folder: Folder) -> None:
+    page = folder.out / "mission.html"
+    page.write_text(page.read_text("utf-8").replace("A trial", "A trail"), "utf-8")
+    (folder.out / "scorecard.html").unlink()
+    assert folder.render() == {"mission", "scorecard"}
+
+
+def test_pages_with_parameters_are_always_rendered(folder: Folder) -> None:
+    for _ in range(2):
+        assert folder.render(policy="random") == {"mission", "scorecard"}
+    assert folder.render() == {"mission", "scorecard"}
+
+
+def test_the_page_of_a_study_is_rendered_once(results: Path, tmp_path: Path, rendered) -> None:
+    for _ in range(2):
+        render_study(results / "trial", tmp_path)
+    assert rendered == ["study-trial"]
