@@ -73,31 +73,6 @@ class WhatIf:
     results: Results
     shown: str
 
-    @property
-    def policies(self) -> list[str]:
-        """The policies; each is compared with itself in the baseline and in the variation."""
-        return self.results.policies
-
-    @property
-    def missions(self) -> int:
-        """The number of missions of every policy, in the baseline and in the variation."""
-        return self.results.manifest["study"]["missions"]
-
-    @property
-    def scenario(self) -> str:
-        """The name of the scenario, or of its file."""
-        return self.results.manifest["study"]["scenario"]
-
-    @property
-    def measured(self) -> list[str]:
-        """What is measured beyond the paper's metrics and not 0 throughout, such as the age."""
-        names, missions = answer.measured(self.results), self.results.missions
-        return [name for name in names if missions[name].any()]
-
-    def fields(self) -> pd.DataFrame:
-        """The fields that the variation changes, that both sides set, and that missions draw."""
-        return question.listed(self.results)
-
     def answer(self) -> str:
         """The paired differences in collection ratio and communication, in words (Markdown)."""
         before, after = (answer.best_of_side(self.results, p) for p in (BASELINE, VARIATION))
@@ -113,14 +88,6 @@ class WhatIf:
         """The paired differences, with a row per policy and metric, as ``answer.answers``."""
         return answer.answers(self.results)
 
-    def amounts(self, policy: str) -> pd.DataFrame:
-        """Means of both sides and their differences for a policy, as a table to print."""
-        return answer.listed(self.table(), policy)
-
-    def pairing(self) -> pd.DataFrame:
-        """How much common random numbers narrow the intervals, as a table to print."""
-        return answer.pairing(self.table())
-
     def plot(self) -> "Figure":
         """The paired differences of the metrics, with intervals."""
         from analysis.figures import what_if as figures
@@ -131,7 +98,7 @@ class WhatIf:
         """A metric of every policy in the baseline and in the variation, with intervals.
 
         Args:
-            metric: One of the paper's metrics, or of ``measured``.
+            metric: One of the paper's metrics, or of what the missions measured.
         """
         from analysis.figures import what_if as figures
 
@@ -142,11 +109,7 @@ class WhatIf:
         """The distribution of the paired differences in collection ratio and communication."""
         from analysis.figures import what_if as figures
 
-        return figures.spread(self._differences())
-
-    def winners(self) -> str:
-        """The shares of the missions in which the variation is better or worse, in words."""
-        return answer.winners(self._differences())
+        return figures.spread(answer.all_differences(self.results))
 
     def typical(self) -> Example:
         """The replication that has the median of the differences."""
@@ -156,17 +119,6 @@ class WhatIf:
     def worst(self) -> Example:
         """The replication with the worst mission of the variation."""
         return Example(self.results, self.shown, answer.worst(self.results, self.shown))
-
-    def command(self) -> str:
-        """The command that makes the page of the question."""
-        return question.command(self.results)
-
-    def as_toml(self) -> str:
-        """The question as the TOML file of a study, to which rows can be added."""
-        return question.as_toml(self.results)
-
-    def _differences(self) -> dict[str, pd.Series]:
-        return {policy: answer.differences(self.results, policy) for policy in self.policies}
 
 
 def what_if(

@@ -31,12 +31,14 @@ shown = None  # the policy whose missions are drawn; None for the best in the va
 from IPython.display import display
 
 from analysis import names, what_if
+from analysis.questions.what_if import answer, question
 from reports.pages import html
 
 # %%
 asked = what_if(
     settings, baseline, scenario, policies, missions, seed, results, workers, shown, yes=yes
 )
+found, table = asked.results, asked.table()
 
 # %% [markdown]
 # ## The question
@@ -49,7 +51,8 @@ asked = what_if(
 # does not set.
 
 # %%
-html.table(asked.fields(), f"Scenario {asked.scenario}, {asked.missions:,} missions of each policy")
+name = found.manifest["study"]["scenario"]
+html.table(question.listed(found), f"Scenario {name}, {missions:,} missions of each policy")
 
 # %% [markdown]
 # ## The answer
@@ -68,11 +71,12 @@ html.say("{answer}", answer=html.composed(asked.answer()))
 # difference is clearly not zero:
 
 # %%
-caption = f"n = {asked.missions:,} missions per dot, bars are 95 % intervals of the means."
+measured = [metric for metric in answer.measured(found) if found.missions[metric].any()]
+caption = f"n = {missions:,} missions per dot, bars are 95 % intervals of the means."
 html.gallery(
     [
         (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
-        for metric in (*names.METRICS, *asked.measured)
+        for metric in (*names.METRICS, *measured)
         for name in [names.metric_name(metric)]
     ]
 )
@@ -83,8 +87,8 @@ html.gallery(
 # one failed mission has a large difference.
 
 # %%
-pairs = f"n = {asked.missions:,} pairs per policy"
-spread = f"{pairs}: {asked.winners()}. The lower panel is limited to the 5 % and 95 % quantiles."
+pairs, better = f"n = {missions:,} pairs per policy", answer.winners(answer.all_differences(found))
+spread = f"{pairs}: {better}. The lower panel is limited to the 5 % and 95 % quantiles."
 html.gallery(
     [
         (asked.plot(), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
@@ -102,8 +106,8 @@ html.gallery(
 # and then there is no difference.
 
 # %%
-for policy in asked.policies:
-    display(html.table(asked.amounts(policy), policy))
+for policy in found.policies:
+    display(html.table(answer.listed(table, policy), policy))
 
 # %% [markdown]
 # ### What common random numbers gained
@@ -116,7 +120,7 @@ for policy in asked.policies:
 # interval is, and how many independent missions would give the same precision.
 
 # %%
-html.table(asked.pairing(), f"Differences of n = {asked.missions:,} pairs")
+html.table(answer.pairing(table), f"Differences of n = {missions:,} pairs")
 
 # %% [markdown]
 # ## Two missions to look at
@@ -173,12 +177,12 @@ html.gallery(worst.drawings())
 # study simulates every combination of the values.
 
 # %%
-command = html.commands([asked.command()])
-study = html.block("toml", asked.as_toml().rstrip("\n"))
+command = html.commands([question.command(found)])
+study = html.block("toml", question.as_toml(found).rstrip("\n"))
 html.say("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
 # ## Where the figures come from
 
 # %%
-html.provenance([asked.results])
+html.provenance([found])

@@ -131,6 +131,11 @@ def differences(results: Results, policy: str) -> pd.Series:
     return sides[VARIATION] - sides[BASELINE]
 
 
+def all_differences(results: Results) -> dict[str, pd.Series]:
+    """The ``differences`` of every policy."""
+    return {policy: differences(results, policy) for policy in results.policies}
+
+
 def best_policy(results: Results, point: int) -> str:
     """The policy with the highest mean collection ratio and communication on one side."""
     missions = results.missions
