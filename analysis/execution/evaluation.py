@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,35 @@ METRICS = (*SHARES, *MEANS)
 # The memory of the records of missions whose values are added up together [bytes]; the last bits of
 # sums depend on it.
 MEMORY = 2**24
+
+
+class Asked(NamedTuple):
+    """Missions of one team.
+
+    Attributes:
+        scenario: The scenario space from which they are drawn.
+        team: ``"P"`` or ``"P,P,..."``.
+        missions: Number of missions: replications 0, 1, ...
+        seed: Seed of the missions.
+        engine: ``batch`` or ``events``.
+        workers: Threads of the batch engine, processes of the event engine.
+    """
+
+    scenario: ScenarioSpace
+    team: str
+    missions: int = 1000
+    seed: int = 0
+    engine: str = "batch"
+    workers: int = 1
+
+    def check(self) -> None:
+        """Refuse numbers that are out of range, and teams that are unknown or too large."""
+        check_workers(self.workers)
+        if not 1 <= self.missions <= MAX_REPLICATION + 1:
+            allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
+            raise InputError(f"missions: {self.missions} is out of range; {allowed}")
+        check_seed(self.seed, self.missions - 1)
+        check_team(len(load_team(self.team)), [self.scenario])
 
 
 @dataclass(frozen=True)
@@ -102,40 +132,37 @@ def evaluate(
         InputError: If a policy is unknown, a number is out of range, or the team has more policies
             than the largest fleet has UAVs.
     """
-    team = TypedByUser(team)
-    _check(scenario, team, missions, seed, workers)
-    pieces = [range(missions)]
-    (whole,) = _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock)
+    asked = Asked(scenario, TypedByUser(team), missions, seed, engine, workers)
+    asked.check()
+    (whole,) = _evaluations(asked, [range(missions)], progress, clock)
     return whole
 
 
 def means(
-    scenario: ScenarioSpace,
-    team: str,
-    missions: int = 1000,
-    seed: int = 0,
-    engine: str = "batch",
-    workers: int = 1,
-    progress: Progress | None = None,
-    clock: Clock = time.perf_counter,
+    asked: Asked, progress: Progress | None = None, clock: Clock = time.perf_counter
 ) -> Means:
     """The metrics of replications 0, 1, ... of a team, in a memory that does not grow with them.
 
-    The arguments are those of ``evaluate``. The number of workers does not change the result.
+    The number of workers does not change the result.
+
+    Args:
+        asked: The missions.
+        progress: Called with the number of missions done since its last call.
+        clock: Returns the time [s].
 
     Raises:
         InputError: As for ``evaluate``.
     """
-    _check(scenario, team, missions, seed, workers)
+    asked.check()
     moments: dict[str, Moments] = {}
-    uav_slots, seconds, size = 0, 0.0, _together(scenario)
-    pieces = (range(n, min(n + size, missions)) for n in range(0, missions, size))
-    for piece in _evaluations(scenario, team, pieces, seed, engine, workers, progress, clock):
+    uav_slots, seconds, size = 0, 0.0, _together(asked.scenario)
+    pieces = (range(n, min(n + size, asked.missions)) for n in range(0, asked.missions, size))
+    for piece in _evaluations(asked, pieces, progress, clock):
         for metric, values in _metrics(piece.records).items():
             new = Moments.of(values)
             moments[metric] = moments[metric].with_others(new) if metric in moments else new
         uav_slots, seconds = uav_slots + piece.uav_slots, seconds + piece.seconds
-    return Means(team, moments, uav_slots, seconds)
+    return Means(asked.team, moments, uav_slots, seconds)
 
 
 def _metrics(records: Records) -> dict[str, np.ndarray]:
@@ -148,24 +175,12 @@ def _metrics(records: Records) -> dict[str, np.ndarray]:
 
 
 def check_evaluation(
-    scenario: ScenarioSpace,
-    teams: Sequence[str],
-    missions: int,
-    seed: int = 0,
-    engine: str = "batch",
-    workers: int = 1,
-    yes: bool = False,
-    clock: Clock = time.perf_counter,
+    asked: Sequence[Asked], yes: bool = False, clock: Clock = time.perf_counter
 ) -> None:
     """Refuse ``means`` of several teams that could not come to their end, before the first mission.
 
     Args:
-        scenario: The scenario space.
-        teams: The teams.
-        missions: Number of missions of each team.
-        seed: Seed of the missions.
-        engine: The engine.
-        workers: Number of threads or processes.
+        asked: For each team its missions, which differ in nothing else.
         yes: Whether any time and memory is allowed.
         clock: Returns the time [s].
 
@@ -173,30 +188,23 @@ def check_evaluation(
         InputError: If a team is unknown or cannot act in the scenario, or a number is out of range;
             if it would take long, or more memory than is available.
     """
-    for team in teams:
-        _check(scenario, team, missions, seed, workers)
-    asked = missions * len(teams)
-    what = f"evaluate: {asked:,} missions (policies: {len(teams)}, workers: {workers:,})"
+    for one in asked:
+        one.check()
+    scenario, workers, engine = asked[0].scenario, asked[0].workers, asked[0].engine
+    missions = sum(one.missions for one in asked)
+    what = f"evaluate: {missions:,} missions (policies: {len(asked)}, workers: {workers:,})"
     if not yes:
         check_workers_memory(what, workers, [scenario], 4 * MEMORY, engine == "events")
-    if yes or are_few(asked, scenario):
-        for team in teams[1:]:  # the first one is refused at its first mission
-            simulate_missions(engine, [scenario], load_team(team), seed, [0])
+    if yes or are_few(missions, scenario):
+        for one in asked[1:]:  # the first one is refused at its first mission
+            simulate_missions(engine, [scenario], load_team(one.team), one.seed, [0])
         return
-    each = [
-        seconds_per_mission(lambda n: [scenario] * n, load_team(team), engine, clock)
-        for team in teams
-    ]
-    check_time(what, missions * sum(each) / workers)
-
-
-def _check(scenario: ScenarioSpace, team: str, missions: int, seed: int, workers: int) -> None:
-    check_workers(workers)
-    if not 1 <= missions <= MAX_REPLICATION + 1:
-        allowed = f"allowed: 1..{MAX_REPLICATION + 1:,}"
-        raise InputError(f"missions: {missions} is out of range; {allowed}")
-    check_seed(seed, missions - 1)
-    check_team(len(load_team(team)), [scenario])
+    seconds = sum(
+        one.missions
+        * seconds_per_mission(lambda n: [scenario] * n, load_team(one.team), engine, clock)
+        for one in asked
+    )
+    check_time(what, seconds / workers)
 
 
 def _together(scenario: ScenarioSpace) -> int:
@@ -207,37 +215,30 @@ def _together(scenario: ScenarioSpace) -> int:
 
 
 def _evaluations(
-    scenario: ScenarioSpace,
-    team: str,
-    pieces: Iterable[range],
-    seed: int,
-    engine: str,
-    workers: int,
-    progress: Progress | None,
-    clock: Clock,
+    asked: Asked, pieces: Iterable[range], progress: Progress | None, clock: Clock
 ) -> Iterator[Evaluation]:
     """An evaluation for each piece of the replications; only the simulation is timed."""
-    policies, pool = load_team(team), Here(workers)
-    if engine == "batch":
-        simulate_batch(scenario, policies, seed, 1)  # compiles
+    policies, pool = load_team(asked.team), Here(asked.workers)
+    about = (asked.scenario, policies, asked.seed)
+    if asked.engine == "batch":
+        simulate_batch(*about, 1)  # compiles
     else:
-        first = _jobs(scenario, team, range(1), seed)
-        _results(pool, first * (1 if workers == 1 else 2 * workers))  # starts the processes
+        first = _jobs(asked, range(1))
+        _results(pool, first * (1 if asked.workers == 1 else 2 * asked.workers))  # starts processes
     for piece in pieces:
         begin = clock()
-        if engine == "batch":
-            records = simulate_batch(
-                scenario, policies, seed, piece, workers=workers, progress=progress
-            )
+        if asked.engine == "batch":
+            records = simulate_batch(*about, piece, workers=asked.workers, progress=progress)
         else:
-            records = _results(pool, _jobs(scenario, team, piece, seed), progress)
-        yield Evaluation(team, records, clock() - begin)
+            records = _results(pool, _jobs(asked, piece), progress)
+        yield Evaluation(asked.team, records, clock() - begin)
 
 
-def _jobs(scenario: ScenarioSpace, team: str, replications: range, seed: int) -> list[Job]:
+def _jobs(asked: Asked, replications: range) -> list[Job]:
     """Jobs of the event engine."""
     chunks = split([Part(Cell(0, 0, "", 0), replications)], CHUNK["events"])
-    return [MissionsJob(chunk, (scenario,), team, seed, "events") for chunk in chunks]
+    spaces = (asked.scenario,)
+    return [MissionsJob(chunk, spaces, asked.team, asked.seed, "events") for chunk in chunks]
 
 
 def _results(pool: Pool, jobs: Sequence[Job], progress: Progress | None = None) -> Records:

@@ -47,18 +47,17 @@ def evaluate(
     as_json: JsonOption = False,
 ) -> None:
     """Simulate many missions and print the means of their metrics with 95 % intervals."""
-    from analysis.execution.evaluation import check_evaluation, means
+    from analysis.execution.evaluation import Asked, check_evaluation, means
     from analysis.study.engine import engine_of
     from policies.registry import typed
 
     space, policy = load_space(scenario, settings), typed(policy)
     engine = engine_of([space], engine)
+    asked = [Asked(space, team, missions, seed, engine, workers) for team in policy]
     with console.compile_notice():
-        check_evaluation(space, policy, missions, seed, engine, workers, yes)
+        check_evaluation(asked, yes)
     with console.compile_notice(), console.bar("mission", missions * len(policy)) as bar:
-        evaluations = [
-            means(space, team, missions, seed, engine, workers, bar.update) for team in policy
-        ]
+        evaluations = [means(of_team, bar.update) for of_team in asked]
     rows = [
         {
             "policy": evaluation.policy,

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from analysis.execution import effort, evaluation
-from analysis.execution.evaluation import check_evaluation, evaluate, means
+from analysis.execution.evaluation import Asked, check_evaluation, evaluate, means
 from analysis.stats.intervals import interval_of
 from dess import InputError, load_scenario
 from dess.code import memory
@@ -38,15 +38,15 @@ def handed(monkeypatch):
 
 def test_means_are_those_of_all_records_bit_for_bit(monkeypatch, handed):
     records = evaluate(SPACE, "greedy,random", 300, 5).records.missions
-    found = means(SPACE, "greedy,random", 300, 5, workers=2)
+    found = means(Asked(SPACE, "greedy,random", 300, 5, workers=2))
     for metric in evaluation.METRICS:
         assert found.moments[metric].interval(metric) == interval_of(metric, records[metric])
     assert found.uav_slots == records["uav_slots"].sum()
-    events = means(SPACE, "greedy,random", 300, 5, "events")
+    events = means(Asked(SPACE, "greedy,random", 300, 5, "events"))
     assert events.moments == found.moments
     monkeypatch.setattr(evaluation, "MEMORY", 20_000)  # 32 missions of three UAVs
     handed.clear()
-    pieces = means(SPACE, "greedy,random", 300, 5)
+    pieces = means(Asked(SPACE, "greedy,random", 300, 5))
     assert handed == [1, *(range(n, min(n + 32, 300)) for n in range(0, 300, 32))]
     for metric in evaluation.METRICS:
         assert pieces.moments[metric] == pytest.approx(found.moments[metric], rel=1e-12)
@@ -63,14 +63,15 @@ def test_the_missions_that_are_simulated_together_do_not_grow(handed):
 def test_what_takes_too_much_is_refused_before_it_begins(monkeypatch, handed):
     ticks = iter(range(0, 10**9, 1))  # a trial takes a second
     monkeypatch.setattr(effort, "LONG_RUN", 500.0)
-    check_evaluation(SPACE, ["random"], 10_000, clock=lambda: next(ticks))
+    check_evaluation([Asked(SPACE, "random", 10_000)], clock=lambda: next(ticks))
+    two = [Asked(SPACE, team, 10**9, workers=4) for team in ("random", "greedy")]
     line = r"evaluate: 2,000,000,000 missions \(policies: 2, workers: 4\), about \d+ days; allowed"
     with pytest.raises(InputError, match=f"{line}: --yes, or less"):
-        check_evaluation(SPACE, ["random", "greedy"], 10**9, workers=4, clock=lambda: next(ticks))
-    check_evaluation(SPACE, ["random"], 10**9, yes=True)
+        check_evaluation(two, clock=lambda: next(ticks))
+    check_evaluation([Asked(SPACE, "random", 10**9)], yes=True)
     monkeypatch.setattr(memory, "available_memory", lambda: 2**20)
     with pytest.raises(InputError, match=r"GiB of memory, of which 0.0 are available"):
-        check_evaluation(SPACE, ["random"], 10)
+        check_evaluation([Asked(SPACE, "random", 10)])
     assert handed == []
 
 

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis import run_study, summary
-from analysis.execution.evaluation import means
+from analysis.execution.evaluation import Asked, means
 from analysis.names import MEASURES, measured_in
 from analysis.results.resimulate import difference, recorded, resimulate
 from analysis.stats.intervals import interval_of
@@ -78,13 +78,13 @@ def test_missions_without_a_value_are_left_out_of_means_and_comparisons(results)
 
 def test_evaluations_have_them_beside_the_metrics_of_the_paper():
     space = load_scenario("paper", quota=30, **MEASURED)
-    found = means(space, "greedy", 20, 5)
+    found = means(Asked(space, "greedy", 20, 5))
     records = simulate_batch(space, load("greedy"), 5, 20).operations
     for name in ("age", "peak_age", "utilisation"):
         values = records[name][~np.isnan(records[name])]
         assert found.moments[name].interval(name) == interval_of(name, values)
     assert "latency" not in found.moments
-    assert not {*means(load_scenario("paper", quota=30), "greedy", 5).moments} & {*MEASURES}
+    assert not {*means(Asked(load_scenario("paper", quota=30), "greedy", 5)).moments} & {*MEASURES}
 
 
 def test_tables_of_sections_are_fields_of_a_study(tmp_path):
