@@ -13,6 +13,7 @@ training nor for selecting weights.
 """
 
 import argparse
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -28,45 +29,41 @@ from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of
 from policies.ddqn.training import Training
 
-EVALUATION_SEED = 900_000_001
+EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
 
 
-def _variants() -> dict[str, dict[str, Any]]:
-    """The settings that differ from ``quick``, by the name of the variant."""
-    quick = load_config("quick")
-    last = quick.phases[-1].model_dump()
-    alone = {"phases": [last | {"ticks": quick.ticks}]}
-    no_guard: dict[str, Any] = {"guard": False}
-    no_starts, no_returns = {"low_battery_starts": 0.0}, {"early_returns": 0.0}
-    return {
-        "quick": {},
-        "no transfer": alone,
-        "no guard": no_guard,
-        "no guard, no transfer": no_guard | alone,
-        "no low-battery starts": no_starts,
-        "no early returns": no_returns,
-        "no low-battery starts, no early returns": no_starts | no_returns,
-        "none of the three": no_guard | no_starts | no_returns,
-        "none of the three, no transfer": no_guard | no_starts | no_returns | alone,
-        "1-step returns": {"n_step": 1},
-        "discount 0.99": {"discount": 0.99},
-        "64 environments": {"num_envs": 64, "replay": 8000},
-        "nodes": {"observation": "nodes", "hidden": (64, 256, 256)},
-        "maps": {"observation": "maps"},
-    }
+_QUICK = load_config("quick")
+_ALONE: dict[str, Any] = {"phases": [_QUICK.phases[-1].model_dump() | {"ticks": _QUICK.ticks}]}
+_NO_GUARD: dict[str, Any] = {"guard": False}
+_NO_STARTS, _NO_RETURNS = {"low_battery_starts": 0.0}, {"early_returns": 0.0}
+_NONE = _NO_GUARD | _NO_STARTS | _NO_RETURNS
+# The settings that differ from ``quick``, by the name of the variant.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "quick": {},
+    "no transfer": _ALONE,
+    "no guard": _NO_GUARD,
+    "no guard, no transfer": _NO_GUARD | _ALONE,
+    "no low-battery starts": _NO_STARTS,
+    "no early returns": _NO_RETURNS,
+    "no low-battery starts, no early returns": _NO_STARTS | _NO_RETURNS,
+    "none of the three": _NONE,
+    "none of the three, no transfer": _NONE | _ALONE,
+    "1-step returns": {"n_step": 1},
+    "discount 0.99": {"discount": 0.99},
+    "64 environments": {"num_envs": 64, "replay": 8000},
+    "nodes": {"observation": "nodes", "hidden": (64, 256, 256)},
+    "maps": {"observation": "maps"},
+}
 
 
-VARIANTS = _variants()
-
-
-def run(config: TrainingConfig, missions: int) -> tuple[pd.DataFrame, dict[str, float]]:
-    """Train once; return the curve, and the metrics of the selected weights on new missions."""
+def run(config: TrainingConfig) -> pd.DataFrame:
+    """Train once; the curve, with the metrics of the selected weights on new missions."""
     training = Training(config, device_of("cpu"))
     training.run(config.ticks)
     policy = training.policy(training.best)
-    records = simulate_batch(config.space, policy, EVALUATION_SEED, missions)
-    metrics = {f"final_{name}": float(records.missions[name].mean()) for name in METRICS}
-    return pd.DataFrame(training.curve), metrics
+    missions = simulate_batch(config.space, policy, EVALUATION_SEED, MISSIONS).missions
+    metrics = {f"final_{name}": float(missions[name].mean()) for name in METRICS}
+    return pd.DataFrame(training.curve).assign(**metrics)
 
 
 def table(curves: pd.DataFrame) -> str:
@@ -90,10 +87,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, help="folder of the curves")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--variants", nargs="+", default=list(VARIANTS), choices=VARIANTS)
-    parser.add_argument(
-        "--missions", type=int, default=1000, help="missions of the final evaluation"
-    )
     parser.add_argument("--gather", type=Path, help="only gather all curves into this file")
     parser.add_argument("--table", type=Path, help="only print what the curves of a file say")
     arguments = parser.parse_args()
@@ -106,18 +99,14 @@ def main() -> None:
         curves = [read_table(path) for path in paths_in(arguments.out, "*.parquet")]
         write_table(arguments.gather, pa.concat_tables(curves, promote_options="permissive"))
         return
-    for seed in arguments.seeds:
-        for variant in arguments.variants:
-            path = arguments.out / f"{variant.replace(',', '').replace(' ', '-')}-{seed}.parquet"
-            if path.exists():
-                continue
-            config = load_config("quick", seed=seed, **VARIANTS[variant])
-            curve, final = run(config, arguments.missions)
+    for seed, variant in product(arguments.seeds, VARIANTS):
+        path = arguments.out / f"{variant.replace(',', '').replace(' ', '-')}-{seed}.parquet"
+        if not path.exists():
+            curve = run(load_config("quick", seed=seed, **VARIANTS[variant]))
             curve.insert(0, "variant", variant)
             curve.insert(1, "seed", seed)
-            curve = curve.assign(**final)
             write_table(path, pa.Table.from_pandas(curve, preserve_index=False))
-            print(variant, seed, final, f"{curve['seconds'].iloc[-1]:.0f} s", flush=True)
+            print(variant, seed, f"{curve['seconds'].iloc[-1]:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,10 @@ The tool replaces the text between two marks in the file, and keeps the text aro
 """
 
 import argparse
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis import load_study, numbers
 from analysis.names import METRICS, PRODUCT
@@ -25,111 +24,65 @@ from policies.ddqn.config import MISSION_SEED, load_config
 from policies.ddqn.description import read_description
 from policies.registry import HEURISTICS, load
 
-BEGIN, END = (
-    "<!-- computed by reports/tools/model_cards.py -->",
-    "<!-- end of the computed part -->",
-)
 # The seed of the missions of model cards, which neither training nor selection of weights uses.
 EVALUATION_SEED = 20_261_121
 # The study whose heuristics a learned policy is compared with: those with the aim of the paper.
 STUDY = "table4"
+ROWS = 12  # of the learning curve
 
 
-def _row(name: str, missions: np.ndarray) -> str:
-    """A table row with success, collection ratio and product, and their intervals."""
-    ends = [interval_of(metric, missions[metric]) for metric in METRICS]
-    return f"| {name} | {' | '.join(numbers.interval(*interval) for interval in ends)} |"
-
-
-HEAD = "| | success | collection ratio | product per mission |\n| --- | --- | --- | --- |"
-
-
-def card(folder: Path, command: str, missions: int) -> Iterator[str]:
-    """The computed part of a card, paragraph by paragraph."""
+def card(folder: Path, command: str, missions: int) -> str:
+    """The computed part of a card, from its first mark to its last one."""
     described = read_description(folder)
-    config, run = described.training, described.run
-    curve = read_curve(folder / "training.parquet")
+    config = described.training
     if load_config(config.name, seed=config.seed) != config:
         raise SystemExit(f"{folder}: was not trained by the config of its name")
     space, policy = load_config(config.name).space, load(folder)
+    curve = read_curve(folder / "training.parquet")
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
-
-    yield "## Training"
-    phases = ", ".join(
-        f"{p.name} ({p.ticks} ticks{'' if p.battery else ', no battery decrease'})"
-        for p in config.phases
-    )
-    entries = {
-        "Command": f"`{command}`",
-        "Config": f"`policies/ddqn/configs/{config.name}.toml`, whole in `config.json`",
-        "Observation and network": f"{config.observation}, {_count(policy):,} weights",
-        "Phases": phases,
-        "Hardware": f"{run.device}, {run.threads} thread(s), torch {run.torch}",
-        "Wall time": f"{run.seconds / 60:.0f} min",
-        "Updates": f"{run.updates:,} of {config.batch} transitions",
-        "Experience": f"{run.uav_slots:,} UAV-slots",
-        "Seeds": f"training {config.seed} (missions of seed {MISSION_SEED} + that); "
-        f"selection {config.evaluation_seed}; evaluation below {EVALUATION_SEED}",
-        "Selection": f"moving average of {config.window} evaluations of "
-        f"{config.evaluation_missions} missions; best product {run.selection_score:.4f}",
-    }
-    yield "\n".join(f"- {name}: {text}" for name, text in entries.items())
-    yield (
-        "The learning curve (`training.parquet`): evaluations during training, without battery "
-        "decrease in a phase without it:"
-    )
-    rows = curve.iloc[np.unique(np.linspace(0, len(curve) - 1, 12).round().astype(int))]
-    table = ["| tick | phase | minutes | success | product |", "| --- | --- | --- | --- | --- |"]
-    table += [
-        f"| {r.tick} | {r.phase} | {r.seconds / 60:.0f} | {numbers.percent(r.evaluation_success)} "
-        f"| {numbers.percent(getattr(r, 'evaluation_' + PRODUCT))} |"
-        for r in rows.itertuples()
-    ]
-    yield "\n".join(table)
-
-    yield "## Evaluation"
-    yield (
-        f"Means over {missions} random missions of Table II (seed {EVALUATION_SEED}, 95 % "
-        f"intervals): `dess evaluate --policy {folder.name} --missions {missions} "
-        f"--seed {EVALUATION_SEED}`."
-    )
     others = {
-        name: simulate_batch(space, load(name), EVALUATION_SEED, missions).missions
+        f"`{name}`": simulate_batch(space, load(name), EVALUATION_SEED, missions).missions
         for name in load_study(STUDY).policies
         if name in HEURISTICS
     }
-    rows = [_row(folder.name, learned)]
-    rows += [_row(f"{n} UAV(s)", learned[learned["uavs"] == n]) for n in np.unique(learned["uavs"])]
-    rows += [_row(f"`{name}`", other) for name, other in others.items()]
-    printed = " | ".join(map(numbers.percent, paper.TABLE_IV.values()))
-    rows.append(f"| paper, Table IV | {printed} |")
-    yield "\n".join([HEAD, *rows])
-    gains = {
-        name: mean_interval(100 * (learned[PRODUCT] - other[PRODUCT]))
-        for name, other in others.items()
+    fleets = {f"{n} UAV(s)": learned[learned["uavs"] == n] for n in np.unique(learned["uavs"])}
+    cases = {
+        f"I = {n}": simulate_batch(
+            load_scenario("fig4", uavs=n), policy, EVALUATION_SEED, missions
+        ).missions
+        for n in paper.FIG_4
     }
-    yield (
-        "Points of the product more than the heuristics on the same missions, paired: "
-        + ", ".join(
-            f"`{name}` {g.mean:+.2f} [{g.low:.2f}, {g.high:.2f}]" for name, g in gains.items()
-        )
-        + "."
+    environment = Environment(
+        loader=PackageLoader("reports", "templates"), undefined=StrictUndefined, trim_blocks=True
     )
-    rows = [
-        _row(f"I = {n}", simulate_batch(case, policy, EVALUATION_SEED, missions).missions)
-        for n, case in ((n, load_scenario("fig4", uavs=n)) for n in (1, 2, 3))
-    ]
-    for n, means in paper.FIG_4.items():
-        cells = " | ".join(
-            numbers.percent(means[metric]) for metric in ("success", "collection_ratio")
-        )
-        rows.append(f"| paper, I = {n} | {cells} | not printed |")
-    yield f"The cases of Fig. 4, {missions} missions each:"
-    yield "\n".join([HEAD, *rows])
+    environment.filters |= {"percent": numbers.percent, "whole": "{:,.0f}".format}
+    evaluated = {"success": "evaluation_success", "product": f"evaluation_{PRODUCT}"}
+    shown = np.unique(np.linspace(0, len(curve) - 1, ROWS).round().astype(int))
+    return environment.get_template("model_card.md").render(
+        name=folder.name,
+        command=command,
+        missions=missions,
+        seed=EVALUATION_SEED,
+        mission_seed=MISSION_SEED,
+        described=described,
+        weights=sum(weight.numel() for weight in policy.network.parameters()),
+        curve=curve.assign(**{name: curve[of] for name, of in evaluated.items()}).iloc[shown],
+        random_missions=_means({folder.name: learned} | fleets | others),
+        gains={
+            name: tuple(mean_interval(100 * (learned[PRODUCT] - other[PRODUCT])))
+            for name, other in others.items()
+        },
+        cases=_means(cases),
+        paper=paper,
+    )
 
 
-def _count(policy: Any) -> int:
-    return sum(weight.numel() for weight in policy.network.parameters())
+def _means(of: dict[str, np.ndarray]) -> dict[str, list[str]]:
+    """Success, collection ratio and product of missions, with their intervals."""
+    return {
+        name: [numbers.interval(*interval_of(metric, missions[metric])) for metric in METRICS]
+        for name, missions in of.items()
+    }
 
 
 def main() -> None:
@@ -141,11 +94,10 @@ def main() -> None:
     arguments = parser.parse_args()
     path = arguments.folder / CARD
     text = read_text(path) if path.exists() else f"# {arguments.folder.name}\n\n"
-    before, _, rest = text.partition(BEGIN)
-    after = rest.partition(END)[2]
-    parts = card(arguments.folder, arguments.command, arguments.missions)
-    computed = "\n\n".join([BEGIN, *parts, END])
-    write_file(path, before + computed + (after or "\n"))
+    computed = card(arguments.folder, arguments.command, arguments.missions)
+    begin, *_, end = computed.splitlines()
+    before, _, rest = text.partition(begin)
+    write_file(path, before + computed + (rest.partition(end)[2] or "\n"))
 
 
 if __name__ == "__main__":

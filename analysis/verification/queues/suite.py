@@ -8,11 +8,13 @@ at the beginning, since its first customers come to an empty zone. All other bat
 their own, of so many customers that the first ones do not matter.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from pydantic import Field
 from scipy import stats
 
@@ -50,149 +52,122 @@ class System(NamedTuple):
     Attributes:
         name: What it is.
         known: The closed forms, by what is measured.
-        run: Simulates that many batches; returns for each of ``known`` a value per batch.
+        run: Simulates that many batches; returns a value per batch for each of ``known``.
     """
 
     name: str
     known: dict[str, float]
-    run: Callable[[int], tuple[np.ndarray, ...]]
+    run: Callable[[int], Mapping[str, Any]]
+
+    @property
+    def tests(self) -> dict[str, str]:
+        """The names of the checks, by what is measured."""
+        return {what: f"{self.name}: {what}" for what in self.known}
 
 
-def systems(space: ScenarioSpace, seed: int) -> Iterator[System]:
+def systems(space: ScenarioSpace, seed: int) -> list[System]:
     """All systems whose batches are compared with closed forms.
 
     Args:
         space: The scenario whose channel and communication slots the missions have.
         seed: Seed of all draws.
     """
-    for pads in (1, 2, 3):
-        yield _zone(f"Charging zone, M/M/{pads}", pads, "exponential", seed)
-    yield _zone("Charging zone, M/D/1", 1, "fixed", seed)
-    yield _buffer(space, seed)
-    yield _finite_buffer(space, seed)
-    yield _mission(space, seed)
-    yield _finite_mission(space, seed)
-    yield System(
-        "Node visited at exponential gaps",
-        {"age": GAP, "peak age": GAP},  # E[X^2] / (2 E[X]) and E[X] of the gaps X
-        lambda batches: _visits(seed, batches),
-    )
 
+    def each(
+        measure: Callable[[ScenarioSpace, int, int, int], dict[str, float]], places: int = 0
+    ) -> Callable[[int], pd.DataFrame]:
+        """Batches that are runs of their own, each with a replication."""
+        return lambda batches: pd.DataFrame(
+            [measure(space, seed, r, places) for r in range(batches)]
+        )
 
-def _zone(name: str, pads: int, charging: str, seed: int) -> System:
-    arrivals = LOAD * pads / CHARGING
-    if charging == "exponential":
-        waiting = theory.waiting_of_mmc(arrivals, CHARGING, pads)
-    else:
-        waiting = theory.waiting_of_mg1(arrivals, Moments(CHARGING, 0.0))
-
-    def run(batches: int) -> tuple[np.ndarray, ...]:
-        generator, count = np.random.default_rng([seed, pads]), (batches + 1) * CUSTOMERS
-        gaps = generator.exponential(1 / arrivals, count)
-        times = np.full(count, CHARGING)
-        if charging == "exponential":
-            times = generator.exponential(CHARGING, count)
-        station = Station(pads, gaps, times)
-        return _batches(station.waits), _batches(station.queues) / _batches(gaps)
-
-    return System(name, {"waiting time": waiting, "queue length": arrivals * waiting}, run)
-
-
-def _buffer(space: ScenarioSpace, seed: int) -> System:
-    known = {
+    gap = 1 / space.communication_slots
+    loss, number = theory.loss_of_mm1k(LOAD, PLACES), theory.number_in_mm1k(LOAD, PLACES)
+    endless = {
         "time in the buffer": theory.waiting_of_mmc(LOAD, 1.0, 1) + 1.0,
         "age": theory.age_of_mm1(LOAD, 1.0),
     }
-
-    def run(batches: int) -> tuple[np.ndarray, ...]:
-        ages, latencies = [], []
-        for replication in range(batches):
-            server, _ = _served(space, seed, replication, 0)
-            packets = server.buffers.packets
-            ages.append(ages_of(server.buffers, packets["left"].max())[0])
-            latencies.append((packets["left"] - packets["generated"]).mean())
-        return np.array(latencies), np.array(ages)
-
-    return System("Buffer with a server, M/M/1", known, run)
-
-
-def _finite_buffer(space: ScenarioSpace, seed: int) -> System:
-    loss, number = theory.loss_of_mm1k(LOAD, PLACES), theory.number_in_mm1k(LOAD, PLACES)
-    known = {
+    finite = {
         "share of packets lost": loss,
         "packets in the buffer": number,
         "time in the buffer": number / (LOAD * (1 - loss)),
     }
+    slotted = {"latency": theory.latency_of_slotted_md1(LOAD / gap, gap)}
+    slotted_finite = {"share of packets lost": theory.loss_of_slotted_md1k(LOAD, PLACES)}
+    visits = {"age": GAP, "peak age": GAP}  # E[X^2] / (2 E[X]) and E[X] of the gaps X
+    return [
+        *(_zone(pads, seed) for pads in (1, 2, 3)),
+        _zone(1, seed, fixed=True),
+        System("Buffer with a server, M/M/1", endless, each(_served)),
+        System(f"Buffer with a server, M/M/1/{PLACES}", finite, each(_served, PLACES)),
+        System("Mission of a UAV above a node, M/D/1", slotted, each(_flown)),
+        System(
+            f"Mission of a UAV above a node, M/D/1/{PLACES}", slotted_finite, each(_flown, PLACES)
+        ),
+        System("Node visited at exponential gaps", visits, partial(_visits, seed)),
+    ]
 
-    def run(batches: int) -> tuple[np.ndarray, ...]:
-        rows = []
-        for replication in range(batches):
-            server, times = _served(space, seed, replication, PLACES)
-            packets, counts = server.buffers.packets, server.buffers.counts
-            done = packets[server.buffers.delivered]
-            latency = (done["left"] - done["generated"]).mean()
-            rows.append((counts[2] / counts[0], server.numbers.sum() / times[-1], latency))
-        return tuple(np.array(rows).T)
 
-    return System(f"Buffer with a server, M/M/1/{PLACES}", known, run)
+def _zone(pads: int, seed: int, fixed: bool = False) -> System:
+    """The charging zone, where UAVs charge for exponential times, or all for the same time."""
+    arrivals = LOAD * pads / CHARGING
+    waiting = theory.waiting_of_mmc(arrivals, CHARGING, pads)
+    if fixed:
+        waiting = theory.waiting_of_mg1(arrivals, Moments(CHARGING, 0.0))
+
+    def run(batches: int) -> dict[str, np.ndarray]:
+        generator, count = np.random.default_rng([seed, pads]), (batches + 1) * CUSTOMERS
+        gaps = generator.exponential(1 / arrivals, count)
+        times = np.full(count, CHARGING) if fixed else generator.exponential(CHARGING, count)
+        station = Station(pads, gaps, times)
+        waits, queues, lasted = (
+            values.reshape(-1, CUSTOMERS)[1:].mean(1)  # without the first batch
+            for values in (station.waits, station.queues, gaps)
+        )
+        return {"waiting time": waits, "queue length": queues / lasted}
+
+    name = f"Charging zone, M/{'D' if fixed else 'M'}/{pads}"
+    return System(name, {"waiting time": waiting, "queue length": arrivals * waiting}, run)
 
 
-def _served(
-    space: ScenarioSpace, seed: int, replication: int, limit: int
-) -> tuple[Server, np.ndarray]:
+def _served(space: ScenarioSpace, seed: int, replication: int, places: int) -> dict[str, float]:
     """A buffer whose packets arrive as in the model, and are served in exponential times of mean 1.
 
-    Returns:
-        The server, and the times of the arrivals.
+    Args:
+        space, seed, replication: Those of the arrivals.
+        places: Packets that the buffer can hold; 0 for no limit.
     """
     world = _continuous(space, arrival_rate=LOAD, max_slots=round(CUSTOMERS / LOAD))
     times = arrivals_of(world, 0, seed, replication)
     work = np.random.default_rng([seed, replication]).exponential(1.0, len(times))
-    return Server(times, work, limit), times
+    server = Server(times, work, places)
+    done, counts = server.buffers.packets[server.buffers.delivered], server.buffers.counts
+    return {
+        "share of packets lost": counts[2] / counts[0],
+        "packets in the buffer": server.numbers.sum() / times[-1],
+        "time in the buffer": (done["left"] - done["generated"]).mean(),
+        "age": ages_of(server.buffers, done["left"].max())[0],
+    }
 
 
-def _mission(space: ScenarioSpace, seed: int) -> System:
-    gap = 1 / space.communication_slots
-    known = {"latency": theory.latency_of_slotted_md1(LOAD / gap, gap)}
-
-    def run(batches: int) -> tuple[np.ndarray, ...]:
-        records = _missions(space, seed, batches, 0)
-        return (np.array([record.latency for record in records]),)
-
-    return System("Mission of a UAV above a node, M/D/1", known, run)
-
-
-def _finite_mission(space: ScenarioSpace, seed: int) -> System:
-    known = {"share of packets lost": theory.loss_of_slotted_md1k(LOAD, PLACES)}
-
-    def run(batches: int) -> tuple[np.ndarray, ...]:
-        records = _missions(space, seed, batches, PLACES)
-        return (np.array([record.lost_packets / record.generated for record in records]),)
-
-    return System(f"Mission of a UAV above a node, M/D/1/{PLACES}", known, run)
+def _flown(space: ScenarioSpace, seed: int, replication: int, places: int) -> dict[str, float]:
+    """A mission of a UAV above a node; the arguments are those of ``_served``."""
+    arrivals = {"process": "continuous", "buffer": places}
+    record = mission_above(space, LOAD, seed, replication, max_slots=SLOTS, arrivals=arrivals)
+    return {
+        "latency": record.latency,
+        "share of packets lost": record.lost_packets / record.generated,
+    }
 
 
-def _missions(space: ScenarioSpace, seed: int, batches: int, buffer: int) -> list[Any]:
-    arrivals = {"process": "continuous", "buffer": buffer}
-    return [
-        mission_above(space, LOAD, seed, replication, max_slots=SLOTS, arrivals=arrivals)
-        for replication in range(batches)
-    ]
-
-
-def _visits(seed: int, batches: int) -> tuple[np.ndarray, ...]:
+def _visits(seed: int, batches: int) -> pd.DataFrame:
     gaps = np.random.default_rng([seed, 99]).exponential(GAP, (batches, CUSTOMERS))
-    ages = [ages_of(visited(times), times[-1])[:2] for times in gaps.cumsum(1)]
-    return tuple(np.array(ages).T)
+    ages = [ages_of(visited(times), times[-1]) for times in gaps.cumsum(1)]
+    return pd.DataFrame(ages, columns=["age", "peak age", "percentile"])
 
 
 def _continuous(space: ScenarioSpace, **changes: Any) -> ScenarioSpace:
     return ScenarioSpace.of(space, **{"arrivals": {"process": "continuous"}} | changes)
-
-
-def _batches(values: np.ndarray) -> np.ndarray:
-    """The means of the batches, without the first one."""
-    return values.reshape(-1, CUSTOMERS)[1:].mean(1)
 
 
 def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
@@ -207,11 +182,10 @@ def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
         For each check a value per batch; of the visits at fixed gaps the ages, and of the thinned
         process the times of all arrivals.
     """
-    measured = {
-        _test(system, what): values.tolist()
-        for system in systems(space, seed)
-        for what, values in zip(system.known, system.run(batches), strict=True)
-    }
+    measured = {}
+    for system in systems(space, seed):
+        values = system.run(batches)
+        measured |= {test: values[what].tolist() for what, test in system.tests.items()}
     times = np.arange(1, CUSTOMERS + 1) * GAP
     measured[_VISITED] = [*ages_of(visited(times), times[-1])]
     schedule = {"process": "continuous", "schedule": SCHEDULE}
@@ -234,7 +208,7 @@ def fits(measured: Measured, space: ScenarioSpace) -> bool:
 def _known(space: ScenarioSpace) -> dict[str, float]:
     """The closed forms by the name of their check."""
     return {
-        _test(system, what): value
+        system.tests[what]: value
         for system in systems(space, 0)
         for what, value in system.known.items()
     }
@@ -246,10 +220,6 @@ def checks(measured: Measured, space: ScenarioSpace) -> list[Check]:
     of_batches = [_batch_check(test, known[test], measured[test]) for test in known]
     thinned = _thinning_checks(np.array(measured[_THINNED]))
     return [*of_batches, _visits_check(measured[_VISITED]), *thinned]
-
-
-def _test(system: System, what: str) -> str:
-    return f"{system.name}: {what}"
 
 
 def _batch_check(test: str, known: float, values: list[float]) -> Check:
@@ -284,12 +254,8 @@ def _thinning_checks(times: np.ndarray) -> list[Check]:
     own, total = (RATE * integrated(t, SCHEDULE, END) for t in (times, np.array([END])))
     gaps = np.diff(own, prepend=0.0)
     p, n = float(stats.kstest(gaps, "expon").pvalue), len(times)
-    test, seen = (
-        f"{_THINNED}: gaps in the integrated rate, Kolmogorov-Smirnov",
-        f"{gaps.mean():.4f}",
-    )
-    whole = float(total[0])
+    test, whole = f"{_THINNED}: gaps in the integrated rate, Kolmogorov-Smirnov", float(total[0])
     return [
-        Check(QUEUES, test, "exponential, mean 1", f"mean {seen}", n, p),
+        Check(QUEUES, test, "exponential, mean 1", f"mean {gaps.mean():.4f}", n, p),
         Check.normal(QUEUES, f"{_THINNED}: number", whole, n, np.sqrt(whole), n, digits=0),
     ]
