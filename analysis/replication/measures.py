@@ -5,6 +5,7 @@ A claim contains one of these functions, with the metric and values filled in:
     >>> partial(mean, metric="success")(evidence).quantities
 """
 
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -165,10 +166,11 @@ def change(
 
 
 def lead(
-    evidence: EvidenceOfPolicy, field: str, metric: str, values: tuple[str, ...], name: str
+    evidence: EvidenceOfPolicy, field: str, metric: str, values: Sequence[str], name: str = ""
 ) -> Measured:
     """How much higher a metric is at some values of a parameter than at all others."""
     leads = evidence.pairs(field, metric).leads(*values)
+    name = name or f"{setting(field, values[0])} above the next best"
     return Measured((leads,), (_least(leads, name),))
 
 

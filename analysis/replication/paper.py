@@ -30,12 +30,8 @@ SWEET_SPOT = {
 # The printed means, by the name of the shipped study that does the same.
 PRINTED = {"table4": TABLE_IV, "sweet-spot": SWEET_SPOT}
 
-# The best number of UAVs (Section V-D); extremes of two parameters (V-C); values of C_S [%] that
-# are adventurous (Fig. 5b); initial data per node that is the best, and what comes next (Fig. 5d).
+# The best number of UAVs (Section V-D).
 BEST_UAVS = 3
-LONE_UAV, EARLIEST_CHARGE = 1, 10
-ADVENTUROUS = (10, 20)
-TURNING, BEYOND = (15.0, 17.5), (17.5, 20.0)
 
 # Training steps at which the curve with transfer learning overtakes the one without it, and from
 # which on the curve without it stays level (Fig. 3b, Section V-B).

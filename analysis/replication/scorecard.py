@@ -7,6 +7,7 @@ the paper's observation, network and algorithm.
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
+from inspect import signature
 from typing import Any
 
 import pandas as pd
@@ -84,7 +85,9 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
         return evidence_of_policy(studies, study, learner)
 
     policies = partial(evidence, "", VARIANTS), partial(evidence, PAPERS_NETWORK, None)
-    return [row for section in SECTIONS for row in _rows(section, margin(studies), policies)]
+    return [
+        row for section in SECTIONS.values() for row in _rows(section, margin(studies), policies)
+    ]
 
 
 def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> list[Row]:
@@ -164,8 +167,12 @@ def _verdict(claim: Claim, margin: float, measured: Measured) -> str:
     """The verdict by the rule; a single mission or training cannot show anything."""
     if any(quantity.n == 1 for quantity in measured.quantities):
         return INCONCLUSIVE
-    known = {"margin": margin, "printed": claim.printed and claim.printed.interval}
-    return claim.rule.judge(*measured.arguments, **{name: known[name] for name in claim.rule.takes})
+    judge = claim.rule.judge
+    known: dict[str, Any] = {"margin": margin}
+    if claim.printed:
+        known["printed"] = claim.printed.interval
+    takes = known.keys() & signature(judge).parameters.keys()
+    return judge(*measured.arguments, **{name: known[name] for name in takes})
 
 
 def _against(claim: Claim, measured: Measured) -> str:

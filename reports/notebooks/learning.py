@@ -29,7 +29,7 @@ from analysis.questions.learning import ablation
 from analysis.questions.learning import curves as learning
 from analysis.questions.learning import trained as policies
 from analysis.questions.learning.files import read_curves
-from analysis.replication import paper, verdict_rules
+from analysis.replication import claims, paper, verdict_rules
 from policies.registry import TRAINED
 from reports.pages import html
 
@@ -72,7 +72,7 @@ html.gallery([with_and_without(name, metric) for name in drawn for metric in met
 
 # %%
 transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
-by_metric = dict(zip(metrics, (verdict_rules.throughout, verdict_rules.passes), strict=True))
+by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"]), strict=True))
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 html.say(
     "**The rules here**, with Welch's t over the trainings:\n\n"

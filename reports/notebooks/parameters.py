@@ -30,7 +30,7 @@ from analysis.figures import parameters as figures
 from analysis.figures.policies import performance
 from analysis.questions import main_effects, sensitivity, summary
 from analysis.replication import paper, scorecard, sweet_spot
-from analysis.replication.claims import FIG_5
+from analysis.replication.claims import SECTIONS
 from analysis.replication.verdict_rules import NO_RESULTS
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
@@ -97,7 +97,7 @@ html.table(
 
 # %%
 studies = {"fig5": fig5, "sweet-spot": sweet}
-rows = scorecard.of_policy(studies, leading, FIG_5)
+rows = scorecard.of_policy(studies, leading, SECTIONS["fig-5"])
 rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
 html.say(
     "These are the claims of the paper about its Fig. 5, and the verdicts for {leading} by the "

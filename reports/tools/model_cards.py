@@ -7,6 +7,7 @@ The tool replaces the text between two marks in the file, and keeps the text aro
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -37,7 +38,8 @@ def card(folder: Path, command: str, missions: int) -> str:
     config = described.training
     if load_config(config.name, seed=config.seed) != config:
         raise SystemExit(f"{folder}: was not trained by the config of its name")
-    space, policy = load_config(config.name).space, load(folder)
+    space = load_config(config.name).space
+    policy: Any = load(folder)  # whose network is counted below
     curve = read_curve(folder / "training.parquet")
     learned = simulate_batch(space, policy, EVALUATION_SEED, missions).missions
     others = {

@@ -182,7 +182,7 @@ def simulate(space: ScenarioSpace, seed: int, batches: int) -> Measured:
         For each check a value per batch; of the visits at fixed gaps the ages, and of the thinned
         process the times of all arrivals.
     """
-    measured = {}
+    measured: Measured = {}
     for system in systems(space, seed):
         values = system.run(batches)
         measured |= {test: values[what].tolist() for what, test in system.tests.items()}

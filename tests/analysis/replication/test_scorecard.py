@@ -11,8 +11,9 @@ from scipy import stats
 
 from analysis import load_study, run_study
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
-from analysis.replication import claims, paper
+from analysis.replication import paper
 from analysis.replication import scorecard as module
+from analysis.replication.claims import SECTIONS
 from analysis.replication.scorecard import Finding, Row, departures, of_policy, scorecard
 from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
 from analysis.results.tables import Results
@@ -23,6 +24,7 @@ from policies.registry import TRAINED
 from tests.analysis.small import grid, small_study
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
+TABLE_4, FIG_3, FIG_5 = (SECTIONS[name] for name in ("table-4", "fig-3", "fig-5"))
 POLICIES = ["greedy", "ddqn"]
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
 NONE = pd.DataFrame()
@@ -121,13 +123,13 @@ def test_every_claim_has_a_verdict_by_the_learned_policy(rows: list[Row]) -> Non
     for row in rows:
         assert row.findings[0].verdict != NO_RESULTS, row.findings[0].note
         assert row.findings[0].quantities
-        assert row.findings[0].policy == ("" if row.section is claims.FIG_3 else "ddqn")
+        assert row.findings[0].policy == ("" if row.section is FIG_3 else "ddqn")
 
 
 def test_the_papers_network_has_none_where_the_study_lacks_it(rows: list[Row]) -> None:
     for row in rows:
         assert row.findings[1].verdict == NO_RESULTS
-        if row.section is claims.FIG_3:
+        if row.section is FIG_3:
             assert row.findings[1].note.startswith("no trainings of this policy")
         else:
             assert "has no policy ddqn-paper" in row.findings[1].note
@@ -234,9 +236,7 @@ def test_few_missions_leave_it_open(studies: dict[str, Results]) -> None:
 def test_a_single_mission_tells_nothing(studies: dict[str, Results]) -> None:
     alone = studies["table4"].missions.query("replication == 0")
     for row in scorecard({"table4": replace(studies["table4"], missions=alone)}, NONE):
-        assert row.findings[0].verdict == (
-            INCONCLUSIVE if row.section is claims.TABLE_4 else NO_RESULTS
-        )
+        assert row.findings[0].verdict == (INCONCLUSIVE if row.section is TABLE_4 else NO_RESULTS)
 
 
 def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
@@ -275,16 +275,16 @@ def test_what_one_more_uav_changes(
 def test_any_policy_is_judged_by_the_same_rules(
     rows: list[Row], studies: dict[str, Results]
 ) -> None:
-    of_ddqn = of_policy(studies, "ddqn", claims.FIG_5)
-    expected = [row for row in rows if row.section is claims.FIG_5]
+    of_ddqn = of_policy(studies, "ddqn", FIG_5)
+    expected = [row for row in rows if row.section is FIG_5]
     assert [row.findings for row in of_ddqn] == [row.findings[:1] for row in expected]
-    others = of_policy(studies, "greedy", claims.FIG_5)
+    others = of_policy(studies, "greedy", FIG_5)
     assert {row.findings[0].policy for row in others} == {"greedy"}
 
 
 def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
     with pytest.raises(InputError, match=r"policy: 'gredy' is not in the study \(did you mean gre"):
-        of_policy(studies, "gredy", claims.FIG_5)
+        of_policy(studies, "gredy", FIG_5)
     for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
         with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
             ask("absent")
@@ -356,7 +356,7 @@ def test_a_study_without_event_logs_does_not_say_where_uavs_fly(tmp_path: Path) 
 
 
 def test_learning_is_judged_by_the_curves(rows: list[Row]) -> None:
-    higher, passes, levels = (row for row in rows if row.section is claims.FIG_3)
+    higher, passes, levels = (row for row in rows if row.section is FIG_3)
     assert (
         higher.findings[0].verdict
         == passes.findings[0].verdict
@@ -371,7 +371,7 @@ def test_learning_that_fails_is_told() -> None:
     """It ends below, and what it should beat levels off, but not low."""
     using, without = module.VARIANTS
     curves = trained({using: (0.1, 0.5), without: (0.9, 0.9)})
-    *both, levels = (row for row in scorecard({}, curves) if row.section is claims.FIG_3)
+    *both, levels = (row for row in scorecard({}, curves) if row.section is FIG_3)
     assert [row.findings[0].verdict for row in both] == [REFUTED, REFUTED]
     assert levels.findings[0].verdict == IN_PART
 
@@ -379,7 +379,7 @@ def test_learning_that_fails_is_told() -> None:
 @pytest.mark.parametrize("tops", [(0.8, 0.4), (0.4, 0.8)])
 def test_short_trainings_cannot_tell(tops: tuple[float, float]) -> None:
     curves = trained({v: (0, top) for v, top in zip(module.VARIANTS, tops, strict=True)}, 12_000)
-    findings = [row.findings[0] for row in scorecard({}, curves) if row.section is claims.FIG_3]
+    findings = [row.findings[0] for row in scorecard({}, curves) if row.section is FIG_3]
     assert [finding.verdict for finding in findings] == 3 * [INCONCLUSIVE]
     assert all(finding.note.endswith("too short to tell") for finding in findings)
 
@@ -399,7 +399,7 @@ def test_without_a_learned_policy_there_are_no_results(tmp_path: Path) -> None:
     study = load_study("table4", policies=["greedy"], missions=4)
     for row in scorecard({"table4": run_study(study, tmp_path / "table4")}, NONE):
         assert row.findings[0].verdict == row.findings[1].verdict == NO_RESULTS
-        if row.section is claims.TABLE_4:
+        if row.section is TABLE_4:
             assert row.findings[0].note == "the study table4 has no learned policy"
 
 

@@ -15,6 +15,7 @@ from analysis.questions.learning.curves import Transfer
 from analysis.questions.main_effects import Shape
 from analysis.replication import paper
 from analysis.replication import verdict_rules as rules
+from analysis.replication.claims import RULES
 from analysis.replication.evidence_of_policy import Pairs, negated
 from analysis.stats.intervals import Interval
 from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED
@@ -22,13 +23,13 @@ from analysis.study.selection import Choice
 from tests.analysis.questions.test_main_effects import pairs_of
 
 OF_ONE_INTERVAL: tuple[Callable[[Interval], str], ...] = (
-    lambda mean: rules.reached.judge(mean, exactly(0.5)),
-    lambda difference: rules.gained.judge(difference, exactly(0.2)),
-    rules.higher.judge,
-    rules.lower.judge,
-    rules.slightly_lower.judge,
-    lambda difference: rules.kept.judge(difference, 0.01),
-    rules.most.judge,
+    lambda mean: rules.reached(mean, exactly(0.5)),
+    lambda difference: rules.gained(difference, exactly(0.2)),
+    rules.higher,
+    rules.lower,
+    rules.slightly_lower,
+    lambda difference: rules.kept(difference, 0.01),
+    rules.most,
 )
 
 
@@ -61,7 +62,7 @@ def test_an_interval_from_end_to_end_is_inconclusive(
     ],
 )
 def test_a_figure_is_reached(mean: float, half: float, verdict: str) -> None:
-    assert rules.reached.judge(around(0.5 + mean, half), exactly(0.5)) == verdict
+    assert rules.reached(around(0.5 + mean, half), exactly(0.5)) == verdict
 
 
 def test_the_paper_s_figures_vary_as_well() -> None:
@@ -70,8 +71,8 @@ def test_the_paper_s_figures_vary_as_well() -> None:
     assert tuple(rules.gap(ours, theirs)) == pytest.approx((0.2, 0.0524, 0.3339), abs=5e-5)
     assert tuple(rules.gap(around(0.8, 0.02), exactly(0.7))) == pytest.approx((0.1, 0.08, 0.12))
     below = around(0.89, 0.009)
-    assert rules.reached.judge(below, exactly(0.9)) == IN_PART
-    assert rules.reached.judge(below, Interval(0.9, 0.88, 0.92)) == HOLDS
+    assert rules.reached(below, exactly(0.9)) == IN_PART
+    assert rules.reached(below, Interval(0.9, 0.88, 0.92)) == HOLDS
 
 
 def test_the_interval_of_a_printed_share_is_wilsons() -> None:
@@ -92,7 +93,7 @@ def test_the_interval_of_a_printed_share_is_wilsons() -> None:
     ],
 )
 def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -> None:
-    assert rules.gained.judge(around(mean, half), exactly(0.26)) == verdict
+    assert rules.gained(around(mean, half), exactly(0.26)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -100,7 +101,7 @@ def test_a_gain_is_as_large_as_printed(mean: float, half: float, verdict: str) -
     [(0.02, HOLDS), (0.005, INCONCLUSIVE), (-0.001, INCONCLUSIVE), (-0.02, REFUTED)],
 )
 def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
-    assert rules.higher.judge(around(mean)) == rules.lower.judge(around(-mean)) == verdict
+    assert rules.higher(around(mean)) == rules.lower(around(-mean)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -115,7 +116,7 @@ def test_higher_and_lower_mirror_each_other(mean: float, verdict: str) -> None:
     ],
 )
 def test_slightly_lower(mean: float, half: float, verdict: str) -> None:
-    assert rules.slightly_lower.judge(around(mean, half)) == verdict
+    assert rules.slightly_lower(around(mean, half)) == verdict
 
 
 @pytest.mark.parametrize(
@@ -130,40 +131,38 @@ def test_slightly_lower(mean: float, half: float, verdict: str) -> None:
     ],
 )
 def test_kept_up_to_a_margin(mean: float, half: float, verdict: str) -> None:
-    assert rules.kept.judge(around(mean, half), 0.01) == verdict
+    assert rules.kept(around(mean, half), 0.01) == verdict
 
 
 def test_shares_of_missions() -> None:
-    assert rules.most.judge(around(0.6, 0.05)) == HOLDS
-    assert rules.most.judge(around(0.6, 0.2)) == rules.most.judge(around(0.4, 0.2)) == INCONCLUSIVE
-    assert rules.most.judge(around(0.4, 0.05)) == REFUTED
+    assert rules.most(around(0.6, 0.05)) == HOLDS
+    assert rules.most(around(0.6, 0.2)) == rules.most(around(0.4, 0.2)) == INCONCLUSIVE
+    assert rules.most(around(0.4, 0.05)) == REFUTED
 
 
 def test_missions_that_collect_everything() -> None:
     none, some, every = Interval(0, 0, 0.01), Interval(0.1, 0.05, 0.2), Interval(1, 0.9, 1)
-    assert rules.never_all.judge(around(0.9), none) == HOLDS
-    assert rules.never_all.judge(around(0.9), some) == IN_PART
-    assert rules.never_all.judge(around(0.9), Interval(0, 0, 0.2)) == IN_PART  # few missions
-    assert rules.never_all.judge(around(0.99), some) == INCONCLUSIVE
-    assert rules.never_all.judge(around(1.0, 0), every) == REFUTED
+    assert rules.never_all(around(0.9), none) == HOLDS
+    assert rules.never_all(around(0.9), some) == IN_PART
+    assert rules.never_all(around(0.9), Interval(0, 0, 0.2)) == IN_PART  # few missions
+    assert rules.never_all(around(0.99), some) == INCONCLUSIVE
+    assert rules.never_all(around(1.0, 0), every) == REFUTED
 
 
 def test_ignored_nodes() -> None:
-    assert rules.ignored.judge(around(0.8), around(0.5)) == HOLDS
-    assert rules.ignored.judge(around(0.4), around(0.2)) == IN_PART  # more than others, not most
-    assert rules.ignored.judge(around(0.9), around(-0.1)) == IN_PART  # most, but the others too
-    assert rules.ignored.judge(around(0.2), around(-0.1)) == REFUTED
-    assert rules.ignored.judge(around(0.5), around(0.0)) == INCONCLUSIVE
+    assert rules.ignored(around(0.8), around(0.5)) == HOLDS
+    assert rules.ignored(around(0.4), around(0.2)) == IN_PART  # more than others, not most
+    assert rules.ignored(around(0.9), around(-0.1)) == IN_PART  # most, but the others too
+    assert rules.ignored(around(0.2), around(-0.1)) == REFUTED
+    assert rules.ignored(around(0.5), around(0.0)) == INCONCLUSIVE
 
 
 def test_divided_nodes() -> None:
-    assert rules.divided.judge(around(0.2), around(0.95)) == HOLDS
-    assert (
-        rules.divided.judge(around(0.0), around(0.95)) == IN_PART
-    )  # nodes of their own, no sectors
-    assert rules.divided.judge(around(0.2), around(0.6)) == IN_PART
-    assert rules.divided.judge(around(0.0), around(0.6)) == REFUTED
-    assert rules.divided.judge(around(0.0), around(0.75)) == INCONCLUSIVE
+    assert rules.divided(around(0.2), around(0.95)) == HOLDS
+    assert rules.divided(around(0.0), around(0.95)) == IN_PART  # nodes of their own, no sectors
+    assert rules.divided(around(0.2), around(0.6)) == IN_PART
+    assert rules.divided(around(0.0), around(0.6)) == REFUTED
+    assert rules.divided(around(0.0), around(0.75)) == INCONCLUSIVE
 
 
 @pytest.mark.parametrize(
@@ -177,7 +176,7 @@ def test_divided_nodes() -> None:
 )
 def test_a_chosen_setting(best: int, left: tuple[int, ...], verdict: str) -> None:
     choice = Choice(best, left, (), (), "kn", "", True, True, 0, 0, 0)
-    assert rules.chosen.judge(choice, [4, 5]) == verdict
+    assert rules.chosen(choice, [4, 5]) == verdict
 
 
 def transfer(last: Interval, verdict: str = HOLDS, throughout: bool = True) -> Transfer:
@@ -186,11 +185,11 @@ def transfer(last: Interval, verdict: str = HOLDS, throughout: bool = True) -> T
 
 
 def test_learning_curves() -> None:
-    throughout, levels_off = rules.throughout.judge, rules.levels_off.judge
+    throughout, levels_off = rules.throughout, rules.levels_off
     above = around(0.1)
-    assert throughout(transfer(above)) == rules.passes.judge(transfer(above)) == HOLDS
+    assert throughout(transfer(above)) == rules.passes(transfer(above)) == HOLDS
     below_at_first = transfer(above, throughout=False)
-    assert (throughout(below_at_first), rules.passes.judge(below_at_first)) == (IN_PART, HOLDS)
+    assert (throughout(below_at_first), rules.passes(below_at_first)) == (IN_PART, HOLDS)
     for verdict in (INCONCLUSIVE, REFUTED):
         assert throughout(transfer(above, verdict)) == verdict
     assert levels_off(0.4, transfer(above)) == HOLDS
@@ -202,13 +201,13 @@ def test_learning_curves() -> None:
 
 def test_single_and_short_trainings_leave_it_open() -> None:
     single = transfer(Interval(0.1, np.nan, np.nan))
-    assert rules.levels_off.judge(0.9, single) == INCONCLUSIVE
+    assert rules.levels_off(0.9, single) == INCONCLUSIVE
     short = replace(transfer(around(0.1)), length=paper.CROSSING - 1)
-    assert rules.levels_off.judge(0.4, short) == INCONCLUSIVE
+    assert rules.levels_off(0.4, short) == INCONCLUSIVE
 
 
 def test_the_margin_is_in_the_words() -> None:
-    for rule in (rules.kept, rules.no_lower, rules.alike):
+    for rule in (RULES["kept"], RULES["no_lower"], RULES["alike"]):
         assert "1 point" in rule.in_words(0.01) and "2.5 points" in rule.in_words(0.025)
 
 
@@ -221,7 +220,7 @@ def leads_of(
 
 
 def test_the_best_value() -> None:
-    best = rules.best.judge
+    best = rules.best
     assert best(leads_of([1, 1], 2)) == HOLDS
     assert best(leads_of([1, -2], 1)) == HOLDS
     assert best(leads_of([1, 1], 1)) == REFUTED
@@ -230,14 +229,14 @@ def test_the_best_value() -> None:
 
 
 def test_the_lowest_value_is_the_best_of_the_negative() -> None:
-    lowest = rules.lowest.judge
+    lowest = rules.lowest
     assert lowest(negated(leads_of([1, 1], 0))) == HOLDS
     assert lowest(negated(leads_of([1, 1], 1))) == REFUTED
     assert lowest(negated(leads_of([0, 1], 0))) == INCONCLUSIVE
 
 
 def test_no_lower() -> None:
-    no_lower = rules.no_lower.judge
+    no_lower = rules.no_lower
     assert no_lower(leads_of([0, 0, 0], 0, 1), 0.01) == HOLDS
     assert no_lower(leads_of([0, -1, 0], 0, 1), 0.01) == HOLDS
     assert no_lower(leads_of([0, 1, 0], 0, 1), 0.01) == REFUTED
@@ -253,12 +252,12 @@ def test_no_lower() -> None:
 )
 def test_only_what_is_wholly_beyond_the_margin_is_refuted(half: float, verdict: str) -> None:
     """Surely lower, perhaps by less than matters; beyond, but not with all at once; beyond."""
-    assert rules.no_lower.judge(leads_of([0, 0.02, 0], 0, 1, half=half), 0.01) == verdict
-    assert rules.alike.judge(pairs_of([0, 0.02], half=half), 0.01) == verdict
+    assert rules.no_lower(leads_of([0, 0.02, 0], 0, 1, half=half), 0.01) == verdict
+    assert rules.alike(pairs_of([0, 0.02], half=half), 0.01) == verdict
 
 
 def test_alike() -> None:
-    alike = rules.alike.judge
+    alike = rules.alike
     assert alike(pairs_of([0, 0.005]), 0.01) == HOLDS
     assert alike(pairs_of([0.005, 0.005]), 0.01) == INCONCLUSIVE  # perhaps a little more
     assert alike(pairs_of([0, 0.05]), 0.01) == REFUTED
@@ -276,11 +275,11 @@ def test_alike() -> None:
     ],
 )
 def test_a_peak(shape: Shape, verdict: str) -> None:
-    assert rules.peaks.judge(shape, 2) == verdict
+    assert rules.peaks(shape, 2) == verdict
 
 
 def test_a_rise() -> None:
-    judge = rules.rises.judge
+    judge = rules.rises
     assert judge(Shape(main_effects.RISES, (1,))) == HOLDS
     assert judge(Shape(main_effects.LEVELS, (0, 1))) == INCONCLUSIVE
     assert judge(Shape(main_effects.FALLS, (0,))) == REFUTED

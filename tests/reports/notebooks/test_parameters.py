@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_results, load_study, run_study
-from analysis.replication.claims import FIG_5
+from analysis.replication.claims import SECTIONS
 from analysis.replication.scorecard import scorecard
 from analysis.replication.verdict_rules import NO_RESULTS
 from tests.by_hand import bounded
@@ -64,7 +64,7 @@ def test_metrics_without_variance_have_no_row(results: Path, text: str) -> None:
 
 def test_verdicts_are_those_of_the_scorecard(results: Path, text: str) -> None:
     studies = {name: load_results(results / name) for name in ("fig5", "sweet-spot")}
-    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.section == FIG_5]
+    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.section == SECTIONS["fig-5"]]
     judged = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
     assert len(judged) > 5
     for row in judged:

@@ -9,8 +9,7 @@ import pytest
 
 from analysis import numbers
 from analysis.replication import measures, paper
-from analysis.replication import verdict_rules as rules
-from analysis.replication.claims import Claim, Section
+from analysis.replication.claims import RULES, Claim, Section
 from analysis.replication.measures import Quantity
 from analysis.replication.scorecard import Finding, Row
 from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
@@ -29,7 +28,7 @@ def row(
     *findings: Finding,
 ) -> Row:
     """A row of the scorecard; pages do not look at how a claim is measured and judged."""
-    claim = Claim(text, place, rules.most, measures.missed_data, printed)
+    claim = Claim(text, place, RULES["most"], measures.missed_data, printed)
     return Row(Section(*section, "fig4", [claim]), claim, rule, findings)
 
 
