@@ -157,6 +157,7 @@ def test_nox_sessions_exist() -> None:
     assert {"tests", "reports"} <= named <= set(defined)
 
 
+@pytest.mark.slow
 def test_the_moving_picture_is_of_the_command_beside_it(tmp_path: Path) -> None:
     (text,) = re.findall(r"`dess (simulate .*--animation .*?)`", README)
     *arguments, name = shlex.split(text)
@@ -268,6 +269,7 @@ def shown(interval: dict[str, float]) -> Any:
     return pytest.approx([100 * interval[key] for key in ("mean", "low", "high")], abs=0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_the_table_of_policies_is_what_its_command_prints(
     capsys: pytest.CaptureFixture[str],

@@ -117,6 +117,7 @@ def test_what_an_extra_adds_is_missed_in_one_line(folder, plain) -> None:
     assert not {"run", "fig5", "new", "mission.png"} & {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_with_the_extra_learning_trained_policies_act(folder) -> None:
     [(code, out, err)] = runs(folder, {"learning"}, "simulate --policy ddqn").values()
     assert code == 0, err

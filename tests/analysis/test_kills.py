@@ -56,6 +56,7 @@ def test_a_killed_study_equals_an_undisturbed_one(workers, tmp_path):
     assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
 
 
+@pytest.mark.slow
 def test_workers_go_with_a_killed_run(tmp_path):
     small_study(tmp_path)
     with start(tmp_path / "trial.toml", tmp_path / "out", 2, 4000) as running:

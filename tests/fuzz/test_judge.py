@@ -36,6 +36,7 @@ def box(folder: Path) -> Path:
     return folder / "cases" / "box"
 
 
+@pytest.mark.slow
 def test_planted_faults_are_found(folder: Path) -> None:
     steps = (write("in/a.toml", b""), node("out/device", "fifo"))
     cases = [Case("planted", (fault,), steps, seconds=2) for fault in FAULTS]

@@ -237,7 +237,6 @@ def test_an_edited_file_has_another_fingerprint(file: Path) -> None:
 
     first = identity()
     assert first.startswith("eager in_a_file:Eager ")
-    assert identity() == first
     file.write_text(FILE.replace("len(view)", "len(view) + 0"))
     edited = identity()
     assert edited != first

@@ -75,10 +75,8 @@ def test_a_study_that_is_told_to_end_equals_an_undisturbed_one(tmp_path):
     check_studies(tmp_path, 2, signal.SIGHUP, 1, 100)
 
 
-KILLED = pytest.param(signal.SIGKILL, marks=pytest.mark.slow)
-
-
-@pytest.mark.parametrize("number", [KILLED, signal.SIGINT])
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
 def test_a_study_that_ends_in_its_bounds_equals_an_undisturbed_one(number, tmp_path):
     check_studies(tmp_path, 1, number, 1, 30, bounds)
 
