@@ -11,7 +11,6 @@ of a parameter are simulated in the same replications, so they are compared miss
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,7 +20,7 @@ from analysis.names import PRODUCT, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
 from analysis.stats.correction import adjust
-from analysis.stats.intervals import LEVEL, Interval
+from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import paired
 from dess import InputError
 
@@ -141,37 +140,6 @@ def shape(pairs: pd.DataFrame) -> Shape:
     else:
         words = PEAK if peaks else VALLEY if valleys else IRREGULAR
     return Shape(words, peaks)
-
-
-class Lower(NamedTuple):
-    """A value that another one is significantly better than: which, and by how much.
-
-    Attributes:
-        other: The better value in words, of several the one with the largest lead.
-        lead: Its lead, with its interval.
-    """
-
-    other: str
-    lead: Interval
-
-
-def significantly_lower(pairs: pd.DataFrame, values: Mapping[int, str], value: str) -> Lower | None:
-    """Whether another value of a parameter is significantly better than a value.
-
-    Args:
-        pairs: The result of ``changes``.
-        values: The values in words, by their positions.
-        value: The value in words; one that the study lacks is lower than none.
-    """
-    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
-    leads = []
-    for row in pairs.itertuples():
-        first, second = values[row.first], values[row.second]
-        if first == value and (row.first, row.second) in ups:
-            leads.append(Lower(second, Interval(row.difference, row.low, row.high)))
-        if second == value and (row.first, row.second) in downs:
-            leads.append(Lower(first, Interval(-row.difference, -row.high, -row.low)))
-    return max(leads, key=lambda lower: lower.lead.mean, default=None)
 
 
 def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
