@@ -5,10 +5,8 @@ For a paired comparison, take the differences of the pairs:
     bootstrap_interval(a - b, np.median, generator)
 """
 
-import inspect
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -23,7 +21,6 @@ def bootstrap_interval(
     statistic: Callable[..., float],
     generator: np.random.Generator,
     level: float = LEVEL,
-    method: str = "BCa",
     resamples: int = 9999,
 ) -> Interval:
     """A statistic with its bootstrap interval, for example a median, a ratio or a small sample.
@@ -31,16 +28,16 @@ def bootstrap_interval(
     Args:
         samples: (n,) values, or several such arrays that are resampled together; entry r of all
             arrays belongs to the same replication.
-        statistic: A function with as many arguments as there are samples. If it takes ``axis``,
-            like ``np.mean``, it is computed for many resamples at once, in limited memory.
+        statistic: A function with as many arguments as there are samples, not a builtin of Python.
+            If it takes ``axis``, like ``np.mean``, it is computed for many resamples at once, in
+            limited memory.
         generator: The random generator of the resamples.
         level: Confidence level.
-        method: ``BCa``, ``percentile`` or ``basic``, as in ``scipy.stats.bootstrap``.
         resamples: Number of resamples.
 
     Returns:
         The statistic of the samples as ``mean``, and its interval. Where BCa is not defined or does
-        not contain the statistic, the interval is that of ``percentile``. If all resamples agree,
+        not contain the statistic, the interval is that of the percentiles. If all resamples agree,
         it is degenerate (low = mean = high).
 
     Raises:
@@ -61,13 +58,11 @@ def bootstrap_interval(
             n_resamples=resamples,
             batch=max(1, _BATCH // n),
             confidence_level=level,
-            method=method,
             paired=True,
-            vectorized=_takes_axis(statistic),
             rng=generator,
         )
     low, high = result.confidence_interval
-    if method == "BCa" and not low <= estimate <= high:  # nan, or too large a bias or level
+    if not low <= estimate <= high:  # nan, or too large a bias or level
         low, high = np.quantile(result.bootstrap_distribution, [(1 - level) / 2, (1 + level) / 2])
     return Interval(estimate, float(low), float(high))
 
@@ -86,10 +81,3 @@ def expanded_level(level: float, n: float) -> float:
     n = max(n, 2)
     end = np.sqrt(n / (n - 1)) * stats.t.ppf((1 + level) / 2, n - 1)
     return float(1 - 2 * stats.norm.sf(end))
-
-
-def _takes_axis(statistic: Callable[..., Any]) -> bool:
-    try:
-        return "axis" in inspect.signature(statistic).parameters
-    except ValueError:  # some builtins show no signature
-        return False
