@@ -124,13 +124,6 @@ def test_the_optimum_is_reached_where_hovering_is_best() -> None:
     assert best <= upper_bound(space, 3, 0).ratio <= 1.01 * best
 
 
-def test_the_optimum_hardly_depends_on_the_number_of_values() -> None:
-    space = shadowed(nodes=TWO, edge_snr=-10.0, shadowing_variance=16.0, initial_data=12.0)
-    few, many = (TinySea(space, 0, contraction(values)).optimum for values in (4, 12))
-    assert 0 < many < 1
-    assert few == pytest.approx(many, abs=0.005)
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_bound_is_above_the_optimum_with_shadowing(kind: str) -> None:
     gaps = []

@@ -26,11 +26,6 @@ def test_student_of_three_values():
     assert mean_interval([1.0, 2.0, 3.0], 0.9) == pytest.approx((2.0, 0.31414, 3.68586), abs=1e-5)
 
 
-@pytest.mark.parametrize("values", [[0.5], [0.5, 0.5, 0.5]])
-def test_without_spread_the_interval_is_degenerate(values):
-    assert mean_interval(values) == (0.5, 0.5, 0.5)
-
-
 @pytest.mark.parametrize(
     "estimate",
     [lambda: wilson(0, 0), lambda: mean_interval([]), lambda: quantile_interval([], 0.5)],
@@ -69,8 +64,3 @@ def test_summary_by_several_columns_and_by_none():
     table = summary(MISSIONS, by=[]).set_index("metric")
     assert table.loc["success", "mean"] == pytest.approx(0.8)
     assert table.loc["success", "n"] == 5
-
-
-def test_missions_without_a_value_of_the_group_are_a_group():
-    table = summary(MISSIONS.assign(policy=["tour", "tour", None, "greedy", None]))
-    assert table["n"].tolist() == [2] * 4 + [2] * 4 + [1] * 4

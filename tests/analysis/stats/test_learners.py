@@ -1,10 +1,8 @@
 """Learners of several trainings: crossed random factors by hand, and tables of them."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from pandas.testing import assert_frame_equal
-from scipy import stats
 
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import mean_interval
@@ -43,15 +41,6 @@ def test_p_is_where_the_interval_reaches_0(seed):
     assert crossed(-d).p == crossed(d).p
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("training", [0.0, 0.02])
-def test_several_trainings_make_no_interval_narrower(seed, training):
-    d = layout(seed, training=training)
-    result, these = crossed(d), mean_interval(d.mean(axis=0))
-    assert result.high - result.low >= these.high - these.low
-    assert result.new_high >= result.high
-
-
 def test_negative_variance_components_are_zero():
     result = crossed(np.array([[1.0, 0, 0, 0], [0, 1.0, 0, 0]]))  # as many, elsewhere
     assert (result.training_sd, result.mission_sd) == (0.0, 0.0)
@@ -64,13 +53,6 @@ def test_equal_differences_of_trainings():
     result = crossed(np.full((3, 4), 0.1))
     assert result[:5] == pytest.approx((0.1,) * 5)
     assert result[5:] == (2 / 8, 0, 0, 0)
-
-
-def test_trainings_alike_leave_the_missions():
-    values = np.array([1.0, 2.0, 4.0, 8.0])
-    alike = crossed(np.stack([values] * 3))
-    assert alike[:3] == pytest.approx(mean_interval(values))
-    assert alike.p == pytest.approx(stats.ttest_1samp(values, 0).pvalue)
 
 
 def test_one_training_or_one_mission_leaves_deviations_unknown():
@@ -114,13 +96,6 @@ def test_learners_without_failures_have_an_interval():
     half = 2.160369 * np.sqrt(2 / 13 / 14)
     assert row[ends].tolist() == pytest.approx([-half, half] * 2, rel=1e-6)
     assert row[["difference", "p", "mission_sd"]].tolist() == [0, 1, 0]
-
-
-def test_points_of_one_replication_are_averaged_for_a_learner():
-    alone = STUDY[STUDY["point"] == 0]
-    twice = pd.concat([alone, alone.assign(point=1)])
-    learners = {"ddqn": ["ddqn", "ddqn-2"]}
-    assert_frame_equal(*(compare_learners(m, learners, "tour", [METRIC]) for m in (alone, twice)))
 
 
 @pytest.mark.parametrize(

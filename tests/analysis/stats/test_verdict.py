@@ -1,7 +1,5 @@
 """What a whole interval shows, refutes and leaves open."""
 
-import itertools
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -58,8 +56,3 @@ def test_verdicts_on_parts() -> None:
     assert judged(True, False) == judged(True, None) == IN_PART
     assert judged(False) == judged(False, None) == judged(False, False) == REFUTED
     assert judged(None) == judged(None, None) == INCONCLUSIVE
-
-
-def test_the_order_of_parts_does_not_matter() -> None:
-    for parts in itertools.product((True, False, None), repeat=3):
-        assert len({judged(*order) for order in itertools.permutations(parts)}) == 1

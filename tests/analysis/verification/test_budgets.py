@@ -1,14 +1,12 @@
 """Data and batteries of logs and records balance; whatever is changed in them is noticed."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 
-from analysis import load_results
 from analysis.results.tables import Results
 from analysis.verification import budgets
 from analysis.verification.logs import Log
@@ -84,17 +82,3 @@ def test_data_that_come_from_nowhere_are_noticed(results: Results, name: str) ->
 def test_rounding_of_a_single_sum_is_not_taken_for_a_loss(results: Results) -> None:
     changed = with_records(results, 3, collected=lambda value: np.nextafter(value, 2 * value))
     assert not fails(budgets.conservation_check({"trial": changed}))
-
-
-def test_studies_in_a_folder_are_found_and_the_broken_ones_named(
-    results: Results, tmp_path: Path
-) -> None:
-    for name in ("one", "two", "broken"):
-        (tmp_path / name).mkdir()
-        for entry in results.store.folder.iterdir():
-            (tmp_path / name / entry.name).symlink_to(entry)
-    (tmp_path / "broken" / "missions").unlink()
-    (tmp_path / "no study").mkdir()
-    found, damaged = budgets.studies_in(tmp_path, but="two")
-    assert ([*found], damaged) == (["one"], ["broken"])
-    assert found["one"].missions.equals(load_results(results.store.folder).missions)

@@ -27,11 +27,6 @@ def test_exact_checks_and_open_ones_do_not_count_for_the_correction() -> None:
     assert table["verdict"].tolist() == [REFUTED, HOLDS, INCONCLUSIVE, INCONCLUSIVE]
 
 
-def test_a_page_without_chance_is_judged_too() -> None:
-    assert judge([check(error=0.0), check()])["verdict"].tolist() == [HOLDS, INCONCLUSIVE]
-    assert judge([check()])["verdict"].tolist() == [INCONCLUSIVE]
-
-
 def test_an_estimate_of_a_normal_variable_by_hand() -> None:
     made = Check.normal("topic", "test", 1, 3.0, 1.0, 10, digits=2)
     assert (made.known, made.seen) == ("1", "3.00 [1.04, 4.96]")
@@ -46,15 +41,6 @@ def test_an_exact_check_without_cases_is_inconclusive() -> None:
 
 def named(name: str, topic: str = "one", **values: float) -> Check:
     return Check(topic, name, "known", "seen", 1000, **values)
-
-
-def test_the_words_of_checks_that_all_hold() -> None:
-    table = judge([named("a", error=0.0), named("b", topic="two", p=0.5)])
-    assert overall(table).startswith(
-        "**2 of 2 checks hold**. 1 are exact. 1 are statistical, judged"
-    )
-    assert overall(table).endswith("one seed in 100.")
-    assert on_topics(table, "two") == "**1 of 1 checks hold**."
 
 
 def test_the_words_name_checks_that_do_not_hold_or_are_inconclusive() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.stats.intervals import LEVEL, wilson
+from analysis.stats.intervals import wilson
 from analysis.verification import closed_forms
 from dess.scenario import Scenario
 
@@ -33,12 +33,6 @@ def test_the_rate_at_an_snr_by_hand() -> None:
     assert closed_forms.rate(world, 10 * np.log10(7)) == pytest.approx(0.75)
 
 
-def test_the_snr_is_found_back_from_the_rate() -> None:
-    snr = np.linspace(-60, 60, 13)
-    again = closed_forms.snr_of(WORLD, closed_forms.rate(WORLD, snr))
-    assert again == pytest.approx(snr, abs=1e-6)
-
-
 @pytest.mark.parametrize("distance", [10.0, 800.0, 20_000.0])
 @pytest.mark.parametrize("variance", [2.0, 60.0])
 def test_moments_of_the_rate_agree_with_a_quadrature_of_another_kind(
@@ -54,13 +48,6 @@ def test_moments_of_the_rate_agree_with_a_quadrature_of_another_kind(
     moments = closed_forms.rate_moments(world, distance)
     assert moments.mean == pytest.approx(mean, rel=1e-8)
     assert moments.deviation == pytest.approx(np.sqrt(weights @ (rates - mean) ** 2), rel=1e-7)
-
-
-def test_without_shadowing_the_rate_does_not_vary() -> None:
-    world = Scenario.of(shadowing_variance=0.0)
-    mean, deviation = closed_forms.rate_moments(world, 5000.0)
-    assert mean == pytest.approx(float(closed_forms.rate(world, closed_forms.mean_snr(world, 5e3))))
-    assert deviation == pytest.approx(0, abs=1e-9)
 
 
 def test_initial_data_of_few_nodes_by_hand() -> None:
@@ -88,11 +75,6 @@ def test_coverage_of_wilson_counts_all_ways_to_draw_a_block(successes: int) -> N
     assert closed_forms.wilson_coverage(successes, 9, 4, 0.5) == pytest.approx(held)
 
 
-def test_coverage_of_t_is_the_level_where_a_block_is_next_to_nothing() -> None:
-    assert closed_forms.t_coverage(10**9, 100) == pytest.approx(LEVEL)
-    assert LEVEL < closed_forms.t_coverage(10_000, 100) < closed_forms.t_coverage(1000, 100) < 1
-
-
 def test_coverage_of_t_agrees_with_a_simulation() -> None:
     draws = np.random.default_rng(3).normal(size=(4000, 4, 5))
     mean = draws.mean((1, 2))
@@ -101,6 +83,3 @@ def test_coverage_of_t_agrees_with_a_simulation() -> None:
     held = ((low <= mean) & (mean <= high)).mean()
     # The block is a part of all, so the spread within it is not independent of the mean of all.
     assert closed_forms.t_coverage(20, 5, 0.8) == pytest.approx(held, abs=0.03)
-
-
-# --- queues ---

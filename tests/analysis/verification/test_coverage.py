@@ -37,12 +37,6 @@ def test_missions_that_depend_on_each_other_are_covered_too_rarely() -> None:
     assert covered((generator.random(20_000) < np.where(shifts > 0, 0.9, 0.7)).astype(int), True)
 
 
-def test_missions_that_are_too_alike_are_covered_too_often() -> None:
-    values = np.tile(np.random.default_rng(15).uniform(size=100), 200)
-    values += 1e-3 * np.random.default_rng(16).uniform(size=20_000)
-    assert covered(values, share=False)
-
-
 def test_nothing_to_cover_tells_nothing() -> None:
     for values in (np.ones(20_000), np.random.default_rng(17).uniform(size=150)):
         check = coverage.coverage_check("metric", values, 100, share=False)

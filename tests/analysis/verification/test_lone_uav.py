@@ -30,11 +30,6 @@ def test_other_rates_are_refuted(rates: pd.DataFrame) -> None:
     assert failing([channel.rate_check(one)])
 
 
-def test_another_path_loss_exponent_is_refuted() -> None:
-    means = lone_uav.simulate_rates(load_scenario("paper", path_loss_exponent=2.26), 11)
-    assert failing([channel.rate_check(lone_uav.rates(SPACE, means))])
-
-
 def test_without_shadowing_the_rates_are_exact() -> None:
     still = load_scenario("paper", shadowing_variance=0.0)
     table = lone_uav.rates(still, lone_uav.simulate_rates(still, 11)).assign(error=0.0)

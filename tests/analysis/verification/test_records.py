@@ -1,18 +1,15 @@
 """Records agree with logs and with the other engine; whatever is changed in them is noticed."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from analysis import run_study
 from analysis.results.tables import Results
 from analysis.verification import budgets, channel, records
 from analysis.verification import logs as event_logs
 from analysis.verification.cross_check import CrossCheck
 from analysis.verification.logs import Log
-from tests.analysis.small import small_study
 from tests.analysis.verification.changes import altered, with_records
 from tests.analysis.verification.verdicts import fails
 
@@ -71,13 +68,6 @@ def test_policies_that_meet_different_missions_are_noticed(
 def test_a_uav_that_starts_elsewhere_is_noticed(results: Results, logs: list[Log]) -> None:
     changed = altered(logs, "mission_start", 0, x=lambda x: x - 1)
     assert fails(records.realisation_checks(results, changed)[1])
-
-
-def test_a_single_policy_shares_its_realisations_with_none(
-    results: Results, tmp_path: Path
-) -> None:
-    alone = run_study(small_study(tmp_path, policies=["greedy"], missions=3), tmp_path / "out")
-    assert not records.realisation_checks(alone, [])
 
 
 @pytest.mark.parametrize("name", ["collected", "reward", "residual"])

@@ -7,12 +7,6 @@ from analysis.verification.closed_forms import Moments
 from analysis.verification.queues import theory
 
 
-def test_the_probability_of_waiting_by_hand() -> None:
-    """a = 2, c = 3: B = 2/3, 2/5, 4/19 by the recursion; C = 3 B / (3 - 2 (1 - B)) = 4/9."""
-    assert theory.erlang_c(3, 2.0) == pytest.approx(4 / 9)
-    assert theory.erlang_c(1, 0.7) == pytest.approx(0.7)  # M/M/1: the server is busy
-
-
 @pytest.mark.parametrize(("servers", "load"), [(1, 0.9), (2, 1.5), (7, 5.0), (30, 28.0)])
 def test_the_probability_of_waiting_is_that_of_the_states(servers: int, load: float) -> None:
     """The stationary probabilities of the birth-death chain, summed from c customers on."""
