@@ -183,6 +183,7 @@ def _bar() -> Iterator[tuple[Progress, Callable[[Round], None]]]:
 
         def begin(started: Round) -> None:
             bar.total = started.missions
-            bar.initial += started.present  # took no time
+            if not bar.disable:
+                bar.initial += started.present  # took no time
 
         yield bar.update, begin

@@ -172,7 +172,7 @@ def precise(folder, **changes):
 
 def selecting(folder, **changes):
     """A study that selects the best of some settings."""
-    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 2000, "check": 5}
+    rule = {"procedure": "kn", "first": 8, "indifference": 0.02, "budget": 400, "check": 5}
     return small_study(folder, selection=rule, design=grid(quota=[20, 40, 60, 80]), **changes)
 
 

@@ -6,7 +6,6 @@ from pydantic import ValidationError
 
 from analysis.names import BOUNDED, MEANS, METRICS, SHARES
 from analysis.stats.intervals import interval_of, mean_interval, wilson
-from analysis.study import stopping
 from analysis.study.stopping import Precision, running_interval
 
 
@@ -79,17 +78,6 @@ def test_running_intervals_are_those_of_the_statistics(metric):
         assert (means[n - 1], widths[n - 1]) == pytest.approx((interval.mean, half), rel=1e-9)
 
 
-def test_a_stopping_point_by_hand():
-    # 0, 2, 1, 1, 1, ...: squares of deviations add up to 2; t sqrt(2 / (n (n - 1))) is
-    # 2.484, 1.299, 0.878 for n = 3, 4, 5 with t = 4.30265, 3.18245, 2.77645
-    values = [0.0, 2.0] + [1.0] * 20
-    row = reached(rule(targets={"reward": {"absolute": 1.0}}), reward=values)
-    assert (row.stop, row.missions, row.met) == (5, 5, True)
-    assert (row.mean, row.half_width) == pytest.approx((1.0, 0.87799), abs=1e-5)
-    row = reached(rule(targets={"reward": {"absolute": 1.0}}, look_ahead=3), reward=values)
-    assert (row.stop, row.missions) == (5, 8)
-
-
 def test_a_negative_mean_is_as_hard_as_its_mirror_image():
     # half-width / mean would be negative, and "met" from the start
     values = np.random.default_rng(2).normal(100.0, 40.0, 2000)
@@ -129,15 +117,6 @@ def test_the_stopping_point_is_the_one_of_the_definition(seed):
     stop = cautious.reached(samples)[0].stop
     assert stop == slow_stop(cautious, data)
     assert len(samples[0]["reward"]) == (300 if stop is None else stop + look_ahead)
-
-
-@pytest.mark.parametrize("growth", [1.0, 1.3, 8.0])
-def test_the_stopping_point_does_not_depend_on_the_rounds(growth, monkeypatch):
-    values = np.random.default_rng(6).normal(1.0, 0.5, 5000)
-    fine = rule(first=30, look_ahead=20, targets={"reward": {"relative": 0.03}})
-    stop = reached(fine, reward=values).stop
-    monkeypatch.setattr(stopping, "_GROWTH", growth)
-    assert reached(fine, reward=values).stop == stop > 500
 
 
 def test_the_rounds_are_few_and_do_not_lead_past_the_stopping_point():

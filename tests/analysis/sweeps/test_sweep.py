@@ -1,5 +1,8 @@
+from functools import partial
+
 import numpy as np
 import pytest
+import tqdm.auto
 from matplotlib.figure import Figure
 
 from analysis import sweep
@@ -65,9 +68,11 @@ def test_a_plot_is_over_the_first_fields(asking):
         asking(missions=2, uavs=1).plot()
 
 
-def test_progress_counts_missions(asking, capsys):
+def test_progress_counts_missions(asking, capsys, monkeypatch):
     done = []
     asking(progress=done.append, uavs=[1, 2])
     assert sum(done) == 2 * 2 * 6
     asking(progress=True, uavs=[1, 2])
     assert capsys.readouterr().err == ""  # nothing is simulated
+    monkeypatch.setattr(tqdm.auto, "tqdm", partial(tqdm.auto.tqdm, disable=True))  # as on pages
+    assert len(asking(progress=True, uavs=[1, 3]).results.missions) == 2 * 2 * 6
