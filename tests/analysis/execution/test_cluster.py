@@ -53,15 +53,6 @@ def cluster():
         yield cluster.scheduler_address
 
 
-@pytest.mark.slow
-def test_dask_replaces_a_killed_worker(plugin, cluster, tmp_path):
-    study = small_study(tmp_path, policies=["killed-once", "greedy"])
-    run_study(study, tmp_path / "out", scheduler=cluster)
-    assert (tmp_path / "plugin" / "killed").exists()
-    run_study(study, tmp_path / "undisturbed")
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")
-
-
 def test_a_worker_with_other_code_or_weights_does_nothing(tmp_path):
     study = small_study(tmp_path)
     cell = Manifest.of(study).cells[0][0]

@@ -1,9 +1,5 @@
 """Evaluations of any number of missions: their means, and the memory that they take."""
 
-import json
-import subprocess
-import sys
-
 import pytest
 
 from analysis.execution import effort, evaluation
@@ -11,15 +7,8 @@ from analysis.execution.evaluation import Asked, check_evaluation, evaluate, mea
 from analysis.stats.intervals import interval_of
 from dess import InputError, load_scenario
 from dess.code import memory
-from tests.analysis.small import environment
 
 SPACE = load_scenario("paper", quota=30)
-RUN = """
-import resource, sys
-from reports.cli import main
-code = main(sys.argv[1:])
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, code)
-"""
 
 
 @pytest.fixture
@@ -73,22 +62,3 @@ def test_what_takes_too_much_is_refused_before_it_begins(monkeypatch, handed):
     with pytest.raises(InputError, match=r"GiB of memory, of which 0.0 are available"):
         check_evaluation([Asked(SPACE, "random", 10)])
     assert handed == []
-
-
-def _peak(*arguments: object) -> int:
-    command = [sys.executable, "-c", RUN, "evaluate", "--json", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment())
-    *document, last = done.stdout.strip().splitlines()
-    peak, code = map(int, last.split())
-    assert code == 0, done.stderr
-    assert json.loads("\n".join(document))[0]["missions"] == arguments[-1]
-    return peak
-
-
-@pytest.mark.slow
-def test_a_million_missions_take_less_than_400_mib() -> None:
-    short = ("--policy", "greedy", "--set", "max_slots=20", "--yes")
-    few = _peak(*short, "--missions", 1000)
-    million = _peak(*short, "--missions", 1_000_000)
-    assert million < 400 * 2**20
-    assert million - few < 120 * 2**20  # the records alone would be 320 bytes per mission

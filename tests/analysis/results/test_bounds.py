@@ -183,12 +183,6 @@ def test_what_no_bound_can_have_is_refused(case):
         check_bounds(table_of_bounds(CHUNK, [Bound(**right | changes)]), CHUNK.rows, {CELL.key: 3})
 
 
-def test_bounds_of_other_missions_are_refused():
-    table = table_of_bounds(CHUNK, [Bound(1.0, np.ones((1, 3)), np.array([3]), 4)])
-    with pytest.raises(ValueError, match="not those of the requested missions"):
-        check_bounds(table, [(CELL.key, 1, 2)], {})
-
-
 def test_results_of_before_have_no_bounds(tmp_path):
     run_study(small_study(tmp_path), tmp_path / "out")
     path = tmp_path / "out" / "manifest.json"

@@ -3,8 +3,7 @@
 import pytest
 
 from analysis.study.engine import engine_of
-from dess import InputError, load_scenario, simulate_batch
-from policies import load
+from dess import InputError, load_scenario
 from tests.analysis.small import grid, small_study
 
 SLOTTED = load_scenario("paper")
@@ -17,11 +16,6 @@ def test_the_batch_engine_is_taken_unless_a_scenario_needs_the_other():
     assert engine_of([SLOTTED, CONTINUOUS]) == "events"
     with pytest.raises(InputError, match=r"arrivals\.process: continuous needs the SimPy engine"):
         engine_of([SLOTTED, CONTINUOUS], "batch")
-
-
-def test_the_batch_engine_refuses_what_it_cannot_simulate():
-    with pytest.raises(InputError, match="allowed: the engine events, or slotted"):
-        simulate_batch(CONTINUOUS, load("greedy"))
 
 
 def test_a_study_takes_the_engine_that_one_of_its_points_needs(tmp_path):

@@ -36,15 +36,6 @@ def test_the_papers_studies_run_every_heuristic_and_learned_policy():
         assert load_study(name).policies == (*guarded, *once)
 
 
-def test_a_rule_decides_how_many_missions_there_are(tmp_path):
-    targets = {"success": {"absolute": 0.02}}
-    precise = small_study(tmp_path, precision={"first": 40, "targets": targets})
-    assert precise.rule is precise.precision
-    assert precise.first == 40
-    assert small_study(tmp_path).rule is None
-    assert small_study(tmp_path).first == 10
-
-
 def test_teams_are_written_alike(tmp_path):
     assert small_study(tmp_path, policies=["greedy , tour"]).policies == ("greedy,tour",)
 
