@@ -10,7 +10,7 @@ import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 import pyarrow as pa
@@ -32,6 +32,7 @@ from dess.streams import MAX_REPLICATION
 NAME = re.compile(r"[0-9a-f]{16}(-\d+)?-[0-9a-f]{16}\.parquet")
 PARTS = b"dess.parts"  # key of the metadata that lists the parts in a file, in their order
 KEY = pa.dictionary(pa.int32(), pa.string())
+Columns = Mapping[str, Any]  # the values of every column of a table
 Row = tuple[Key, Replication, Annotated[int, Field(ge=1, le=MAX_REPLICATION + 1)]]
 _ROWS = TypeAdapter(Annotated[list[Row], Field(min_length=1)])
 MEASURED = OPERATIONS.names or ()  # nan where a mission lacks it
@@ -92,15 +93,8 @@ EVENT_LIMITS = {
 }
 
 
-class Tables(NamedTuple):
-    """The two tables of a chunk: one row per mission, and one row per UAV."""
-
-    missions: pa.Table
-    uavs: pa.Table
-
-
-def tables_of(chunk: Chunk, records: Records) -> Tables:
-    """The records of the missions of a chunk as tables, with their parts as metadata."""
+def tables_of(chunk: Chunk, records: Records) -> list[pa.Table]:
+    """The records of the missions of a chunk, and of their UAVs, with their parts as metadata."""
     cells = _cells(chunk)
     missions = {"cell": cells} | {n: records.missions[n] for n in MISSION_RECORD.names or ()}
     if len(records.operations):
@@ -117,11 +111,13 @@ def tables_of(chunk: Chunk, records: Records) -> Tables:
     return tables_with(chunk, missions, uavs)
 
 
-def tables_with(chunk: Chunk, missions: Mapping[str, Any], uavs: Mapping[str, Any]) -> Tables:
+def tables_with(
+    chunk: Chunk, missions: Mapping[str, Any], uavs: Mapping[str, Any]
+) -> list[pa.Table]:
     """The tables of a chunk from their columns, such as those of ``rows_of``."""
     is_extended = any(name in missions and not np.isnan(missions[name]).all() for name in MEASURED)
     schema = EXTENDED_MISSIONS if is_extended else MISSIONS
-    return Tables(_table(missions, schema, chunk), _table(uavs, UAVS, chunk))
+    return [_table(missions, schema, chunk), _table(uavs, UAVS, chunk)]
 
 
 def table_of_bounds(chunk: Chunk, bounds: Sequence[Bound]) -> pa.Table:
@@ -143,17 +139,18 @@ def _cells(chunk: Chunk) -> np.ndarray:
     return np.repeat(keys, lengths)
 
 
-def _table(columns: Mapping[str, Any], schema: pa.Schema, chunk: Chunk) -> pa.Table:
+def _table(columns: Columns, schema: pa.Schema, chunk: Chunk) -> pa.Table:
     arrays = {name: pa.array(columns[name]) for name in schema.names}
     arrays["cell"] = arrays["cell"].dictionary_encode()
     return pa.table(arrays, schema=schema.with_metadata({PARTS: json.dumps(chunk.rows)}))
 
 
-def check(tables: Tables, rows: Sequence[Row], seed: int) -> None:
+def check(tables: Sequence[pa.Table], rows: Sequence[Row], seed: int) -> None:
     """Check that tables have the records of some parts, and nothing that no mission can have.
 
     Args:
-        tables: The records, such as those of a worker or of a file that anybody may have written.
+        tables: The records of missions, and those of their UAVs, such as those of a worker or of a
+            file that anybody may have written.
         rows: The key, start and stop of every part, in the order of the records.
         seed: The seed of the missions.
 

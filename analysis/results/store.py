@@ -190,7 +190,7 @@ class Store:
         if kind == "bounds":
             parquet.check_bounds(tables[0], rows, self._nodes)
         else:
-            parquet.check(parquet.Tables(*tables), rows, self.manifest.seed)
+            parquet.check(tables, rows, self.manifest.seed)
 
     @cached_property
     def _nodes(self) -> dict[str, int]:

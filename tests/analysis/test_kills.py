@@ -67,17 +67,3 @@ def test_workers_go_with_a_killed_run(tmp_path):
         assert running.wait() == -signal.SIGKILL
     assert len(workers) >= 2
     assert psutil.wait_procs(workers, timeout=60)[1] == []
-
-
-@pytest.mark.slow
-def test_twenty_thousand_missions_survive_ten_kills(tmp_path, monkeypatch):
-    monkeypatch.setitem(CHUNK, "batch", 500)  # as shipped
-    study = load_study("table4", policies=["greedy"], missions=20_000)
-    run_study(study, tmp_path / "undisturbed")
-    (tmp_path / "study.toml").write_text(
-        f'name = "table4"\npolicies = ["greedy"]\nseed = {study.seed}\n'
-        f'description = "{study.description}"\n'
-    )
-    generator = random.Random(20)
-    run_with_kills(tmp_path / "study.toml", tmp_path / "out", 2, 20_000, 10, generator)
-    assert files_of(tmp_path / "out") == files_of(tmp_path / "undisturbed")

@@ -1,7 +1,5 @@
 import errno
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +18,7 @@ from policies import load_team
 from policies.heuristics import Greedy
 from reports import cli
 from reports.cli.settings import setting
-from tests.analysis.small import environment, files_of, grid, small_study
+from tests.analysis.small import files_of, grid, small_study
 
 
 def assert_same(ours, other):
@@ -326,26 +324,3 @@ def test_a_team_may_be_larger_than_the_fleet_of_some_points(engine, tmp_path):
     assert cli.main(again) == 0
     with pytest.raises(InputError, match="more policies than the largest fleet has UAVs; allowed"):
         small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy,tour,random"])
-
-
-def test_a_policy_of_a_file_runs_in_workers_and_an_edited_file_is_noticed(tmp_path):
-    """The command in new processes, since a process keeps the modules that it has imported."""
-    small_study(tmp_path)
-    file = tmp_path / "still_policy.py"
-    code = "class Still:\n    name = 'still'\n    def act(self, view):\n"
-    code += "        return [4] * len(view)\n"
-    file.write_text(code)
-    command = [sys.executable, "-m", "reports", "study", "run", "trial.toml", "--out", "out"]
-    command += ["--policy", "still_policy.py:Still"]
-
-    def run(*options):
-        asked = {"cwd": tmp_path, "env": environment(), "capture_output": True, "text": True}
-        return subprocess.run([*command, *options], **asked)
-
-    assert run("--missions", "40", "--workers", "2").returncode == 0
-    (team,) = load_results(tmp_path / "out").store.manifest.policies
-    assert (team.policy, team.members[0].name) == ("still_policy.py:Still", "still")
-    file.write_text(code.replace("[4]", "[0]"))
-    again = run("--missions", "50")
-    assert again.returncode == 2
-    assert "made by other code of still_policy" in again.stderr

@@ -1,8 +1,5 @@
 import json
 import shutil
-import signal
-import subprocess
-import sys
 
 import pandas as pd
 import pytest
@@ -16,7 +13,7 @@ from analysis.results.manifest import Cell
 from analysis.results.store import Failure, Store
 from dess import InputError, simulate_batch
 from policies import load
-from tests.analysis.small import environment, files_of, grid, small_study, write_scenario
+from tests.analysis.small import files_of, grid, small_study, write_scenario
 
 
 @pytest.fixture
@@ -185,18 +182,6 @@ def test_two_runs_of_one_folder_at_once(tmp_path):
             with pytest.raises(InputError, match="in use by another run; allowed: another --out"):
                 run_study(other, tmp_path / "out")
     assert len(run_study(study, tmp_path / "out").missions) == 20
-
-
-def test_a_run_that_was_killed_leaves_no_lock(tmp_path):
-    small_study(tmp_path)
-    script = (
-        "import os, signal; from analysis import load_study; "
-        "from analysis.results.store import Store; "
-        "store = Store.open(load_study('trial.toml'), 'out'); os.kill(os.getpid(), signal.SIGKILL)"
-    )
-    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=environment())
-    assert done.returncode == -signal.SIGKILL
-    assert len(run_study(small_study(tmp_path), tmp_path / "out").missions) == 20
 
 
 def test_records_that_were_not_asked_for_do_not_enter(tmp_path):
