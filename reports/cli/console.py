@@ -145,13 +145,27 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
 def bar(unit: str, total: int = 0) -> Iterator[Any]:
     """A progress bar on stderr (``tqdm``), if the work takes longer than a second.
 
-    Outside a terminal it prints a line every ten seconds.
+    Outside a terminal it prints a line every ten seconds. While something is compiled it says so;
+    this time is no part of the speed that it shows.
     """
     from tqdm import tqdm
 
-    delay, interval = (1, 0.1) if sys.stderr.isatty() else (10, 10)
+    is_terminal = sys.stderr.isatty()
+    delay, interval = (1, 0.1) if is_terminal else (10, 10)
     with tqdm(total=total, unit=unit, delay=delay, mininterval=interval) as progress:
-        yield progress
+        before = ""
+
+        def begin() -> None:
+            nonlocal before
+            before = progress.desc
+            progress.set_description("compiling", refresh=is_terminal)
+
+        def end() -> None:
+            progress.unpause()
+            progress.set_description_str(before, refresh=False)
+
+        with _compiling(begin, end):
+            yield progress
 
 
 @contextmanager
@@ -170,18 +184,28 @@ def counted_bar(unit: str) -> Iterator[Callable[..., None]]:
 @contextmanager
 def compile_notice() -> Iterator[None]:
     """Print a line, once, if numba compiles something that is not in its cache."""
+    lines = iter(["compiling the simulator (first run only) ..."])
+    with _compiling(lambda: [print(line, file=sys.stderr) for line in lines], lambda: None):
+        yield
+
+
+@contextmanager
+def _compiling(begin: Callable[[], object], end: Callable[[], object]) -> Iterator[None]:
+    """Call functions before and after numba compiles a function with all that it calls."""
     from numba.core.event import Event, Listener, install_listener
 
-    class Notice(Listener):
-        printed = False
+    class Outermost(Listener):
+        depth = 0
 
         def on_start(self, event: Event) -> None:
-            if not self.printed:
-                print("compiling the simulator (first run only) ...", file=sys.stderr)
-            self.printed = True
+            if self.depth == 0:
+                begin()
+            self.depth += 1
 
         def on_end(self, event: Event) -> None:
-            pass
+            self.depth -= 1
+            if self.depth == 0:
+                end()
 
-    with install_listener("numba:compile", Notice()):
+    with install_listener("numba:compile", Outermost()):
         yield

@@ -6,6 +6,7 @@ import sys
 
 import pytest
 from numba import njit
+from numba.core.event import trigger_event
 
 from reports import cli
 from reports.cli import console
@@ -23,6 +24,14 @@ def test_compilation_is_announced_once(capsys):
     with console.compile_notice():
         assert double(2) == 4
     assert capsys.readouterr().err == ""
+
+
+def test_a_bar_says_that_something_is_compiled():
+    with console.bar("mission", 10) as progress:
+        progress.set_description("round 2", refresh=False)
+        with trigger_event("numba:compile"), trigger_event("numba:compile"):  # what it calls
+            assert progress.desc == "compiling: "
+        assert progress.desc == "round 2: "
 
 
 def is_printable(text: str) -> bool:
