@@ -29,8 +29,7 @@ from reports.pages import kernels, missions
 from reports.pages.index import index_of, pages_in
 from reports.pages.kernels import Progress
 from reports.pages.keys import has_key, key_of
-from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read
-from reports.pages.parameters import with_paths
+from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
 from reports.pages.study.sections import report_of
 from reports.pages.template import fill
 

@@ -113,16 +113,6 @@ def test_words_of_the_library_are_cut_too(refused):
     refused("x" * 10**5)
 
 
-def test_an_output_below_a_long_name_is_a_line(refused, tmp_path):
-    refused("study", "run", "trial.toml", "--out", "x/" * 3000)
-
-
-@pytest.mark.parametrize("command", [("train", "quick"), ("study", "run", "trial.toml")])
-def test_an_output_that_is_a_loop_of_links_is_a_line(refused, tmp_path, command):
-    (tmp_path / "loop").symlink_to("loop")
-    refused(*command, "--out", "loop")
-
-
 @pytest.mark.parametrize("command", [("train", "quick"), ("study", "run", "trial.toml")])
 def test_an_output_that_is_no_text_is_a_line(refused, command):
     assert "is not text in UTF-8" in refused(*command, "--out", "out\udc80")

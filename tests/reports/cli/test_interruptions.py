@@ -71,17 +71,6 @@ def check_studies(folder, workers, number, kills, missions, progress=chunks):
 
 
 @pytest.mark.slow
-def test_a_study_that_is_told_to_end_equals_an_undisturbed_one(tmp_path):
-    check_studies(tmp_path, 2, signal.SIGHUP, 1, 100)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_a_study_that_ends_in_its_bounds_equals_an_undisturbed_one(number, tmp_path):
-    check_studies(tmp_path, 1, number, 1, 30, bounds)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 @pytest.mark.parametrize("number", SIGNALS)
 def test_studies_that_are_killed_equal_an_undisturbed_one(number, workers, tmp_path):
@@ -179,13 +168,6 @@ def results(tmp_path):
     """Results of a small study; nothing is rendered yet."""
     run_study(small_study(tmp_path), tmp_path / "results")
     return tmp_path / "results"
-
-
-@pytest.mark.slow
-def test_a_report_that_is_told_to_end_leaves_nothing(results, tmp_path):
-    command = a_page(tmp_path / "killed", results)
-    assert command.kill(signal.SIGTERM, lambda: renderings(command) > 0, 0.5)
-    assert not command.out.exists()
 
 
 @pytest.mark.slow

@@ -102,14 +102,10 @@ def test_a_package_is_the_command(module):
     ("words", "completed"),
     [
         ("dess sim", ["simulate"]),
-        ("dess scenarios show fig", ["fig1", "fig4"]),
-        ("dess policies show near", ["nearest"]),
         ("dess simulate --scenario pap", ["paper"]),
         ("dess simulate --policy greedy,tou", ["greedy,tour"]),
         ("dess simulate --set charge_", ["charge_rate=", "charge_start=", "charge_complete="]),
         ("dess study run fig", ["fig1", "fig4", "fig5"]),
-        ("dess evaluate --policy nea", ["nearest"]),
-        ("dess sweep --set qu", ["quota="]),
         ("dess train qui", ["quick"]),
     ],
 )

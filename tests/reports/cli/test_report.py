@@ -111,27 +111,6 @@ def test_a_folder_of_pages_is_checked_before_the_first_cell(
     assert f"pages/{name}: " in err and "; allowed: " in err
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("sweep", "--set", "uavs=1,2", "--scenario", "small.toml", "--missions", 2),
-        ("study", "run", "trial.toml", "--report"),
-    ],
-)
-@pytest.mark.parametrize(("name", "kind"), [(".index.lock", "link"), ("", "loop")])
-def test_a_folder_of_pages_is_checked_before_the_first_mission(
-    dess, monkeypatch, tmp_path, command, name, kind
-):
-    monkeypatch.setattr("reports.cli.study.run.PAGES", Path("pages"))
-    out = () if "run" in command else ("--out", "pages")
-    odd(tmp_path / "pages" / name, kind)
-    before = files_of(tmp_path)
-    code, _, err = dess(*command, *out)
-    assert (code, err.count("\n")) == (2, 1)
-    assert "pages" in err and "; allowed: " in err
-    assert files_of(tmp_path) == before
-
-
 def test_a_parameter_that_the_study_refuses_is_refused_before_any_cell(dess, monkeypatch, tmp_path):
     def fail(*_):
         raise AssertionError("a cell runs")

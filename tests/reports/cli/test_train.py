@@ -13,7 +13,7 @@ import pytest
 import torch
 
 import policies
-from dess.code import libraries, memory
+from dess.code import memory
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import load_config
 from reports import cli
@@ -85,20 +85,6 @@ def test_the_seed_can_be_set(dess):
     assert dess("train", "tiny.toml", "--out", "a", "--resume", "--seed", 5)[0] == 0
 
 
-def test_fields_of_the_scenario_can_be_set(dess):
-    arguments = ("train", "tiny.toml", "--out", "run", "--set", "uavs=1")
-    assert dess(*arguments)[0] == 0
-    assert json.loads(Path("run/config.json").read_text())["training"]["set"] == {"uavs": 1}
-    assert "of another config" in dess("train", "tiny.toml", "--out", "run", "--resume")[2]
-    assert dess(*arguments, "--resume")[0] == 0
-
-
-def test_where_tensorboard_is_absent_the_line_says_how_to_install_it(dess, monkeypatch):
-    monkeypatch.setitem(libraries.EXTRAS, "tensorboard", ("no_such_library",))
-    _, _, err = dess("train", "tiny.toml", "--out", "run")
-    assert "a live view of the curves needs no_such_library, which is not installed: pip " in err
-
-
 # Arguments, and what the line on stderr must name.
 BAD = {
     "train nope --out out": ["nope: no such config", "or a TOML file"],
@@ -140,14 +126,6 @@ def test_bad_input_gets_one_line_and_changes_nothing(arguments, dess, tmp_path, 
     for part in BAD[arguments]:
         assert part in line
     assert files_of(tmp_path) == before
-
-
-def test_a_bad_config_is_named_with_its_key(dess, tmp_path):
-    write_config(tmp_path, **SHORT, speed=3)
-    code, out, err = dess("train", "tiny.toml", "--out", "out")
-    assert (code, out) == (2, "")
-    assert err.startswith("dess: error: tiny.toml: speed: unknown key")
-    assert err.count("\n") == 1
 
 
 def test_a_training_that_diverges_ends_with_one_line(dess, tmp_path):

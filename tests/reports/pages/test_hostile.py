@@ -15,7 +15,7 @@ from analysis import numbers, run_study
 from analysis.figures import style
 from reports.pages import html
 from reports.pages.index import index_of, pages_in
-from reports.pages.parameters import values_of, with_values
+from reports.pages.notebook import values_of, with_values
 from reports.pages.render import render_study
 from reports.pages.verify import sealed
 from tests.analysis.hostile import hostile_folder

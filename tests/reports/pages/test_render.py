@@ -17,12 +17,13 @@ from typing import Any
 import nbformat
 import pytest
 from nbclient import NotebookClient
-from nbclient.exceptions import CellExecutionError
 
 from analysis import load_results, run_study
 from dess import InputError
+from reports.cli import main
+from reports.pages import kernels
 from reports.pages.html import STUDY, embedded
-from reports.pages.notebook import NAMES, read
+from reports.pages.notebook import Report
 from reports.pages.render import ReportError, html_of, render, with_indices
 from tests.analysis.small import environment, small_study
 from tests.reports.browser import Visit
@@ -118,6 +119,11 @@ raise ArithmeticError("no such number")
 "the cell after"
 """
 TINY = {"mission": MISSION, "scorecard": SCORECARD}
+# What Python, IPython, Jupyter and the libraries would import or run in a working directory.
+MODULES = ("pandas", "sitecustomize", "matplotlib", "joblib", "typer")
+MODULES += ("ipython_config", "ipython_kernel_config", "jupyter_config")
+STARTUP = ".ipython/profile_default/startup/00.py"
+TEMPLATES = ("index.html.j2", "base.html.j2", "base/null.j2")
 
 
 def write_notebooks(folder: Path, **sources: str) -> Path:
@@ -137,6 +143,21 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
+def trap(results: Path) -> Path:
+    """The folder of the results, with files that would run if it is the working directory."""
+    for name in (*(f"{module}.py" for module in MODULES), STARTUP):
+        file = results / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(f"open({str(results / 'hit')!r}, 'a').write({name!r})\n")
+    for name in TEMPLATES:
+        file = results / "basic" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("the template of a stranger")
+    (results / "matplotlibrc").write_text("this is no setting\n")
+    return results
+
+
+@pytest.fixture(scope="module")
 def notebooks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_notebooks(tmp_path_factory.mktemp("notebooks"), **TINY)
 
@@ -153,18 +174,20 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def files(
-    results: Path,
+    trap: Path,
     notebooks: Path,
     out: Path,
     progress: list[Any],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> dict[str, str]:
-    """All files of the reports, rendered once, by name."""
+    """All files of the reports, rendered once in a folder of traps, by name."""
     home = tmp_path_factory.mktemp("home")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("HOME", str(home))
+        patch.delenv("PYTHONSAFEPATH", raising=False)
+        patch.chdir(trap)
         note = lambda *step: progress.append(step)  # noqa: E731
-        assert render([], results, out, note, notebooks=notebooks) == out / "index.html"
+        assert render([], ".", out, note, notebooks=notebooks) == out / "index.html"
     assert not list(home.glob(".ipython")) + list(home.glob(".jupyter")) + list(home.glob(".local"))
     return {path.name: path.read_text("utf-8") for path in out.iterdir()}
 
@@ -281,21 +304,32 @@ def test_pages_fit_a_phone_and_request_nothing(
         assert opened.complaints == []
 
 
+def test_a_page_runs_nothing_of_the_working_directory(files: dict[str, str], trap: Path) -> None:
+    assert not (trap / "hit").exists()
+    assert all("of a stranger" not in text for text in files.values())
+
+
+def test_processes_of_a_command_import_nothing_of_the_working_directory(
+    trap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start_a_process(*_: Any, **__: Any) -> int:
+        return subprocess.run([sys.executable, "-c", "import joblib"], check=True).returncode
+
+    monkeypatch.chdir(trap)
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    monkeypatch.setattr("reports.cli.commands.app", start_a_process)
+    assert main([]) == 0
+    assert not (trap / "hit").exists() and "PYTHONSAFEPATH" not in os.environ
+
+
+def test_the_command_imports_nothing_of_the_working_directory(trap: Path) -> None:
+    variables = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    command = [sys.executable, "-m", "reports", "--version"]
+    subprocess.run(command, cwd=trap, check=True, env=variables)
+    assert not (trap / "hit").exists()
+
+
 # --- input that is refused ---
-
-
-def test_an_unknown_report_is_refused(results: Path, notebooks: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="report: 'nothing' is unknown; allowed: mission, score"):
-        render(["nothing"], results, tmp_path / "out", notebooks=notebooks)
-    assert not (tmp_path / "out").exists()
-
-
-def test_missing_results_are_named_with_the_command_that_makes_them(tmp_path: Path) -> None:
-    with pytest.raises(InputError) as caught:
-        render(["performance"], tmp_path, tmp_path / "out")
-    folder = tmp_path / "table4"
-    assert f"dess study run table4 --out {folder}" in str(caught.value)
-    assert not (tmp_path / "out").exists()
 
 
 def test_pages_without_results_are_left_out_with_a_note(
@@ -326,42 +360,6 @@ def test_results_of_another_study_are_refused(results: Path, tmp_path: Path) -> 
         render(["performance"], tmp_path, tmp_path / "out")
 
 
-def test_a_folder_that_cannot_be_written_is_refused(
-    results: Path, notebooks: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file.*: cannot be written: "):
-        render(["mission"], results, tmp_path / "file" / "out", notebooks=notebooks)
-
-
-def test_a_page_takes_the_place_of_a_link_and_of_nothing_but_files(
-    results: Path, tmp_path: Path
-) -> None:
-    notebooks = write_notebooks(tmp_path / "notebooks", scorecard=SCORECARD)
-    (tmp_path / "elsewhere").write_text("of somebody")
-    out = tmp_path / "out"
-    out.mkdir()
-    (out / "scorecard.html").symlink_to(tmp_path / "elsewhere")
-    render(["scorecard"], results, out, notebooks=notebooks)
-    assert (tmp_path / "elsewhere").read_text() == "of somebody"
-    assert not (out / "scorecard.html").is_symlink()
-    (out / "scorecard.ipynb").unlink()
-    (out / "scorecard.ipynb").mkdir()
-    before = (out / "scorecard.html").read_bytes()
-    with pytest.raises(InputError, match="scorecard.ipynb: is a folder; allowed: a file"):
-        render(["scorecard"], results, out, notebooks=notebooks)
-    assert (out / "scorecard.html").read_bytes() == before
-    assert sorted(os.listdir(out)) == ["index.html", "scorecard.html", "scorecard.ipynb"]
-
-
-@pytest.mark.parametrize("name", ["speed", "results"])
-def test_an_unknown_parameter_is_refused(
-    results: Path, notebooks: Path, tmp_path: Path, name: str
-) -> None:
-    with pytest.raises(InputError, match=f"parameter: '{name}' is unknown to mission"):
-        render(["mission"], results, tmp_path, parameters={name: 1}, notebooks=notebooks)
-
-
 def test_a_notebook_that_refuses_its_input_leaves_nothing(
     results: Path, notebooks: Path, tmp_path: Path
 ) -> None:
@@ -374,89 +372,53 @@ def test_a_notebook_that_refuses_its_input_leaves_nothing(
 # --- notebooks ---
 
 
-def test_values_stand_in_the_cell_of_the_parameters_and_run_from_there(
-    results: Path, notebooks: Path, tmp_path: Path
-) -> None:
-    render(["mission"], results, tmp_path, parameters={"policy": "random"}, notebooks=notebooks)
-    notebook = nbformat.read(tmp_path / "mission.ipynb", as_version=4)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert len(code) == len(read("mission", notebooks).cells)
-    folder = Path(os.path.relpath(results, tmp_path)).as_posix()
-    assert code[0].source == f"results = {folder!r}\npolicy = 'random'"
-    assert "'random'" in (tmp_path / "mission.html").read_text("utf-8").replace("&#39;", "'")
-
-
-@pytest.mark.slow
-def test_an_edited_parameter_is_that_of_the_notebook(
-    results: Path, notebooks: Path, tmp_path: Path
-) -> None:
-    render(["mission"], results, tmp_path, parameters={"policy": "random"}, notebooks=notebooks)
-    notebook = nbformat.read(tmp_path / "mission.ipynb", as_version=4)
-    first = next(cell for cell in notebook.cells if cell.cell_type == "code")
-    first.source = first.source.replace("random", "nobody")
-    with pytest.raises(CellExecutionError, match="policy: nobody is not in the study"):
-        NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
-
-
 def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
     results: Path, notebooks: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source = MISSION.replace("if policy", "if not Path(policy).is_absolute() and policy")
-    folder = write_notebooks(tmp_path / "notebooks", mission=source)
+    """Values stand in the cell of the parameters; the notebook runs in another folder."""
+    ran: list[Report] = []
+    monkeypatch.setattr(kernels, "run", lambda reports, progress: ran.extend(reports))
     monkeypatch.chdir(tmp_path)
-    render(["mission"], results, "out", parameters={"policy": "./sea.toml"}, notebooks=folder)
+    given = {"policy": "./sea.toml"}
+    render(["mission"], results, "out", parameters=given, notebooks=notebooks)
+    assert ran[0].parameters == {"results": str(results), "policy": str(tmp_path / "sea.toml")}
     (cell,) = [c for c in nbformat.read("out/mission.ipynb", 4).cells if c.metadata.get("tags")]
-    assert "policy = '../sea.toml'" in cell.source
+    folder = Path(os.path.relpath(results, "out")).as_posix()
+    assert cell.source == f"results = {folder!r}\npolicy = '../sea.toml'"
     page = Path("out/mission.html").read_text("utf-8")
     assert str(tmp_path) not in page and "sea.toml" in page
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_shipped_notebooks_have_a_heading_and_a_description(name: str) -> None:
-    report = read(name)
-    assert report.title and "#" not in report.title
-    assert len(report.description.split()) > 10
 
 
 # --- processes ---
 
 
-def test_what_a_process_reports_before_it_dies_is_part_of_the_failure(
-    results: Path, tmp_path: Path, capfd: pytest.CaptureFixture
+def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture
 ) -> None:
-    """The other pages are rendered nevertheless."""
-    source = FAILING.replace("raise", r"import os; os.write(2, b'one\nmemory\n'); os._exit(1) #")
-    notebooks = write_notebooks(tmp_path / "notebooks", mission=source, scorecard=SCORECARD)
-    line = r"^report mission: cell 3 of 4 \(import os.*\): its process ended: memory; partial page"
-    with pytest.raises(ReportError, match=line):
-        render([], results, tmp_path, notebooks=notebooks)
-    assert capfd.readouterr().err == ""
-    assert "the cell before" in words_of((tmp_path / "mission.partial.html").read_text("utf-8"))
-    assert (tmp_path / "scorecard.html").exists()
-
-
-def test_a_failing_notebook_leaves_a_partial_page_and_names_the_cell(
-    results: Path, tmp_path: Path
-) -> None:
+    """What a process reports before it dies is part of the line; the others are rendered."""
     (tmp_path / "mission.html").write_text("before")
     working = FAILING.replace("raise ArithmeticError", "print")
-    notebooks = write_notebooks(tmp_path / "notebooks", mission=FAILING, performance=working)
+    dying = FAILING.replace("raise", r"import os; os.write(2, b'one\nmemory\n'); os._exit(1) #")
+    sources = {"mission": FAILING, "learning": dying, "performance": working}
+    notebooks = write_notebooks(tmp_path / "notebooks", **sources)
     with pytest.raises(ReportError) as caught:
         render([], results, tmp_path, notebooks=notebooks)
-    partial_page = tmp_path / "mission.partial.html"
-    assert str(caught.value) == (
+    failed, dead = str(caught.value).split("; report ")
+    assert failed == (
         'report mission: cell 3 of 4 (raise ArithmeticError("no such number")): '
-        f"ArithmeticError: no such number; partial page: {partial_page}"
+        f"ArithmeticError: no such number; partial page: {tmp_path / 'mission.partial.html'}"
     )
-    text = words_of(partial_page.read_text("utf-8"))
-    assert "This page is incomplete. report mission: cell 3 of 4" in text
-    assert "the cell before" in text and "the cell after" not in text
+    assert re.match(r"learning: cell 3 of 4 \(import os.*\): its process ended: memory; ", dead)
+    assert capfd.readouterr().err == ""
+    for name in ("mission", "learning"):
+        text = words_of((tmp_path / f"{name}.partial.html").read_text("utf-8"))
+        assert f"This page is incomplete. report {name}: cell 3 of 4" in text
+        assert "the cell before" in text and "the cell after" not in text
     assert (tmp_path / "mission.html").read_text() == "before"  # the complete page stays
     assert "the cell after" in words_of((tmp_path / "performance.html").read_text("utf-8"))
-    write_notebooks(notebooks, mission=working)
+    monkeypatch.setattr(kernels, "run", lambda reports, progress: None)
     render(["mission"], results, tmp_path, notebooks=notebooks)
-    assert not partial_page.exists()
-    assert "the cell after" in (tmp_path / "mission.html").read_text("utf-8")
+    assert not (tmp_path / "mission.partial.html").exists()
 
 
 HEEDED = ("SIGINT", "SIGTERM", "SIGHUP")

@@ -3,8 +3,6 @@
 import re
 from typing import Any
 
-import pytest
-
 from analysis import load_study
 from analysis.figures import verification as drawings
 from analysis.results.manifest import Manifest
@@ -94,15 +92,6 @@ def test_every_input_parameter_is_in_the_table() -> None:
     fields = table["Input parameter [unit]"].str.partition(":")[0]
     assert set(fields) == set(Scenario.model_fields) - set(EXTENSIONS) == set(OTHER)
     assert table.notna().all(axis=None)
-
-
-@pytest.mark.parametrize("field", OTHER)
-def test_a_change_of_the_scenario_changes_the_words(field: str) -> None:
-    wider = {"grid": OTHER["grid"]} if field in ("nodes", "zone") else {}
-    fewer = {"uavs": 3} if field == "zone" else {}
-    assert words(manifest(set=wider | fewer | {field: OTHER[field]})) != words(
-        manifest(set=wider | fewer)
-    )
 
 
 def test_no_number_of_the_model_is_typed() -> None:

@@ -8,8 +8,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from markupsafe import Markup
 
 from analysis import load_study, run_study
 from analysis.bound import Bound
@@ -22,7 +24,7 @@ from reports.pages import html, verify
 from reports.pages.html import STUDY, embedded
 from reports.pages.index import index_of, pages_in
 from reports.pages.notebook import NAMES, read
-from reports.pages.render import render
+from reports.pages.template import fill
 from reports.pages.verify import sealed, verify_page, verify_results
 from tests.analysis.small import small_study
 from tests.reports.small import made_up, quick
@@ -42,9 +44,15 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A page on both."""
+    """A page on both, with the index of its folder; its notebook has not been run."""
     out = tmp_path_factory.mktemp("out")
-    render(["performance"], results, out)
+    shown = html.table(pd.DataFrame({"Success": ["97.3 %"]}))
+    origins = html.provenance([load_results(results / name) for name in ("table4", "fig4")])
+    parts = {"body": Markup(shown.data + origins.data), "code": Markup("")}
+    (out / "performance.html").write_text(
+        fill("report.html", report=read("performance"), **parts), "utf-8"
+    )
+    (out / "index.html").write_text(index_of(pages_in(out), [*map(read, NAMES)]), "utf-8")
     return out / "performance.html"
 
 
