@@ -1,6 +1,6 @@
 """Rules that exist only inside compiled functions, so that tests can call them one by one."""
 
-from dess import channel, rules
+from dess import rules
 from dess.code.kernels import kernel
 from dess.observations import guard
 
@@ -8,35 +8,6 @@ from dess.observations import guard
 @kernel
 def resolve(mission, uavs):
     rules.resolve(mission, uavs)
-
-
-@kernel
-def grant_pads(mission, uavs):
-    rules.grant_pads(mission, uavs)
-
-
-@kernel
-def communicate(
-    mission, uavs, residual, sensors, teeth, order, means, batches, search, n
-):  # fmt: skip
-    rules.communicate(
-        mission, uavs, residual, sensors, teeth, order, means, batches, search, n
-    )  # fmt: skip
-
-
-@kernel
-def open_slot(mission, uavs, nodes, mean_snr, order, means, search):
-    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, search)
-
-
-@kernel
-def arrive(mission, residual, arrivals):
-    rules.arrive(mission, residual, arrivals)
-
-
-@kernel
-def settle(mission, uavs):
-    rules.settle(mission, uavs)
 
 
 @kernel

@@ -66,10 +66,3 @@ def test_a_lock_is_a_file_of_its_own(kind: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.lock: .*; allowed: "), locked(path, "busy"):
         raise AssertionError("not locked")
     assert os.path.lexists(path) and outside.read_text() == "of somebody"
-
-
-def test_a_lock_takes_nothing_of_its_folder_away(tmp_path: Path) -> None:
-    (tmp_path / ".index").mkdir()
-    with locked(tmp_path / ".index.lock", "busy"):
-        pass
-    assert (tmp_path / ".index").is_dir()

@@ -9,32 +9,13 @@ scenario wants in dB, is 255 * 100 / 12800 = 1.9921875.
 """
 
 import math
-from typing import Any
 
-import numpy as np
 import pytest
 
-from dess.batch import simulate_batch
-from dess.mission import simulate
-from dess.record import MissionRecord
 from dess.scenario import Scenario
-from tests.drawn import Script
+from tests.dess.flights import CHANNEL, batteries, flown, rows_of
 
-HAND = {
-    "grid": 4,
-    "cell_size": 40.0,
-    "altitude": 10.0,
-    "path_loss_exponent": 2.0,
-    "edge_snr": 10 * math.log10(1.9921875),
-    "shadowing_variance": 0.0,
-    "arrival_rate": 0.0,
-    "communication_slots": 1,
-    "charge_start": 11,
-    "charge_complete": 25,
-    "uavs": 1,
-    "zone": [0, 0, 1, 1],
-}
-
+HAND = CHANNEL | {"charge_start": 11, "charge_complete": 25, "uavs": 1, "zone": [0, 0, 1, 1]}
 
 # Two UAVs that start in a zone of two cells, far from a node that is never emptied.
 PAIR = HAND | {"uavs": 2, "zone": [0, 0, 2, 1], "nodes": [[3, 3]], "initial_data": 1000.0}
@@ -43,36 +24,6 @@ PAIR = HAND | {"uavs": 2, "zone": [0, 0, 2, 1], "nodes": [[3, 3]], "initial_data
 def _bits(k: float) -> float:
     """Data units that a whole slot carries over k [cells^2]."""
     return math.log2(1 + 255 / (1 + 16 * k))
-
-
-def _simulate(scenario: Scenario, *routes: str, starts: Any = None) -> tuple[MissionRecord, dict]:
-    """The mission and its log; of the first replication in which UAV i starts at ``starts[i]``."""
-    for replication in range(1000):
-        record = simulate(scenario, Script(*routes), 0, replication, events=True)
-        assert record.events is not None
-        log = record.events.columns()
-        begins = (log["event"] == "mission_start") & (log["uav"] >= 0)
-        if starts in (None, list(zip(log["x"][begins], log["y"][begins], strict=True))):
-            batch = simulate_batch(scenario, Script(*routes), 0, [replication])
-            assert batch.missions[0].tobytes() == record.metrics.tobytes()
-            assert batch.uavs[0].tobytes() == record.uavs.tobytes()
-            return record, log
-    raise AssertionError(f"no replication starts at {starts}")
-
-
-def _values(log: dict[str, np.ndarray], event: str, *names: str) -> list[tuple]:
-    chosen = log["event"] == event
-    return list(zip(*(log[name][chosen].tolist() for name in names), strict=True))
-
-
-def _batteries(log: dict[str, np.ndarray], uav: int) -> list[float]:
-    """The battery of a UAV at the end of every slot in which it was active."""
-    return [battery for i, battery in _values(log, "move", "uav", "value") if i == uav]
-
-
-def test_the_rates_of_the_hand_worked_channel() -> None:
-    assert _bits(0) == 8
-    assert _bits(1) == 4
 
 
 def test_a_node_is_emptied_by_flying_over_it() -> None:
@@ -86,10 +37,10 @@ def test_a_node_is_emptied_by_flying_over_it() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 19.5, "quota": 4, "flying_time": 5}
     )
-    record, log = _simulate(scenario, "EEW")
-    served = _values(log, "communication", "time", "uav", "node", "x", "y")
+    record, log = flown(scenario, "EEW")
+    served = rows_of(log, "communication", "time", "uav", "node", "x", "y")
     assert served == [(1.0, 0, 0, 1.0, 0.0), (2.0, 0, 0, 2.0, 0.0), (3.0, 0, 0, 1.0, 0.0)]
-    amounts = [value for (value,) in _values(log, "communication", "value")]
+    amounts = rows_of(log, "communication", "value")
     assert amounts == pytest.approx([8, 4, 7.5], abs=1e-9)
     assert (record.slots, record.success, record.residual) == (5, 0, 0.0)
     assert record.collected == pytest.approx(19.5, abs=1e-9)
@@ -97,7 +48,7 @@ def test_a_node_is_emptied_by_flying_over_it() -> None:
     assert record.collection_ratio_and_communication == 0.0
     assert record.reward == pytest.approx(-275.15, abs=1e-9)
     assert record.uav_rows() == [{"quota": 3, "battery": 0, "slots_charging": 0, "end": "battery"}]
-    assert _values(log, "battery_empty", "time", "uav", "value") == [(5.0, 0, 0.0)]
+    assert rows_of(log, "battery_empty", "time", "uav", "value") == [(5.0, 0, 0.0)]
 
 
 def test_two_nodes_are_harvested_on_the_way() -> None:
@@ -123,10 +74,10 @@ def test_two_nodes_are_harvested_on_the_way() -> None:
             "flying_time": 20,
         }
     )
-    record, log = _simulate(scenario, "EEE")
-    served = _values(log, "communication", "time", "node", "x")
+    record, log = flown(scenario, "EEE")
+    served = rows_of(log, "communication", "time", "node", "x")
     assert served == [(0.5, 0, 0.5), (1.0, 0, 1.0), (1.5, 1, 1.5), (2.0, 1, 2.0), (2.5, 1, 2.5)]
-    amounts = [value for (value,) in _values(log, "communication", "value")]
+    amounts = rows_of(log, "communication", "value")
     assert amounts == pytest.approx([2.85022, 3.14978, 1.49019, 2.0, 2.50981], abs=5e-6)
     first, second = math.log2(52) / 2, math.log2(292 / 37) / 2
     exact = [first, 6 - first, second, 2, 4 - second]
@@ -135,7 +86,7 @@ def test_two_nodes_are_harvested_on_the_way() -> None:
     assert record.collection_ratio_and_communication == pytest.approx(1.0, abs=1e-12)
     assert record.reward == pytest.approx(115.3, abs=1e-9)
     assert record.uav_rows() == [{"quota": 5, "battery": 17, "slots_charging": 0, "end": "quota"}]
-    assert _values(log, "quota_filled", "time", "value") == [(3.0, 5.0)]
+    assert rows_of(log, "quota_filled", "time", "value") == [(3.0, 5.0)]
 
 
 def test_a_charge_stop() -> None:
@@ -149,8 +100,8 @@ def test_a_charge_stop() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 5, "flying_time": 12}
     )
-    record, log = _simulate(scenario, "")
-    assert _values(log, "move", "time", "value") == [
+    record, log = flown(scenario, "")
+    assert rows_of(log, "move", "time", "value") == [
         (0.0, 11.0),
         (1.0, 21.0),
         (2.0, 25.0),
@@ -159,34 +110,16 @@ def test_a_charge_stop() -> None:
         (5.0, 22.0),
         (6.0, 21.0),
     ]
-    assert [t for (t,) in _values(log, "communication", "time")] == [1.0, 4.0, 5.0, 6.0, 7.0]
-    assert _values(log, "charge_request", "time", "value") == [(1.0, 11.0)]
-    assert _values(log, "charge_start", "time", "value") == [(1.0, 11.0)]
-    assert _values(log, "charge_end", "time", "value") == [(3.0, 25.0)]
+    assert rows_of(log, "communication", "time") == [1.0, 4.0, 5.0, 6.0, 7.0]
+    assert rows_of(log, "charge_request", "time", "value") == [(1.0, 11.0)]
+    assert rows_of(log, "charge_start", "time", "value") == [(1.0, 11.0)]
+    assert rows_of(log, "charge_end", "time", "value") == [(3.0, 25.0)]
     assert (record.slots, record.success, record.uav_slots) == (7, 1, 7)
     assert record.collected == pytest.approx(20.0, abs=1e-9)
     assert record.collection_ratio == pytest.approx(20 / 50, abs=1e-12)
     assert record.reward == pytest.approx(125.4, abs=1e-9)
     row = record.uavs[0]
     assert (row["slots_flying"], row["slots_charging"], row["slots_waiting"]) == (5, 2, 0)
-
-
-def test_returning_to_charge() -> None:
-    """C_S = 11, C_C = 25, b(0) = 13; east, west, then hovering at home (0, 0); node at (1, 0).
-
-    Slot 0: out, b = 12, above the node: 8 units. Slot 1: back, b = 11: 4 units; it enters the
-    zone, but moves, and its battery was 12 > C_S at the start of the slot. Slot 2: 11 <= C_S, it
-    hovers in the zone: 21, slot 3: 25. Slot 4: 4 units, the third communication fills the quota.
-    """
-    scenario = Scenario.of(
-        **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 3, "flying_time": 13}
-    )
-    record, log = _simulate(scenario, "EW")
-    batteries = [value for (value,) in _values(log, "move", "value")]
-    assert batteries == [12, 11, 21, 25, 24]
-    amounts = [value for (value,) in _values(log, "communication", "value")]
-    assert amounts == pytest.approx([8, 4, 4], abs=1e-9)
-    assert (record.slots, record.success) == (5, 1)
 
 
 @pytest.mark.parametrize(
@@ -199,8 +132,8 @@ def test_uavs_are_served_in_index_order(starts: list, amounts: list[float]) -> N
     scenario = Scenario.of(
         **PAIR | {"nodes": [[0, 0]], "initial_data": 10.0, "flying_time": 20, "quota": 1}
     )
-    record, log = _simulate(scenario, "", "", starts=starts)
-    assert _values(log, "communication", "uav", "node") == [(0, 0), (1, 0)]
+    record, log = flown(scenario, "", "", starts=starts)
+    assert rows_of(log, "communication", "uav", "node") == [(0, 0), (1, 0)]
     assert record.uavs["collected"].tolist() == pytest.approx(amounts, abs=1e-9)
     # Each UAV is paid for the data of the whole team: 1.3 * 10 - 0.1 + 100.
     assert record.uavs["reward"].tolist() == pytest.approx([112.9, 112.9], abs=1e-9)
@@ -219,13 +152,13 @@ def test_a_queue_for_the_only_pad() -> None:
     scenario = Scenario.of(
         **PAIR | {"pads": 1, "flying_time": 12, "charge_complete": 30, "max_slots": 7}
     )
-    record, log = _simulate(scenario, "", "")
-    assert _batteries(log, 0) == [11, 21, 30, 29, 28, 27, 26]
-    assert _batteries(log, 1) == [11, 10, 9, 19, 29, 30, 29]
-    assert _values(log, "charge_request", "time", "uav") == [(1.0, 0), (1.0, 1)]
-    assert _values(log, "charge_start", "time", "uav") == [(1.0, 0), (3.0, 1)]
-    assert _values(log, "charge_end", "time", "uav") == [(3.0, 0), (6.0, 1)]
-    served = _values(log, "communication", "uav", "time")
+    record, log = flown(scenario, "", "")
+    assert batteries(log, 0) == [11, 21, 30, 29, 28, 27, 26]
+    assert batteries(log, 1) == [11, 10, 9, 19, 29, 30, 29]
+    assert rows_of(log, "charge_request", "time", "uav") == [(1.0, 0), (1.0, 1)]
+    assert rows_of(log, "charge_start", "time", "uav") == [(1.0, 0), (3.0, 1)]
+    assert rows_of(log, "charge_end", "time", "uav") == [(3.0, 0), (6.0, 1)]
+    served = rows_of(log, "communication", "uav", "time")
     assert [t for i, t in served if i == 0] == [1, 4, 5, 6, 7]
     assert [t for i, t in served if i == 1] == [1, 2, 3, 7]
     rows = record.uavs
@@ -234,20 +167,6 @@ def test_a_queue_for_the_only_pad() -> None:
     assert rows["slots_flying"].tolist() == [5, 4]
     assert [row["end"] for row in record.uav_rows()] == ["truncated", "truncated"]
     assert record.success == 0
-
-
-def test_a_queue_in_the_very_first_slot() -> None:
-    """b(0) = 5 <= C_S = 11: both are latched from the start; one pad, C_C = 25, 5 slots.
-
-    slot      0   1   2   3   4
-    UAV 0    15  25  24  23  22
-    UAV 1     4   3  13  23  25    waits in slots 0 and 1
-    """
-    scenario = Scenario.of(**PAIR | {"pads": 1, "flying_time": 5, "max_slots": 5})
-    record, log = _simulate(scenario, "", "")
-    assert _batteries(log, 0) == [15, 25, 24, 23, 22]
-    assert _batteries(log, 1) == [4, 3, 13, 23, 25]
-    assert record.uavs["slots_waiting"].tolist() == [0, 2]
 
 
 def test_pads_are_first_come_first_served() -> None:
@@ -263,11 +182,11 @@ def test_pads_are_first_come_first_served() -> None:
         flying_time=12,
         max_slots=6,
     )
-    record, log = _simulate(scenario, "NS", "", "")
-    assert _batteries(log, 0) == [11, 10, 9, 8, 18, 21]
-    assert _batteries(log, 1) == [11, 21, 20, 19, 18, 17]
-    assert _batteries(log, 2) == [11, 10, 20, 21, 20, 19]
-    assert _values(log, "charge_start", "time", "uav") == [(1.0, 1), (2.0, 2), (4.0, 0)]
+    record, log = flown(scenario, "NS", "", "")
+    assert batteries(log, 0) == [11, 10, 9, 8, 18, 21]
+    assert batteries(log, 1) == [11, 21, 20, 19, 18, 17]
+    assert batteries(log, 2) == [11, 10, 20, 21, 20, 19]
+    assert rows_of(log, "charge_start", "time", "uav") == [(1.0, 1), (2.0, 2), (4.0, 0)]
     assert record.uavs["slots_waiting"].tolist() == [2, 0, 1]
 
 
@@ -294,13 +213,13 @@ def test_the_battery_of_a_uav_is_depleted_outside_a_taken_cell(stuck: int) -> No
     at_home = 1 - stuck
     routes, starts = ["", ""], [(1.0, 0.0), (1.0, 0.0)]
     routes[stuck], starts[stuck] = "SE" + "N" * 18, (0.0, 0.0)
-    record, log = _simulate(scenario, *routes, starts=starts)
+    record, log = flown(scenario, *routes, starts=starts)
     rows = record.uav_rows()
     assert rows[stuck] == {"quota": 13, "battery": 0, "slots_charging": 0, "end": "battery"}
     assert rows[at_home] == {"quota": 3, "battery": 27, "slots_charging": 17, "end": "truncated"}
-    collisions = _values(log, "collision", "time", "uav", "x", "y")
+    collisions = rows_of(log, "collision", "time", "uav", "x", "y")
     assert collisions == [(float(t), stuck, 1.0, 1.0) for t in range(2, 13)]
-    assert _values(log, "battery_empty", "time", "uav") == [(13.0, stuck)]
+    assert rows_of(log, "battery_empty", "time", "uav") == [(13.0, stuck)]
     assert record.collected == pytest.approx(4 * _bits(13) + 12 * _bits(8), abs=1e-9)
     assert record.uavs["reward"][stuck] == pytest.approx(-281.7665, abs=5e-5)
     assert record.uavs["reward"][at_home] == pytest.approx(29.3835, abs=5e-5)
@@ -313,7 +232,7 @@ def test_the_last_slot_of_the_battery_still_communicates() -> None:
     scenario = Scenario.of(
         **HAND | {"nodes": [[1, 0]], "initial_data": 50.0, "quota": 2, "flying_time": 2}
     )
-    record, _ = _simulate(scenario, "EE")
+    record, _ = flown(scenario, "EE")
     assert record.uav_rows() == [{"quota": 2, "battery": 0, "slots_charging": 0, "end": "quota"}]
     assert (record.success, record.slots) == (1, 2)
     assert record.reward == pytest.approx(1.3 * 12 - 0.2 + 100, abs=1e-9)
@@ -338,9 +257,9 @@ def test_flying_without_battery_decrease(
         flight_cost=0,
         max_slots=6,
     )
-    record, log = _simulate(scenario, "EEW")
+    record, log = flown(scenario, "EEW")
     assert record.uav_rows() == [{"quota": slots, "battery": 2, "slots_charging": 0, "end": end}]
-    assert _values(log, "move", "time", "value") == [(float(t), 2.0) for t in range(slots)]
+    assert rows_of(log, "move", "time", "value") == [(float(t), 2.0) for t in range(slots)]
     assert (record.slots, record.uav_slots, record.success) == (slots, slots, end == "quota")
     assert record.collected == pytest.approx(collected, abs=1e-9)
     assert record.reward == pytest.approx(reward, abs=1e-9)
@@ -356,11 +275,11 @@ def test_a_uav_that_has_ended_leaves_the_map() -> None:
         flying_time=20,
         max_slots=2,
     )
-    record, log = _simulate(scenario, "", "WW", starts=[(0, 0), (1, 0)])
+    record, log = flown(scenario, "", "WW", starts=[(0, 0), (1, 0)])
     assert [row["end"] for row in record.uav_rows()] == ["quota", "truncated"]
-    assert _values(log, "collision", "time", "uav") == [(0.0, 1)]
+    assert rows_of(log, "collision", "time", "uav") == [(0.0, 1)]
     moves = [(0.0, 0, 0.0), (0.0, 1, 1.0), (1.0, 1, 0.0)]
-    assert _values(log, "move", "time", "uav", "x") == moves
+    assert rows_of(log, "move", "time", "uav", "x") == moves
     # UAV 0 is paid for slot 0 only; UAV 1 for the team's data, two steps and one collision.
     assert record.uavs["reward"].tolist() == pytest.approx([106.4, 5.3], abs=1e-9)
     assert (record.slots, record.uav_slots) == (2, 3)
@@ -375,8 +294,8 @@ def test_a_collision_names_the_uav_in_the_way() -> None:
     """
     scenario = Scenario.of(**PAIR | {"uavs": 3, "zone": [0, 0, 3, 1]}, max_slots=3)
     starts = [(1, 0), (0, 0), (2, 0)]
-    _, log = _simulate(scenario, "..S", "EEE", "NWW", starts=starts)
-    assert _values(log, "collision", "time", "uav", "other", "value") == [
+    _, log = flown(scenario, "..S", "EEE", "NWW", starts=starts)
+    assert rows_of(log, "collision", "time", "uav", "other", "value") == [
         (0.0, 1, 0, 1.0),
         (0.0, 2, -1, 0.0),
         (1.0, 1, 0, 1.0),
@@ -386,12 +305,9 @@ def test_a_collision_names_the_uav_in_the_way() -> None:
     ]
 
 
-def test_the_snr_of_a_communication_gives_its_rate() -> None:
-    """Beside the node the SNR is 15, above it 255; the node is emptied with the third."""
-    scenario = Scenario.of(
-        **HAND | {"nodes": [[1, 0]], "initial_data": 14.0, "quota": 3, "flying_time": 20}
-    )
-    _, log = _simulate(scenario, ".E")
-    snr, amounts = zip(*_values(log, "communication", "snr", "value"), strict=True)
-    assert snr == pytest.approx([10 * math.log10(k) for k in (15, 255, 255)], abs=1e-9)
-    assert amounts == pytest.approx([4, 8, 2], abs=1e-9)
+def test_ties_go_to_the_node_of_lowest_index() -> None:
+    """Four nodes around a UAV that hovers: the first is emptied first, then the second."""
+    for nodes in ([[0, 1], [2, 1], [1, 0], [1, 2]], [[1, 2], [1, 0], [2, 1], [0, 1]]):
+        values = {"grid": 3, "zone": [1, 1, 1, 1], "nodes": nodes, "initial_data": 1.0}
+        _, log = flown(Scenario.of(**HAND | values | {"quota": 4}, max_slots=4), "")
+        assert rows_of(log, "communication", "node") == [0, 1, 2, 3]

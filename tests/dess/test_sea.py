@@ -36,12 +36,6 @@ def test_columns_x_and_y_are_cells(tmp_path: Path) -> None:
     assert nodes_in(_csv(tmp_path, text), 8, 800.0) == ((1, 3), (7, 0))
 
 
-def test_a_node_is_in_the_middle_of_the_grid(tmp_path: Path) -> None:
-    path = _csv(tmp_path, "lon,lat\n8.5,54.25\n")
-    assert nodes_in(path, 32, 800.0) == ((16, 16),)
-    assert nodes_in(path, 33, 800.0) == ((16, 16),)
-
-
 def test_degrees_are_projected_about_the_centre_of_their_box(tmp_path: Path) -> None:
     """At 60 degrees north a degree of longitude is half a degree of latitude long: 55,597 m."""
     places = [(10.0, 60.0), (9.91, 60.0), (10.09, 60.0), (10.0, 60.045), (10.0, 59.955)]
@@ -53,20 +47,9 @@ def test_degrees_are_projected_about_the_centre_of_their_box(tmp_path: Path) -> 
     assert nodes_in(_geojson(tmp_path, *features), 20, 1000.0) == expected
 
 
-def test_the_cell_size_scales(tmp_path: Path) -> None:
-    half = 3.5 * 400 / METRES_PER_DEGREE
-    path = _csv(tmp_path, f"lon,lat\n0,{half}\n0,{-half}\n")
-    assert nodes_in(path, 8, 400.0) == ((4, 0), (4, 7))
-    assert nodes_in(path, 8, 800.0) == ((4, 2), (4, 5))
-
-
 def test_a_sea_may_lie_across_the_180th_meridian(tmp_path: Path) -> None:
     path = _csv(tmp_path, "lon,lat\n179.99,0\n-179.99,0\n")  # 2,224 m apart
     assert nodes_in(path, 10, 1000.0) == ((3, 5), (6, 5))
-
-
-def test_the_order_of_the_file_is_kept(tmp_path: Path) -> None:
-    assert nodes_in(_csv(tmp_path, "x,y\n5,5\n1,1\n3,3\n"), 8, 1.0) == ((5, 5), (1, 1), (3, 3))
 
 
 # --- in a scenario ---
@@ -126,11 +109,6 @@ def test_a_table_that_is_refused(text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"buoys.csv: .*{TABLES[text]}") as error:
         nodes_in(_csv(tmp_path, text), 8, 800.0)
     assert "\n" not in str(error.value)
-
-
-def test_the_grid_that_is_named_would_do(tmp_path: Path) -> None:
-    path = _csv(tmp_path, "lon,lat\n0,0\n0,0.09\n0.05,0.02\n")
-    assert len(nodes_in(path, 14, 800.0)) == len(nodes_in(path, 15, 800.0)) == 3
 
 
 FEATURES: dict[str, Any] = {

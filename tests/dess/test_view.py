@@ -7,7 +7,7 @@ from hypothesis import given
 
 from dess.mission import simulate
 from dess.scenario import ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y
+from dess.state import STEP_X, STEP_Y
 from dess.view import View
 from tests.drawn import Fidget, replications, seeds, spaces
 
@@ -51,25 +51,3 @@ def test_a_view_shows_who_must_act_and_all_that_may_be_known(
     inspector = _Inspector(Fidget(), space)
     record = simulate(space, inspector, seed, replication)
     assert 0 < inspector.calls <= record.slots
-
-
-def test_a_charging_uav_has_hover_alone() -> None:
-    seen = []
-
-    class Everyone:
-        """Looks at all UAVs, the charging ones too."""
-
-        name = "everyone"
-
-        def act(self, view: View) -> np.ndarray:
-            whole = View(view.state, view.world, np.zeros(2, int), np.arange(2))
-            for own, legal in zip(whole.own, whole.legal, strict=True):
-                if own["charging"]:
-                    seen.append(legal.tolist())
-            return np.full(len(view), HOVER)
-
-    # Both hover in the zone; with one pad one of them charges while the other is asked.
-    space = ScenarioSpace.of(uavs=2, pads=1, flying_time=40, charge_start=30, max_slots=20)
-    simulate(space, Everyone(), 0)
-    assert seen
-    assert all(legal == [False] * 4 + [True] for legal in seen)

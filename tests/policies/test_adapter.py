@@ -4,10 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 import dess
-import policies
 from analysis.results.provenance import team_of
 from dess import InputError, ScenarioSpace
 from dess.observations.observer import KINDS
@@ -44,19 +42,6 @@ def test_missions_are_those_of_the_environment(kind: str, guarded: bool) -> None
             finished += 1
     assert illegal
     assert dess.simulate(QUICK, policy, 3, 4).metrics == expected.missions[4]
-
-
-def test_the_network_of_the_shipped_learner_flies_as_the_shipped_learner() -> None:
-    shipped = policies.load("ddqn")
-
-    @torch.inference_mode()
-    def act(observations, masks):
-        values = shipped.exact(torch.from_numpy(observations).double()).numpy()
-        return np.where(masks, values.round(9), -np.inf).argmax(1)
-
-    paper = dess.load_scenario("paper")
-    same = dess.simulate_batch(paper, Adapter("same", act, guarded=True), 1, 20)
-    assert np.array_equal(same.missions, dess.simulate_batch(paper, shipped, 1, 20).missions)
 
 
 def test_missions_with_other_zones_are_observed_with_their_own() -> None:

@@ -38,7 +38,7 @@ def test_random_without_the_guard_is_legal_and_fails_nearly_all_missions() -> No
     paper, unguarded = load_scenario("paper"), policies.load("random-unguarded")
     simulate(paper, Checked(unguarded, lambda view: view.legal), 21, 0)
     shares = [
-        simulate_batch(paper, policies.load(name), 32, 300).missions["success"].mean()
+        simulate_batch(paper, policies.load(name), 32, 100).missions["success"].mean()
         for name in ("random", "random-unguarded")
     ]
     assert shares[0] >= 0.97 and shares[1] <= 0.05
@@ -71,14 +71,6 @@ def test_heuristics_do_the_same_in_any_batch(
         assert single.uavs.tobytes() == records.uavs[job, : len(single.uavs)].tobytes()
 
 
-def test_heuristics_check_out_on_the_paper_scenario() -> None:
-    paper = load_scenario("paper", uavs=len(NAMES))
-    for name in NAMES:
-        simulate(paper, _checked(policies.load(name)), 21, 0)
-    checked = [_checked(policies.load(name)) for name in NAMES]
-    simulate_batch(paper, checked, 21, 3)
-
-
 # --- what each of them goes for ---
 
 
@@ -90,12 +82,6 @@ def _path(name: str, slots: int, **scenario: Any) -> list[tuple[float, float]]:
     log = record.events.columns()
     moves = log["event"] == "move"
     return list(zip(log["x"][moves].tolist(), log["y"][moves].tolist(), strict=True))
-
-
-def test_nearest_flies_to_the_nearest_node_on_the_shortest_way() -> None:
-    for node, away in (([8, 5], [8, 14]), ([11, 8], [2, 8]), ([8, 11], [8, 2]), ([5, 8], [14, 8])):
-        path = _path("nearest", 3, nodes=[away, node], initial_data=100)
-        assert path[-1] == tuple(node)
 
 
 def test_greedy_weighs_data_against_distance() -> None:
@@ -128,36 +114,12 @@ def test_tour_visits_every_node_once_around() -> None:
     assert steps in ({1}, {7})
 
 
-def test_random_has_its_own_stream_and_goes_everywhere() -> None:
-    open_grid = {"grid": 64, "zone": [30, 30, 4, 4], "nodes": [[0, 0]], "flying_time": 100}
-    space = ScenarioSpace.of(**open_grid, initial_data=1e6, quota=100, max_slots=20)
-    record = simulate(space, policies.load("random"), 5, events=True)
-    again = simulate(space, policies.load("random"), 5, events=True)
-    other = simulate(space, policies.load("random"), 6, events=True)
-    assert record.events == again.events
-    assert record.events != other.events
-    counts = np.zeros(4, int)
-    directions = {(0, -1): 0, (1, 0): 1, (0, 1): 2, (-1, 0): 3}
-    scenario = ScenarioSpace.of(space, uavs=1)
-    for replication in range(60):
-        events = simulate(scenario, policies.load("random"), 5, replication, events=True).events
-        assert events is not None
-        log = events.columns()
-        own_moves = (log["uav"] == 0) & np.isin(log["event"], ("mission_start", "move"))
-        track = list(zip(log["x"][own_moves], log["y"][own_moves], strict=True))
-        for (a, b), (c, d) in zip(track, track[1:], strict=False):
-            counts[directions[c - a, d - b]] += 1
-    total = counts.sum()
-    assert total == 60 * 20
-    assert abs(counts - total / 4).max() < 5 * np.sqrt(total * 3 / 16)
-
-
 # --- how good they are ---
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_lone_uav_never_fails(name: str) -> None:
-    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 1000)
+    records = simulate_batch(load_scenario("paper", uavs=1), policies.load(name), 31, 250)
     assert records.missions["success"].all()
     assert (records.uavs["slots_charging"] > 0).all()  # eq. 6: it takes at least one charge
 
@@ -165,7 +127,7 @@ def test_a_lone_uav_never_fails(name: str) -> None:
 def test_the_best_heuristic_is_as_good_as_the_readme_says() -> None:
     products = {}
     for name in NAMES:
-        missions = simulate_batch(load_scenario("paper"), policies.load(name), 32, 1000).missions
+        missions = simulate_batch(load_scenario("paper"), policies.load(name), 32, 500).missions
         products[name] = missions["collection_ratio_and_communication"].mean()
         if name != "random":
             assert missions["success"].mean() >= 0.99
@@ -185,14 +147,3 @@ def test_age_flies_to_the_stalest_node_for_the_distance() -> None:
         # 30 / 3 + 0.1 * 50 / 9 > 50 / 5 + 0.1 * 30 / 11, but 30 / 3 + ... < 60 / 5 + ...
         (asked,) = policies.load("age").act(View(state, stepper.world, here, here))
         assert asked == action
-
-
-def test_age_lowers_the_mean_age_of_information_against_greedy() -> None:
-    paper = load_scenario("paper", **{"age.measured": True})
-    for space in (paper, ScenarioSpace.of(paper, quota=1600)):  # some 110 and 440 slots
-        age, greedy = (
-            simulate_batch(space, policies.load(name), 5, 200).operations["age"]
-            for name in ("age", "greedy")
-        )
-        lower = greedy - age
-        assert lower.mean() > 3 * lower.std() / np.sqrt(len(lower))

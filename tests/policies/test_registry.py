@@ -21,7 +21,7 @@ from policies.base import Policy
 from policies.ddqn.config import config_of
 from policies.ddqn.trained import save_policy
 from policies.ddqn.training import build
-from policies.registry import SHIPPED, TypedByUser, trained_names
+from policies.registry import SHIPPED, TypedByUser
 
 ROOT = Path(__file__).parents[2]
 
@@ -63,21 +63,6 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, "outside_policies", raising=False)
 
 
-def test_shipped_policies_load_by_name() -> None:
-    assert {"random", "nearest", "greedy", "tour"} <= set(SHIPPED)
-    assert policies.names()[: len(SHIPPED)] == list(SHIPPED)
-    for name in SHIPPED:
-        policy = policies.load(name)
-        assert isinstance(policy, Policy)
-        assert policy.name == name
-
-
-def test_a_team_is_a_list_of_names() -> None:
-    assert [policy.name for policy in policies.load_team("greedy")] == ["greedy"]
-    team = policies.load_team("greedy, tour,greedy")
-    assert [policy.name for policy in team] == ["greedy", "tour", "greedy"]
-
-
 @pytest.mark.parametrize("text", ["gredy", "", "greedy,", "greedy,,tour", "Greedy"])
 def test_unknown_names_are_refused(text: str) -> None:
     with pytest.raises(InputError) as error:
@@ -113,53 +98,6 @@ def test_a_trained_policy_loads_from_its_folder(
     assert np.isfinite(simulate(Scenario.of(uavs=3), team, 0).reward)
 
 
-def test_a_shipped_trained_policy_loads_by_its_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    _trained(tmp_path / "novice")
-    (tmp_path / "no-policy").mkdir()
-    monkeypatch.setattr(registry, "TRAINED", tmp_path)
-    assert policies.names()[: len(SHIPPED) + 1] == [*SHIPPED, "novice"]
-    assert policies.load("novice").name == "novice"
-    with pytest.raises(InputError, match="'no-policy' is unknown; allowed: .*novice"):
-        policies.load("no-policy")
-
-
-def test_a_folder_without_a_policy_is_unknown(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "none"):
-        with pytest.raises(InputError, match="or the folder of a trained policy, "):
-            policies.load(path)
-
-
-def test_a_damaged_trained_policy_is_named(tmp_path: Path) -> None:
-    folder = _trained(tmp_path / "first")
-    (folder / "model.safetensors").write_bytes(b"")
-    with pytest.raises(InputError, match=f"^{folder / 'model.safetensors'}: "):
-        policies.load(folder)
-
-
-@pytest.mark.usefixtures("outside")
-def test_outside_packages_add_policies() -> None:
-    shipped = len(SHIPPED) + len(trained_names())
-    assert policies.names()[shipped:] == ["absent", "broken", "nothing", "still"]
-    record = simulate(Scenario.of(uavs=1), policies.load("still"), 0)
-    assert np.isfinite(record.reward)
-
-
-@pytest.mark.usefixtures("outside")
-@pytest.mark.parametrize(
-    ("name", "complaint"),
-    [
-        ("broken", "cannot be loaded: RuntimeError: no weights"),
-        ("absent", "cannot be loaded: AttributeError: .*Absent"),
-        ("nothing", "has no name and act"),
-    ],
-)
-def test_broken_outside_policies_are_named(name: str, complaint: str) -> None:
-    with pytest.raises(InputError, match=f"policy: {name} of outside_policies:.*{complaint}"):
-        policies.load(name)
-
-
 @pytest.mark.usefixtures("outside")
 def test_the_list_says_which_outside_policies_cannot_be_loaded() -> None:
     described = registry.descriptions()
@@ -168,6 +106,10 @@ def test_the_list_says_which_outside_policies_cannot_be_loaded() -> None:
     problem = "cannot be loaded: RuntimeError: no weights (of the package outside-policies 1)"
     assert described["broken"] == problem
     assert described["nothing"].startswith("has no name and act(view)")
+    assert "AttributeError" in described["absent"]
+    with pytest.raises(InputError, match="policy: broken of outside_policies:.*no weights"):
+        policies.load("broken")
+    assert np.isfinite(simulate(Scenario.of(uavs=1), policies.load("still"), 0).reward)
 
 
 FILE = """
@@ -269,11 +211,6 @@ def test_the_card_of_a_policy_is_a_regular_file(tmp_path: Path) -> None:
         about(str(folder))
 
 
-@pytest.mark.usefixtures("outside")
-def test_the_package_of_a_policy_is_named() -> None:
-    assert about("still").origin == "the package outside-policies 1"
-
-
 def test_which_policies_are_python_files_is_known_without_running_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -289,12 +226,3 @@ def test_which_policies_are_python_files_is_known_without_running_them(
     for team in ("greedy", "ddqn,tour", "data.py:Trap", "greedy, ./data.py:Trap", "unknown", ""):
         assert registry.files_of(team) == []
     assert "trap" not in sys.modules
-
-
-@pytest.mark.parametrize(
-    "name", ["x" * 5000 + ".py:X", "a\0b.py:X", "\udcff.py:X", "a\0b", "x" * 5000, "a\nb"]
-)
-def test_a_name_that_no_file_can_have_is_refused(name: str) -> None:
-    with pytest.raises(InputError) as error:
-        policies.load(name)
-    assert "\n" not in str(error.value)

@@ -9,7 +9,6 @@ import policies
 from dess import InputError
 from policies import registry
 from policies.heuristics import Greedy
-from reports.cli import main
 
 
 def write_config(folder: Path, description: str) -> None:
@@ -18,29 +17,6 @@ def write_config(folder: Path, description: str) -> None:
     content = json.loads((registry.TRAINED / "ddqn" / "config.json").read_text("utf-8"))
     content["training"] |= {"name": folder.name, "description": description}
     (folder / "config.json").write_text(json.dumps(content))
-
-
-@pytest.fixture
-def learned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One trained policy is shipped: ``learned``."""
-    write_config(tmp_path / "learned", "it has learned")
-    monkeypatch.setattr(registry, "TRAINED", tmp_path)
-
-
-@pytest.mark.usefixtures("learned")
-def test_policies_are_described_in_the_order_of_their_names() -> None:
-    described = registry.descriptions()
-    assert list(described) == policies.names()
-    assert described["learned"] == "it has learned"
-    assert described["greedy"] == registry.SHIPPED["greedy"][1]
-
-
-@pytest.mark.usefixtures("learned")
-def test_the_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["policies"]) == 0
-    assert ["learned", "it has learned"] in [
-        line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()
-    ]
 
 
 def test_a_folder_does_not_hide_the_shipped_policy_of_its_name(

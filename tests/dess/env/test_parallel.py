@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import dess
 from dess import InputError, ScenarioSpace
-from dess.env.stepper import REWARD_TERMS
 from dess.observations.observer import ENCODERS
 from dess.observations.states import compact_states, layout_of, masks
 from dess.state import END_NAMES, HOVER, spaces_of
@@ -111,67 +110,6 @@ def test_observations_and_masks_are_those_of_the_shipped_learner(
             actions[agent] = int(generator.choice(np.flatnonzero(allowed[row])))
         mission.step(np.array([actions.get(agent, HOVER) for agent in env.possible_agents]))
         observations, *_ = env.step(actions)
-
-
-def test_a_lone_uav_is_overruled_when_its_action_is_masked_and_only_then() -> None:
-    env = dess.parallel_env(small(), observation="state")
-    generator = np.random.default_rng(0)
-    observations, _ = env.reset(seed=0)
-    overruled = 0
-    while env.agents:
-        mask = observations["uav_0"]["action_mask"]
-        action = int(generator.integers(5))
-        observations, _, _, _, infos = env.step({"uav_0": action})
-        if not observations["uav_0"]["observation"][6]:  # not charging
-            assert infos["uav_0"]["overruled"] == (not mask[action])
-            overruled += infos["uav_0"]["overruled"]
-    assert overruled > 0
-
-
-def test_the_state_is_the_components_of_all_possible_agents() -> None:
-    scenario = dess.load_scenario("paper", uavs=[2, 3])
-    env, maps = dess.parallel_env(scenario, observation="state"), dess.parallel_env(scenario)
-    fleets = set()
-    for _ in range(10):
-        observations, _ = env.reset()
-        maps.reset()
-        fleets.add(len(env.agents))
-        rows = [observations[agent]["observation"] for agent in env.agents]
-        absent = np.zeros((3 - len(rows), len(rows[0])), np.float32)
-        assert np.array_equal(env.state(), np.concatenate([*rows, *absent]))
-        assert np.array_equal(env.state(), maps.state())  # whatever the agents observe
-        assert env.state_space.contains(env.state())
-    assert fleets == {2, 3}
-
-
-@pytest.mark.parametrize(
-    ("values", "end", "slots", "term"),
-    [
-        ({"max_slots": 3}, "truncated", 3, 0.0),
-        ({"flying_time": 2, "charge_start": 10}, "battery", 2, -300.0),
-        ({"quota": 7}, "quota", 2, 100.0),  # overshot by one
-        ({"quota": 8, "flying_time": 2}, "quota", 2, 100.0),  # filled on the last percent
-        ({"quota": 8, "max_slots": 2}, "quota", 2, 100.0),  # filled in the last slot
-    ],
-)
-@pytest.mark.parametrize("ended", ["leave", "stay"])
-def test_terminated_is_not_truncated(
-    values: dict, end: str, slots: int, term: float, ended: str
-) -> None:
-    env = dess.parallel_env(small(**values), ended=ended)
-    env.reset()
-    # To the west, out of the zone, so that nobody charges.
-    steps = []
-    while env.agents:
-        steps.append(env.step({"uav_0": 3}))
-    observations, _, terminated, truncated, infos = steps[-1]
-    assert env.observation_space("uav_0").contains(observations["uav_0"])
-    assert (len(steps), END_NAMES[infos["uav_0"]["end"]]) == (slots, end)
-    assert terminated["uav_0"] == (end != "truncated")
-    assert truncated["uav_0"] == (end == "truncated")
-    terms = dict(zip(REWARD_TERMS, infos["uav_0"]["reward_terms"], strict=True))
-    assert terms["quota"] + terms["depleted"] == term
-    assert all(not step[2]["uav_0"] and not step[3]["uav_0"] for step in steps[:-1])
 
 
 @given(spaces(), seeds, st.integers(0, 9))

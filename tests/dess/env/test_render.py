@@ -16,20 +16,6 @@ def agg() -> None:
     pyplot.switch_backend("agg")
 
 
-@pytest.fixture
-def screen(monkeypatch: pytest.MonkeyPatch) -> list[tuple[np.ndarray, float]]:
-    """A screen: the pictures that it has shown, each with the time that the program waited [s]."""
-    shown: list[tuple[np.ndarray, float]] = []
-
-    def pause(seconds: float) -> None:
-        (image,) = pyplot.gca().images
-        shown.append((np.asarray(image.get_array()), seconds))
-
-    monkeypatch.setattr(pyplot, "get_backend", lambda: "qtagg")
-    monkeypatch.setattr(pyplot, "pause", pause)
-    return shown
-
-
 def test_a_picture_shows_the_mission() -> None:
     assert dess.parallel_env(PAPER).render() is None
     env = dess.parallel_env(small(), render_mode="rgb_array")
@@ -52,22 +38,6 @@ def test_pettingzoos_render_test_passes(ended: str) -> None:
         lambda render_mode: parallel_to_aec(dess.parallel_env(PAPER, 0, render_mode, ended=ended))
     )
     pyplot.close("all")  # the test leaves a window open
-
-
-def test_a_window_shows_the_reset_and_every_step(screen: list[tuple[np.ndarray, float]]) -> None:
-    env = dess.parallel_env(small(), render_mode="human")
-    other = dess.parallel_env(small(), render_mode="rgb_array")
-    env.reset(seed=0)
-    other.reset(seed=0)
-    expected = [other.render()]
-    for action in (3, 2, 4):
-        env.step({"uav_0": action})
-        other.step({"uav_0": action})
-        expected.append(other.render())
-    pictures = [picture for picture, _ in screen]
-    assert all(np.array_equal(a, b) for a, b in zip(pictures, expected, strict=True))
-    assert {seconds for _, seconds in screen} == {1 / env.metadata["render_fps"]}
-    env.close()
 
 
 def test_close_closes_the_window_and_may_be_called_twice() -> None:

@@ -5,7 +5,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-import torch
 from gymnasium.spaces import flatten
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
@@ -18,7 +17,6 @@ from dess.observations.observer import KINDS
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.state import HOVER, TRUNCATED
 from tests.dess.env.episodes import PAPER, small
-from tests.drawn import Commuter
 
 QUICK = ScenarioSpace.of(uavs=[1, 3], flying_time=[5, 30], charge_start=[10, 50], max_slots=60)
 FLEET = 3
@@ -49,7 +47,7 @@ def assert_same(observed: dict[str, Any], rows: Any, first: int) -> None:
         assert data_equivalence(seen["observation"], row, exact=True)
 
 
-@pytest.mark.parametrize("num_envs", [1, 3, 4])
+@pytest.mark.parametrize("num_envs", [1, 3])
 @pytest.mark.parametrize("observation", KINDS)
 def test_a_batch_equals_single_episodes(num_envs: int, observation: str) -> None:
     guarded = num_envs == 3
@@ -103,39 +101,30 @@ def assert_same_record(record: Any, final: dict[str, Any], first: int) -> None:
 
 @pytest.mark.parametrize("observation", KINDS)
 def test_rows_without_a_uav_are_zeros_that_may_only_hover(observation: str) -> None:
-    env = dess.vector_env(QUICK, 5, observation=observation)
-    rows, info = env.reset(seed=2)
+    """And what was returned is never overwritten: another environment returns the same."""
+    env, again = (dess.vector_env(QUICK, 5, 2, observation) for _ in range(2))
+    (rows, info), idle, steps = env.reset(), np.zeros(1), []
     acted = info["active"]
-    for _ in range(100):
+    for _ in range(60):
         idle = ~(acted | info["active"])
         for row in idle.nonzero()[0]:
             assert not flatten(env.single_observation_space, row_of(rows, row)).any()
-        inactive = ~info["active"]
-        assert (info["action_mask"][inactive] == (np.arange(5) == HOVER)).all()
+        assert (info["action_mask"][~info["active"]] == (np.arange(5) == HOVER)).all()
         assert info["action_mask"].any(1).all()
         assert info["action_mask"] is env.action_masks()
-        rows, rewards, terminated, truncated, info = env.step(arbitrary_actions(env))
+        steps.append(env.step(arbitrary_actions(env)))
+        rows, rewards, terminated, truncated, info = steps[-1]
         assert env.observation_space.contains(rows)
         assert not (terminated & truncated).any()
         acted = info["acted"]
         assert not rewards[~acted].any()
-        for row in np.flatnonzero(info.get("_final_obs", ())):
-            assert env.single_observation_space.contains(info["final_obs"][row])
     assert idle.any()
-
-
-@pytest.mark.parametrize("observation", KINDS)
-def test_what_was_returned_is_never_overwritten(observation: str) -> None:
-    env = dess.vector_env(QUICK, 3, observation=observation)
-    env.reset()
-    steps = [env.step(arbitrary_actions(env)) for _ in range(40)]
-    again = dess.vector_env(QUICK, 3, observation=observation)
     again.reset()
     for step in steps:
         assert data_equivalence(step, again.step(arbitrary_actions(again)), exact=True)
 
 
-@pytest.mark.parametrize("num_envs", [1, 2, 5])
+@pytest.mark.parametrize("num_envs", [1, 3])
 def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
     env = dess.vector_env(QUICK, num_envs, seed=1)
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
@@ -167,35 +156,6 @@ def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
     assert data_equivalence(again, fresh, exact=True)
 
 
-def test_a_policy_can_play_the_batch() -> None:
-    env = dess.vector_env(QUICK, 4, seed=2)
-    env.reset()
-    expected = dess.simulate_batch(QUICK, Commuter(), 2, 100)
-    played = set()
-    while len(played) < 8:
-        view = env.view()
-        actions = np.full(env.num_envs, HOVER)
-        actions[view.mission * FLEET + view.uav] = Commuter().act(view)
-        *_, info = env.step(actions)
-        for row in np.flatnonzero(info.get("_final_info", ())):
-            final, (_, i) = info["final_info"], divmod(row, FLEET)
-            number = final["replication"][row]
-            played.add(number)
-            for name in MISSION_RECORD.names or ():
-                assert final[name][row] == expected.missions[name][number], name
-            for name in UAV_RECORD.names or ():
-                assert np.array_equal(final["uav"][name][row], expected.uavs[name][number, i])
-
-
-@pytest.mark.parametrize("scenario", [PAPER, dess.load_scenario("paper", uavs=2)])
-def test_gymnasium_makes_it(scenario: ScenarioSpace) -> None:
-    env = gymnasium.make_vec("dess/Paper-v0", num_envs=3, scenario=scenario, seed=7)
-    assert isinstance(env, HarvestVectorEnv)
-    assert (env.missions, env.num_envs) == (3, 3 * scenario.uavs[1])
-    mine = dess.vector_env(scenario, 3, seed=7)
-    assert data_equivalence(env.reset(), mine.reset(), exact=True)
-
-
 def test_gymnasium_makes_it_from_a_name_with_options() -> None:
     env = gymnasium.make_vec("dess/Paper-v0", num_envs=64)
     assert env.num_envs == 64 * PAPER.uavs[1]
@@ -203,18 +163,8 @@ def test_gymnasium_makes_it_from_a_name_with_options() -> None:
     assert set(small_vision.single_observation_space.keys()) == {"local", "global", "battery"}
 
 
-# --- Gymnasium's own wrappers ---
-
-
-def quick(
-    observation: str = "vector", mode: AutoresetMode = AutoresetMode.SAME_STEP
-) -> HarvestVectorEnv:
-    """Four environments of quick missions."""
-    return dess.vector_env(QUICK, 4, 3, observation, autoreset_mode=mode)
-
-
 def test_the_returns_that_gymnasium_counts_are_those_of_the_records() -> None:
-    env = wrappers.RecordEpisodeStatistics(quick())
+    env = wrappers.RecordEpisodeStatistics(dess.vector_env(QUICK, 4, 3))
     env.reset()
     ended = 0
     for _ in range(120):
@@ -263,77 +213,6 @@ def test_it_refuses_other_modes_of_reset() -> None:
     for mode in ("Disabled", AutoresetMode.DISABLED, "soon"):
         with pytest.raises(InputError, match="autoreset_mode.*SameStep or NextStep"):
             dess.vector_env(QUICK, 2, autoreset_mode=mode)
-
-
-@pytest.mark.parametrize(
-    ("wrapped", "expected"),
-    [
-        (lambda env: wrappers.TransformObservation(env, lambda x: 2 * x), lambda x: 2 * x),
-        (wrappers.FlattenObservation, lambda x: x),
-        (lambda env: wrappers.DtypeObservation(env, np.float64), lambda x: x),
-        (lambda env: wrappers.ReshapeObservation(env, (1, 242)), lambda x: x[:, None]),
-        (lambda env: wrappers.ClipReward(env, 0.0, 1.0), lambda x: x),
-        (wrappers.NormalizeReward, lambda x: x),
-    ],
-)
-def test_wrappers_of_gymnasium_run_on_it(wrapped: Any, expected: Any) -> None:
-    env, plain = wrapped(quick(mode=NEXT_STEP)), quick(mode=NEXT_STEP)
-    assert np.array_equal(env.reset()[0], expected(plain.reset()[0]))
-    for _ in range(60):
-        actions = arbitrary_actions(plain)
-        rows, *_ = env.step(actions)
-        assert np.array_equal(rows, expected(plain.step(actions)[0]))
-
-
-def test_observations_are_normalised() -> None:
-    env = wrappers.NormalizeObservation(quick(mode=NEXT_STEP))
-    rows = [env.reset()[0]] + [env.step(arbitrary_actions(env.unwrapped))[0] for _ in range(60)]
-    assert np.isfinite(rows).all()
-    assert np.abs(np.concatenate(rows[-30:]).mean(0)).max() < 1.0
-
-
-@pytest.mark.parametrize("observation", ["maps", "nodes"])
-def test_dictionaries_are_flattened(observation: str) -> None:
-    plain = quick(observation, NEXT_STEP)
-    env = wrappers.FlattenObservation(quick(observation, NEXT_STEP))
-    rows, expected = env.reset()[0], plain.reset()[0]
-    for _ in range(60):
-        space = plain.single_observation_space
-        assert np.array_equal(rows[4], flatten(space, row_of(expected, 4)))
-        actions = arbitrary_actions(plain)
-        rows, expected = env.step(actions)[0], plain.step(actions)[0]
-
-
-def test_infos_become_a_list() -> None:
-    env, plain = wrappers.DictInfoToList(quick()), quick()
-    _, infos = env.reset()
-    _, expected = plain.reset()
-    ended = 0
-    for _ in range(60):
-        for row, info in enumerate(infos):
-            assert np.array_equal(info["action_mask"], expected["action_mask"][row])
-            assert ("final_info" in info) == bool(expected.get("_final_info", np.zeros(12))[row])
-            if "final_info" in info:
-                assert info["final_info"]["slots"] == expected["final_info"]["slots"][row]
-                ended += 1
-        actions = arbitrary_actions(plain)
-        *_, infos = env.step(actions)
-        *_, expected = plain.step(actions)
-    assert ended > 0
-
-
-def test_arrays_become_tensors() -> None:
-    pytest.importorskip("array_api_compat")  # which this wrapper needs
-    env, plain = wrappers.NumpyToTorch(quick(mode=NEXT_STEP)), quick(mode=NEXT_STEP)
-    rows, info = env.reset()
-    plain.reset()
-    for _ in range(60):
-        assert isinstance(rows, torch.Tensor) and isinstance(info["action_mask"], torch.Tensor)
-        actions = arbitrary_actions(plain)
-        rows, rewards, *_, info = env.step(torch.from_numpy(actions))
-        expected, gained, *_ = plain.step(actions)
-        assert np.array_equal(rows.numpy(), expected)
-        assert np.array_equal(rewards.numpy(), gained)
 
 
 def test_bad_input_is_refused_with_one_line() -> None:

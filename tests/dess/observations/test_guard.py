@@ -7,14 +7,13 @@ import pytest
 from hypothesis import event, given
 
 from dess import streams
-from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.observations.guard import guard
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import ScenarioSpace
 from dess.state import BATTERY, HOVER, constants_of, empty_state
 from dess.view import View
 from tests import compiled
-from tests.drawn import EAST, NORTH, SOUTH, WEST, Fidget, replications, seeds, spaces
+from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces
 
 
 class Guarded:
@@ -43,25 +42,6 @@ def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
     record = simulate(space, Guarded(), seed, replication)
     assert (record.uavs["end"] != BATTERY).all()
     event(f"charged {record.uavs['slots_charging'][0] > 0}")
-
-
-def test_guarded_random_play_on_the_paper_scenario() -> None:
-    records = simulate_batch(load_scenario("paper", uavs=1), Guarded(), 41, 100)
-    assert records.missions["success"].all()
-
-
-@given(spaces(), seeds, replications)
-def test_the_mask_of_any_situation_is_legal_and_never_empty(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
-    class Careless(Guarded):
-        """Checks the mask, then does as it likes."""
-
-        def act(self, view: View) -> np.ndarray:
-            super().act(view)
-            return Fidget().act(view)
-
-    simulate(space, Careless(), seed, replication)
 
 
 def _mask(uavs: list[dict[str, Any]], **scenario: Any) -> np.ndarray:
@@ -101,18 +81,6 @@ def test_at_the_last_moment_only_the_way_home_is_left() -> None:
     assert opened[3:] == [5] * len(opened[3:])
 
 
-def test_without_need_to_charge_nothing_is_closed() -> None:
-    # Four communications short of the quota, one slot will do: no charge needed.
-    (mask,) = _mask([{"x": 20, "y": 10, "battery": 3, "communications": 436}])
-    assert mask.all()
-
-
-def test_where_flying_costs_no_battery_nothing_is_closed() -> None:
-    # The corner of the zone is 11 steps away: with a cost, only the way home would be left.
-    (mask,) = _mask([{"x": 20, "y": 10, "battery": 12}], flight_cost=0)
-    assert mask.all()
-
-
 def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
     (mask,) = _mask([{"x": 0, "y": 0}])
     assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH, HOVER]
@@ -130,13 +98,6 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> 
     collided = _mask([first | {"overruled": True}, second | {"overruled": True}])
     assert collided[0, SOUTH] and not collided[1, NORTH]
     assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fleet", [2, 3])
-def test_guarded_random_teams_seldom_fail(fleet: int) -> None:
-    records = simulate_batch(load_scenario("paper", uavs=fleet), Guarded(), 42, 200)
-    assert records.missions["success"].mean() > 0.9
 
 
 # --- pads ---
@@ -181,14 +142,6 @@ def test_the_time_that_a_uav_expects_to_wait(
     batteries: list[int], asked: list[int], scenario: dict[str, Any], slots: int
 ) -> None:
     assert _wait(batteries, asked, **scenario) == slots
-
-
-def test_the_guard_brings_uavs_home_in_time_to_wait_for_the_only_pad() -> None:
-    values = {"uavs": 3, "pads": 1, "quota": 300}
-    plain = simulate_batch(load_scenario("paper", **values, **OFF), Guarded(), 7, 60)
-    aware = simulate_batch(load_scenario("paper", **values), Guarded(), 7, 60)
-    depleted = [int((records.uavs["end"] == BATTERY).sum()) for records in (plain, aware)]
-    assert depleted[1] < depleted[0] / 2
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:

@@ -62,61 +62,6 @@ def _filled(layer: np.ndarray) -> dict[tuple[int, int], float]:
     return {(int(x), int(y)): float(layer[y, x]) for y, x in np.argwhere(layer)}
 
 
-def test_a_node_under_the_uav_is_in_the_middle() -> None:
-    seen = _observe(_layout((5, 20)), _team((5, 20, 60, 1), residual=(10.0,)))
-    assert _filled(seen.near[DATA]) == {(8, 8): 0.5}
-    assert _filled(seen.far[DATA]) == {(10, 10): pytest.approx(0.5 / 9)}
-    assert seen.own == pytest.approx(0.6)
-
-
-def test_the_local_map_ends_eight_cells_away() -> None:
-    nodes = [(18, 10), (19, 10), (10, 2), (10, 1), (2, 18)]
-    seen = _observe(_layout(*nodes), _team((10, 10, 60, 1), residual=(20.0,) * len(nodes)))
-    assert _filled(seen.near[DATA]) == {(16, 8): 1.0, (8, 0): 1.0, (0, 16): 1.0}
-
-
-def test_the_nodes_of_one_global_cell_share_its_mean() -> None:
-    # Relative cells (-1, 0) and (1, 1) lie with the UAV in global cell (10, 10), (2, 0) does not.
-    nodes = [(9, 10), (11, 11), (12, 10)]
-    seen = _observe(_layout(*nodes), _team((10, 10, 60, 1), residual=(20.0, 10.0, 20.0)))
-    assert _filled(seen.near[DATA]) == {(7, 8): 1.0, (9, 9): 0.5, (10, 8): 1.0}
-    shares = {(10, 10): pytest.approx(1.5 / 9), (11, 10): pytest.approx(1 / 9)}
-    assert _filled(seen.far[DATA]) == shares
-
-
-def test_from_a_corner_the_opposite_corner_is_at_the_rim() -> None:
-    layout = _layout((31, 31), (0, 0))
-    seen = _observe(layout, _team((0, 0, 60, 1), residual=(20.0, 20.0)))
-    assert _filled(seen.far[DATA]) == {
-        (20, 20): pytest.approx(1 / 9),
-        (10, 10): pytest.approx(1 / 9),
-    }
-    seen = _observe(layout, _team((31, 31, 60, 1), residual=(20.0, 20.0)))
-    assert _filled(seen.far[DATA]) == {
-        (0, 0): pytest.approx(1 / 9),
-        (10, 10): pytest.approx(1 / 9),
-    }
-    assert _filled(seen.near[DATA]) == {(8, 8): 1.0}
-
-
-def test_the_zone_partly_in_the_local_map() -> None:
-    # Seen from (20, 11) the zone spans relative x 6 to 9 and y -9 to -6; the map ends at 8.
-    seen = _observe(_layout(), _team((20, 11, 60, 1)))
-    assert _filled(seen.near[ZONE]) == {(x, y): 1.0 for x in (14, 15, 16) for y in (0, 1, 2)}
-    # Centred it spans columns 37 to 40 and rows 22 to 25: 2 and 2 cells of global columns 12 and
-    # 13, and 2 and 2 of rows 7 and 8.
-    shares = {(12, 7): 2 * 2, (13, 7): 2 * 2, (12, 8): 2 * 2, (13, 8): 2 * 2}
-    assert _filled(seen.far[ZONE]) == {cell: pytest.approx(n / 9) for cell, n in shares.items()}
-
-
-def test_a_whole_global_cell_of_zone_counts_one() -> None:
-    # Seen from (25, 1) the zone begins one cell right of and below the own one: row, column 32.
-    seen = _observe(_layout(), _team((25, 1, 60, 1)))
-    assert seen.far[ZONE][11, 11] == pytest.approx(1)
-    assert seen.far[ZONE].sum() * 9 == pytest.approx(16)
-    assert seen.far[ZONE][10, 10] == pytest.approx(1 / 9)
-
-
 def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
     states = _team((10, 10, 60, 1), (12, 7, 35, 1), (11, 10, 50, 0), (0, 0, 0, 0))
     seen = _observe(_layout(), states)
@@ -146,13 +91,6 @@ def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
 def test_refuses_maps_that_do_not_fit(settings: dict[str, int], line: str) -> None:
     with pytest.raises(InputError, match=re.escape(line)):
         Maps(_layout(), **settings)
-
-
-def test_no_rows() -> None:
-    maps = Maps(_layout())
-    none = np.zeros(0, np.int64)
-    encoded = maps.encode(_team((0, 0, 60, 1)), none, none)
-    assert [a.shape for a in encoded] == [(0, *shape) for shape in maps.shapes]
 
 
 @st.composite

@@ -3,36 +3,29 @@
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import event, given
 
-import policies
-from dess.batch import simulate_batch
 from dess.env.stepper import MissionStepper
 from dess.mission import simulate
 from dess.observations import states as columns
 from dess.observations.guard import guard
-from dess.observations.maps import Maps
 from dess.observations.states import (
     ACTIVE,
     BATTERY,
     CHARGING,
     HOME,
     LATCH,
-    MUST_CHARGE,
     NEEDED,
     CompactStates,
     X,
     Y,
     compact_states,
-    empty_states,
-    layout_of,
     masks,
 )
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import ScenarioSpace
 from dess.state import HOVER, State
 from dess.view import View
-from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces, teams
+from tests.drawn import replications, seeds, spaces, teams
 
 FIELDS = {
     X: "x",
@@ -84,12 +77,6 @@ def test_snapshots_tell_what_the_view_tells(
     event(f"somebody charged {any(policy.charging for policy in compared)}")
 
 
-def test_snapshots_of_many_missions() -> None:
-    compared = _Compared(policies.load("greedy"))
-    simulate_batch(load_scenario("paper"), compared, 51, 20)
-    assert compared.charging > 0
-
-
 def _state(uavs: list[dict[str, Any]], **scenario: Any) -> State:
     """One mission with UAVs in given states, 400 communications short of the quota."""
     space = ScenarioSpace.of(**({"uavs": len(uavs), "charge_start": 30} | scenario))
@@ -101,20 +88,6 @@ def _state(uavs: list[dict[str, Any]], **scenario: Any) -> State:
     return stepper.state
 
 
-def test_a_uav_far_out_by_hand() -> None:
-    # 6 + 5 slots from the nearest zone cell (26, 5), 11 % in hand: only the ways home are left.
-    states = compact_states(_state([{"x": 20, "y": 10, "battery": 12}]), True)
-    row = states.uavs[0, 0]
-    assert [row[X], row[Y], row[BATTERY]] == [20, 10, 12]
-    assert [row[NEEDED], row[MUST_CHARGE], row[HOME]] == [100, 1, 11]
-    (mask,) = masks(states, np.array([0]), np.array([0]))
-    assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
-    # Four communications, one slot, are left: no need to charge, all is open.
-    states = compact_states(_state([{"x": 20, "y": 10, "battery": 3, "communications": 436}]), True)
-    assert [states.uavs[0, 0, NEEDED], states.uavs[0, 0, MUST_CHARGE]] == [1, 0]
-    assert masks(states, np.array([0]), np.array([0])).all()
-
-
 def test_each_has_its_own_parking_cell() -> None:
     # Both are nearest to (26, 5); the one with less battery chooses first.
     first, second = {"x": 23, "y": 5, "battery": 20}, {"x": 26, "y": 8, "battery": 19}
@@ -122,21 +95,6 @@ def test_each_has_its_own_parking_cell() -> None:
     assert states.uavs[0, :, HOME].tolist() == [3 + 1, 3]
 
 
-def test_without_the_guard_only_the_edge_closes() -> None:
-    states = compact_states(_state([{"x": 31, "y": 0, "battery": 1}]), False)
-    (mask,) = masks(states, np.array([0]), np.array([0]))
-    assert np.nonzero(mask)[0].tolist() == [SOUTH, WEST, HOVER]
-
-
 def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
     states = compact_states(_state([{}], quota=1_000_000, communication_slots=1), True)
     assert states.uavs[0, 0, NEEDED] == np.iinfo(np.int16).max
-
-
-@pytest.mark.parametrize("uavs", [1, 3])
-def test_a_snapshot_takes_a_few_bytes(uavs: int) -> None:
-    paper = load_scenario("paper")
-    one = sum(part.nbytes for part in empty_states(1, uavs, len(paper.nodes)))
-    assert one == 2 * 2 + 10 * 2 * uavs + 4 * 25  # thresholds, UAVs, nodes
-    maps = sum(4 * int(np.prod(shape)) for shape in Maps(layout_of(paper)).shapes)
-    assert 80 * one < uavs * maps

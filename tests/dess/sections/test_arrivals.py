@@ -5,27 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.stats import kstest, poisson
 
 from analysis.verification.queues.sources import arrivals_of, integrated
 from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
-from tests.drawn import replications, seeds
 
 
 def _space(**arrivals: Any) -> ScenarioSpace:
     values = {f"arrivals.{name}": value for name, value in arrivals.items()}
     return load_scenario("paper", **{"arrivals.process": "continuous"} | values)
-
-
-def test_gaps_are_exponential() -> None:
-    space = ScenarioSpace.of(_space(), arrival_rate=0.5, max_slots=20_000)
-    times = arrivals_of(space, 3)
-    assert kstest(np.diff(times, prepend=0.0) * 0.5, "expon").pvalue > 0.01
-    assert 0.01 < poisson.cdf(len(times), 10_000) < 0.99
-    assert times[-1] < 20_000
 
 
 SCHEDULE = ((100.0, 3.0), (400.0, 0.0), (500.0, 0.25), (1500.0, 2.0))
@@ -51,23 +40,6 @@ def test_a_node_has_its_own_rate() -> None:
     assert 0.01 < poisson.cdf(len(arrivals_of(space, 2)), 100) < 0.99
 
 
-@given(seeds, replications, st.integers(0, 24))
-def test_a_schedule_of_ones_and_other_rates_change_no_arrival(
-    seed: int, replication: int, k: int
-) -> None:
-    plain = arrivals_of(_space(), k, seed, replication)
-    others = [0.5] * 25
-    others[k] = 0.02
-    space = _space(rates=others, schedule=[[10, 1], [20.5, 1]])
-    assert arrivals_of(space, k, seed, replication).tolist() == plain.tolist()
-    assert (np.diff(plain) > 0).all()
-
-
-def test_a_schedule_that_ends_at_zero_ends_the_arrivals() -> None:
-    assert (arrivals_of(_space(schedule=[[0, 50], [100, 0]]), 4) < 100).all()
-    assert len(arrivals_of(_space(schedule=[[0, 0]]), 4)) == 0
-
-
 # --- scenarios ---
 
 
@@ -90,13 +62,6 @@ def test_a_schedule_is_read_from_a_file_beside_the_scenario(tmp_path: Path) -> N
     assert load_scenario(tmp_path / "same.toml") == space
     replaced = load_scenario(path, **{"arrivals.schedule": [[1, 2]]})
     assert replaced.arrivals.schedule == ((1.0, 2.0),)
-
-
-def test_rates_and_a_schedule_beside_nodes_from_a_file(tmp_path: Path) -> None:
-    path = _file(tmp_path, "slot,factor\n5,2\n", rates="rates = [0.1, 0.2]")
-    (tmp_path / "buoys.csv").write_text("x,y\n1,1\n2,2\n")
-    path.write_text('nodes = "buoys.csv"\n' + path.read_text())
-    assert load_scenario(path).arrivals.rates == (0.1, 0.2)
 
 
 @pytest.mark.parametrize(

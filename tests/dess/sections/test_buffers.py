@@ -8,27 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.sections.age import age_of_teeth
 from dess.sections.buffers import DELIVERED, LOST, PACKET, WAITING, Buffers, teeth_of
 
 
 def _left(buffers: Buffers) -> list[float | None]:
     """When each packet left its buffer."""
     return [None if math.isnan(time) else time for time in buffers.packets["left"].tolist()]
-
-
-def test_the_oldest_packet_is_served_first_by_hand() -> None:
-    buffers = Buffers(1)
-    for time in (0.0, 1.0, 2.0):
-        buffers.store(0, time, 1.0)
-    buffers.serve(0, 3.0, 0.5)  # half of packet 0
-    assert _left(buffers) == [None, None, None]
-    buffers.serve(0, 4.0, 1.0, uav=2)  # the other half, and half of packet 1
-    assert _left(buffers) == [4.0, None, None]
-    buffers.serve(0, 5.0, 2.5)
-    assert _left(buffers) == [4.0, 5.0, 5.0]
-    assert buffers.packets["uav"].tolist() == [2, -1, -1]
-    assert buffers.delivered.tolist() == [0, 1, 2]
 
 
 def test_the_newest_packet_is_served_first_by_hand() -> None:
@@ -52,16 +37,6 @@ def test_a_full_buffer_refuses_the_new_packet_or_loses_its_oldest_by_hand() -> N
         assert buffers.packets["left"][lost] == 2.0
         assert buffers.queues["count"].tolist() == [2, 1]
         assert buffers.counts.tolist() == [4, 0, 1]
-
-
-def test_all_packets_of_a_node_can_be_lost() -> None:
-    buffers = Buffers(2)
-    for k in (0, 1, 0):
-        buffers.store(k, 0.0, 1.0)
-    assert buffers.lose(0, 5.0).tolist() == [0, 2]
-    assert buffers.packets["status"].tolist() == [LOST, WAITING, LOST]
-    assert buffers.queues["count"].tolist() == [0, 1]
-    assert buffers.lose(0, 6.0).tolist() == []
 
 
 # --- laws ---
@@ -137,18 +112,3 @@ def test_the_sawtooth_of_time_stamps_by_hand() -> None:
     teeth, peaks = _teeth((0, 1.0, 2.0), (0, 3.0, 5.0), (0, 2.0, 6.0), end=8.0)
     assert teeth == [(0.0, 2.0), (1.0, 4.0), (2.0, 5.0)]
     assert peaks == 2
-
-
-def test_deliveries_at_one_time_are_one_peak() -> None:
-    teeth, peaks = _teeth((0, 1.0, 4.0), (0, 2.0, 4.0), (1, 0.0, 4.0), nodes=2, end=5.0)
-    assert teeth == [(0.0, 4.0), (2.0, 3.0), (0.0, 5.0)]
-    assert peaks == 1
-
-
-def test_the_age_of_visits_at_fixed_gaps() -> None:
-    """Data collected as they are generated, every 3 slots: a mean age of 3 / 2."""
-    visits = [(0, 3.0 * n, 3.0 * n) for n in range(1, 101)]
-    lows, highs, peaks = teeth_of(_done(*visits), 1, 300.0)
-    mean, percentile = age_of_teeth(lows, highs, np.ones(len(lows)))
-    assert (mean, percentile) == pytest.approx((1.5, 2.97))
-    assert highs[:peaks].mean() == pytest.approx(3.0)

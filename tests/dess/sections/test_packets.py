@@ -1,154 +1,23 @@
 """Missions with packets: conservation, latency, and the event log packet by packet."""
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 from dess import InputError, parallel_env
 from dess.batch import simulate_batch
 from dess.mission import MissionModel, simulate
-from dess.record import EventLog, MissionRecord
+from dess.record import EventLog
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
-from dess.sections.age import age_of_teeth
 from dess.sections.buffers import DELIVERED, LOST, WAITING
 from dess.view import View
-from tests.drawn import Commuter, Wanderer, continuous_spaces, policies, replications, seeds
-
-# A mission of any small space with packets under any of the test policies.
-missions = given(continuous_spaces(), policies, seeds, replications)
 
 
 def _flown(space: ScenarioSpace, policy: Any, seed: int, replication: int) -> tuple[Any, Any]:
     """A mission that has been flown, and its record."""
     model = MissionModel(space, [policy], seed, replication, EventLog())
     return model, model.run()
-
-
-@settings(max_examples=30)
-@missions
-def test_conservation_in_missions_and_at_each_node(
-    space: ScenarioSpace, policy: object, seed: int, replication: int
-) -> None:
-    model, record = _flown(space, policy, seed, replication)
-    packets = model.packets.buffers.packets
-    ours = record.operations
-    assert len(packets) == ours["generated"]
-    assert (packets["status"] == DELIVERED).sum() == ours["delivered"]
-    assert (packets["status"] == LOST).sum() == ours["lost_packets"]
-    assert record.initial + record.arrived == pytest.approx(
-        record.collected + record.residual + ours["lost"]
-    )
-    assert 0.0 <= record.collection_ratio <= 1.0
-    log = record.events.columns()
-    for k in range(len(space.nodes)):
-        own = packets[packets["node"] == k]
-        waiting = own["remaining"][own["status"] == WAITING]
-        assert model.residual[k] == pytest.approx(waiting.sum(), abs=1e-9)
-        assert space.arrivals.buffer == 0 or len(waiting) <= space.arrivals.buffer
-        # Data of the node: what it had and what arrived is collected, lost or still there.
-        collected = log["value"][(log["event"] == "communication") & (log["node"] == k)].sum()
-        started = log["value"][(log["event"] == "mission_start") & (log["node"] == k)].sum()
-        arrived = (own["generated"] > 0.0).sum()
-        lost = own["remaining"][own["status"] == LOST].sum()
-        assert started + arrived == pytest.approx(collected + lost + waiting.sum())
-
-
-@settings(max_examples=30)
-@missions
-def test_the_log_tells_what_became_of_each_packet(
-    space: ScenarioSpace, policy: object, seed: int, replication: int
-) -> None:
-    record = simulate(space, policy, seed, replication, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    rows = {name: log["event"] == name for name in ("arrival", "delivery", "loss")}
-    start = (log["event"] == "mission_start") & (log["packet"] >= 0)
-    born = np.concatenate([log["packet"][start], log["packet"][rows["arrival"]]]).tolist()
-    assert born == [*range(len(born))]
-    generated = {
-        **dict.fromkeys(log["packet"][start].tolist(), 0.0),
-        **dict(zip(log["packet"][rows["arrival"]], log["time"][rows["arrival"]], strict=True)),
-    }
-    gone = [log["packet"][rows[name]].tolist() for name in ("delivery", "loss")]
-    assert len({*gone[0], *gone[1]}) == len(gone[0]) + len(gone[1])
-    assert record.generated == len(born)
-    assert (record.delivered, record.lost_packets) == (len(gone[0]), len(gone[1]))
-    for name in rows:
-        for packet, born_at in zip(
-            log["packet"][rows[name]], log["generated"][rows[name]], strict=True
-        ):
-            assert generated[packet] == born_at
-    of_uavs = (log["event"] == "data_lost") & (log["uav"] >= 0)
-    assert record.lost == pytest.approx(log["value"][rows["loss"] | of_uavs].sum())
-    latency = log["time"][rows["delivery"]] - log["generated"][rows["delivery"]]
-    if len(latency):
-        assert record.latency == pytest.approx(latency.mean())
-        assert (latency <= record.latency_p99).mean() >= 0.99
-        assert (latency < record.latency_p99).mean() < 0.99
-    else:
-        assert math.isnan(record.latency)
-    _check_littles_law(record, log, len(born))
-    _check_ages(record, space, log)
-
-
-def _check_littles_law(record: MissionRecord, log: dict[str, np.ndarray], born: int) -> None:
-    """The packets in all buffers over time, and the time that each of them was there."""
-    start = (log["event"] == "mission_start") & (log["packet"] >= 0)
-    number, before, area = int(start.sum()), 0.0, 0.0
-    for time, name in zip(log["time"], log["event"], strict=True):
-        area += number * (time - before)
-        before = time
-        number += {"arrival": 1, "delivery": -1, "loss": -1}.get(name, 0)
-    lost = log["event"] == "loss"
-    there = (log["time"][lost] - log["generated"][lost]).sum()
-    gone = np.isin(log["event"], ("delivery", "loss"))
-    waiting = {*log["packet"][log["packet"] >= 0].tolist()} - {*log["packet"][gone].tolist()}
-    for row in range(len(log["time"])):
-        if log["packet"][row] in waiting:
-            there += record.slots - log["generated"][row]
-    delivered = record.latency * record.delivered if record.delivered else 0.0
-    assert number == len(waiting) == born - record.delivered - record.lost_packets
-    assert area == pytest.approx(there + delivered)
-
-
-def _check_ages(record: MissionRecord, space: ScenarioSpace, log: dict[str, np.ndarray]) -> None:
-    """The ages of a record are those of the deliveries in its log."""
-    teeth, peaks = [], []
-    done = log["event"] == "delivery"
-    for k in range(len(space.nodes)):
-        own = done & (log["node"] == k)
-        since = newest = 0.0
-        for time in sorted({*log["time"][own]}):
-            fresh = log["generated"][own & (log["time"] == time)].max()
-            if fresh > newest:
-                teeth.append((since - newest, time - newest))
-                peaks.append(time - newest)
-                newest, since = fresh, time
-        teeth.append((since - newest, record.slots - newest))
-    lows, highs = np.array(teeth).T.copy()
-    assert (record.age, record.age_p99) == pytest.approx(
-        age_of_teeth(lows, highs, np.ones(len(lows)))
-    )
-    assert record.peak_age == pytest.approx(np.mean(peaks) if peaks else math.nan, nan_ok=True)
-
-
-@settings(max_examples=15)
-@given(continuous_spaces(), seeds, replications)
-def test_arrivals_do_not_depend_on_the_policy(
-    space: ScenarioSpace, seed: int, replication: int
-) -> None:
-    records = [simulate(space, p, seed, replication, events=True) for p in (Wanderer(), Commuter())]
-    end = min(record.slots for record in records)
-    arrivals = []
-    for record in records:
-        assert record.events is not None
-        log = record.events.columns()
-        rows = (log["event"] == "arrival") & (log["time"] < end)
-        arrivals.append([*zip(log["time"][rows], log["node"][rows], strict=True)])
-    assert arrivals[0] == arrivals[1]
 
 
 class _Hover:

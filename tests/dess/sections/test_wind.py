@@ -8,13 +8,13 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 
 import policies
-from dess import InputError, load_scenario, simulate, simulate_batch
+from dess import simulate, simulate_batch
 from dess.observations.reach import reach_of
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from dess.sections.wind import Wind, surcharges
 from dess.state import BATTERY, constants_of
 from policies.registry import HEURISTICS
-from tests.drawn import Script, Wanderer, replications, seeds, spaces
+from tests.drawn import Script, replications, seeds, spaces
 
 OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
 GUARDED = st.sampled_from([name for name in HEURISTICS if name != "random-unguarded"])
@@ -73,15 +73,6 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
     assert ((north == 0) | (south == 0)).all() and ((east == 0) | (west == 0)).all()
 
 
-def test_an_overruled_move_costs_what_hovering_does() -> None:
-    corner = {"zone": [0, 0, 1, 1], "wind.strength": 3, "wind.direction": 0}
-    assert _batteries("N.", **corner) == [59, 58]
-
-
-def test_a_flight_without_battery_decrease_costs_nothing_in_wind_either() -> None:
-    assert _batteries("NNN", flight_cost=0, **{"wind.strength": 9, "wind.gusts": 4}) == [60] * 3
-
-
 def test_a_battery_that_does_not_suffice_is_empty_and_not_negative() -> None:
     scenario = ScenarioSpace.of(**OPEN | {"flying_time": 4, "charge_start": 10, "max_slots": 20})
     wind = ScenarioSpace.of(scenario, **{"wind.strength": 8})
@@ -91,40 +82,6 @@ def test_a_battery_that_does_not_suffice_is_empty_and_not_negative() -> None:
 
 
 # --- the field ---
-
-
-@given(winds, seeds, replications, st.integers(0, 1))
-def test_every_move_of_every_mission_costs_what_the_field_says(
-    wind: Wind, seed: int, replication: int, engine: int
-) -> None:
-    space = ScenarioSpace.of(**OPEN | {"flying_time": 100, "max_slots": 12}, wind=wind.model_dump())
-    record = simulate(space, Wanderer(), seed, replication, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    table, moves = _table(wind, 9), log["event"] == "move"
-    x, y, battery = 4, 4, 100.0
-    for new_x, new_y, after in zip(
-        *(log[c][moves].astype(int) for c in ("x", "y", "value")), strict=True
-    ):
-        step = (new_x - x, new_y - y)
-        cost = 1
-        if step != (0, 0):
-            action = [(0, -1), (1, 0), (0, 1), (-1, 0)].index(step)
-            cost += table[action, new_y, new_x]
-        assert after == max(battery - cost, 0)
-        x, y, battery = new_x, new_y, after
-
-
-def test_another_seed_is_another_field() -> None:
-    one, other = (_table(Wind(gusts=2, seed=seed), 16) for seed in (1, 2))
-    assert (one != other).any()
-    assert (one == _table(Wind(gusts=2, seed=1), 16)).all()
-
-
-def test_what_is_no_wind_is_refused() -> None:
-    for field, value in (("strength", -1), ("direction", 361), ("gusts", 11), ("seed", 0.5)):
-        with pytest.raises(InputError, match=f"wind.{field}"):
-            load_scenario("paper", **{f"wind.{field}": value})
 
 
 # --- the guard ---
@@ -161,25 +118,3 @@ def test_a_guarded_lone_uav_never_depletes_its_battery_in_wind(
     record = simulate(windy, policies.load(name), seed, replication)
     assert (record.uavs["end"] != BATTERY).all()
     event(f"charged {record.uavs['slots_charging'][0] > 0}")
-
-
-@pytest.mark.parametrize("name", ["greedy", "random"])
-def test_teams_come_home_in_a_strong_wind(name: str) -> None:
-    windy = load_scenario("paper", **{"wind.strength": 2, "wind.direction": 200, "wind.gusts": 1})
-    ends = simulate_batch(windy, policies.load(name), 7, 60).uavs["end"]
-    assert (ends == BATTERY).mean() < 0.02
-
-
-def test_the_guard_without_wind_does_not_look_at_a_table() -> None:
-    assert reach_of(constants_of(load_scenario("paper"))) is None
-    assert reach_of(constants_of(load_scenario("paper", fleet=[{"rate": 2.0}]))) is None
-
-
-def test_a_learned_policy_applies_in_wind() -> None:
-    windy = load_scenario("paper", **{"wind.strength": 1, "wind.gusts": 0.5})
-    ends = simulate_batch(windy, policies.load("ddqn"), 7, 20).uavs["end"]
-    assert (ends == BATTERY).mean() < 0.05
-
-
-def test_a_scenario_shows_its_wind() -> None:
-    assert Scenario.of(**{"wind.strength": 2.0}).wind == Wind(strength=2.0)

@@ -9,9 +9,7 @@ import policies
 from dess import InputError
 from dess.scenario import load_scenario
 from policies.ddqn.config import (
-    TrainingConfig,
     config_names,
-    config_of,
     learner_of,
     load_config,
     resume_command,
@@ -22,27 +20,17 @@ PHASE = PHASES[0]
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"speed": 1}, "speed: unknown key"),
     ({"phases": [PHASE | {"speed": 1}]}, "phases.0.speed: unknown key"),
-    ({"num_envs": "many"}, "num_envs: "),
     ({"num_envs": 8.0}, "num_envs: "),
-    ({"num_envs": 0}, "num_envs: "),
     ({"batch": True}, "batch: "),
-    ({"seed": -1}, "seed: "),
     ({"name": 3}, "name: "),
     ({"guard": "perhaps"}, "guard: "),
     ({"hidden": [16, 0]}, "hidden.1: "),
-    ({"hidden": 16}, "hidden: "),
     ({"observation": "radar"}, "observation: "),
     ({"observation": "nodes", "hidden": [8]}, "hidden: [8] "),
     ({"precision": "float16"}, "precision: "),
-    ({"loss": "l1"}, "loss: "),
     ({"discount": 1.5}, "discount: "),
-    ({"target_rate": 0.0}, "target_rate: "),
-    ({"reward_scale": 0}, "reward_scale: "),
-    ({"low_battery_starts": 2}, "low_battery_starts: "),
     ({"phases": []}, "phases: "),
     ({"phases": [{"ticks": 1}]}, "phases.0.name: "),
-    ({"phases": [PHASE | {"ticks": 0}]}, "phases.0.ticks: "),
-    ({"phases": [PHASE | {"epsilon": [0.5]}]}, "phases.0.epsilon"),
     ({"phases": [PHASE | {"epsilon": [0.5, 2]}]}, "phases.0.epsilon.1: "),
     ({"phases": [PHASE, PHASE]}, "phases: ['harvest', 'harvest'] are not distinct"),
     ({"n_step": 60}, "learning_starts: 60 is too few; allowed: more than n_step 60"),
@@ -51,29 +39,20 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"set": {"batch": 3}}, "batch is a setting of the training, not a field of the scenario; "),
     ({"set": {"uvs": 3}}, "scenario: scenario paper: uvs: unknown key (did you mean uavs?)"),
     ({"set": {"uavs": "many"}}, "scenario: scenario paper: uavs: "),
-    ({"set": 3}, "set: "),
-    ({"num_envs": 10**9}, "num_envs: 1000000000 is out of range; allowed: an integer 1..100,000"),
     ({"replay": 10**18}, "replay: 1000000000000000000 is out of range"),
     (
         {"hidden": [50_000, 50_000]},
         "hidden.0: 50000 is out of range; allowed: a list",
     ),
-    ({"hidden": [8] * 9}, "hidden: "),
-    ({"batch": 10**9}, "batch: "),
-    ({"updates": 10**9}, "updates: "),
-    ({"evaluation_missions": 10**9}, "evaluation_missions: "),
     ({"phases": [PHASE | {"ticks": 10**18}]}, "phases.0.ticks: 1000000000000000000 is out of "),
     ({"phases": [PHASE | {"ticks": 10**8}]}, "evaluate_every: 25 makes more than 50,000 evalu"),
     ({"phases": [PHASE | {"temperature": 1e-320}]}, "phases.0: temperature: 1e-320 is too low"),
     ({"phases": [PHASE | {"learning_rate": [1e300, 1.0]}]}, "phases.0.learning_rate.0: "),
     ({"phases": [PHASE | {"name": "a\nb"}]}, "phases.0.name: 'a\\nb' has control characters"),
     ({"discount": "0.99"}, "discount: "),
-    ({"discount": 1e-320}, "discount: "),
-    ({"reward_scale": float("inf")}, "reward_scale: "),
     ({"reward_scale": 1e-320}, "reward_scale: 1e-320 is out of range"),
     ({"gradient_norm": float("nan")}, "gradient_norm: "),
     ({"name": "\x1b[2J"}, "name: '\\x1b[2J' has control characters; allowed: printable"),
-    ({"name": ""}, "name: "),
     ({"scenario": "a\0b"}, "scenario: a"),
     ({"scenario": "/dev/zero"}, "scenario: /dev/zero: cannot be read: it is a device"),
     ({"set": {"nodes": [[[[1]]]]}}, "set: is nested too deeply; allowed: fields of the scenario"),
@@ -88,29 +67,6 @@ def test_what_is_wrong_is_named(changes: dict[str, Any], complaint: str, tmp_pat
         load_config(path)
     assert str(error.value).startswith(f"{path}: {complaint}")
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("key", ["name", "phases"])
-def test_what_is_missing_is_named(key: str) -> None:
-    with pytest.raises(InputError, match=f"^here: {key}: "):
-        config_of({k: v for k, v in TINY.items() if k != key}, "here")
-
-
-def test_a_missing_file_is_named() -> None:
-    with pytest.raises(InputError, match=r"^nope\.toml: no such config; allowed: .*a TOML file$"):
-        load_config("nope.toml")
-
-
-def test_a_file_that_is_no_config_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be read"):
-        load_config(tmp_path)
-    path = tmp_path / "bad.toml"
-    path.write_text("num_envs = [8", "utf-8")
-    with pytest.raises(InputError, match=r"bad\.toml: not valid TOML"):
-        load_config(path)
-    path.write_bytes(b"name = '\xff'")
-    with pytest.raises(InputError, match=r"bad\.toml: cannot be read"):
-        load_config(path)
 
 
 def test_a_file_holds_what_it_says(tmp_path: Path) -> None:
@@ -147,25 +103,8 @@ def test_the_shipped_policies_keep_the_identity_of_their_learner() -> None:
     assert {policies.load(name).learner for name in names} == {learner_of(load_config("ddqn"))}
 
 
-def test_as_plain_values_and_back_it_is_the_same() -> None:
-    config = tiny(discount=1 / 3, seed=7)
-    assert config_of(config.model_dump(mode="json"), "here") == config
-
-
-def test_every_setting_is_documented() -> None:
-    for name, field in TrainingConfig.model_fields.items():
-        assert field.description, name
-
-
 def test_the_shipped_configs_load() -> None:
     for name in config_names():
         config = load_config(name)
         assert config.description
         assert config.ticks > 0
-
-
-def test_the_config_of_the_how_to_page_loads(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[3] / "docs/how-to/train.md").read_text("utf-8")
-    path = tmp_path / "my-config.toml"
-    path.write_text(text.partition("```toml\n")[2].partition("```")[0], "utf-8")
-    assert load_config(path).space == load_scenario("paper", uavs=2)

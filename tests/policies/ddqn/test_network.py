@@ -1,7 +1,5 @@
 """The networks have the paper's layers, and value alike in either precision."""
 
-from itertools import pairwise
-
 import pytest
 import torch
 from torch import Tensor, nn
@@ -16,28 +14,11 @@ def _maps(rows: int) -> list[Tensor]:
     return [torch.rand(rows, *shape, generator=generator) for shape in SHAPES]
 
 
-def _parameters(network: nn.Module) -> int:
-    return sum(p.numel() for p in network.parameters())
-
-
 def _convolve(image: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
     """A convolution without padding and its ReLU, by the windows of the image."""
     windows = image.unfold(2, 5, 1).unfold(3, 5, 1)
     summed = torch.einsum("rcyxij,kcij->rkyx", windows, weight)
     return (summed + bias[:, None, None]).clamp(min=0)
-
-
-def test_the_layers_of_the_paper() -> None:
-    network = PaperNetwork(SHAPES)
-    kernels = [tuple(m.weight.shape) for m in network.modules() if isinstance(m, nn.Conv2d)]
-    assert kernels == [(16, 4, 5, 5), (16, 16, 5, 5)] * 2
-    # Two convolutions of 5 x 5 leave 9 of 17 and 13 of 21 cells.
-    flat = 16 * 9 * 9 + 16 * 13 * 13 + 1
-    dense = [tuple(m.weight.shape) for m in network.modules() if isinstance(m, nn.Linear)]
-    assert dense == [(256, flat), (256, 256), (256, 256), (5, 256)]
-    convolutions = (4 * 25 + 1) * 16 + (16 * 25 + 1) * 16
-    layers = (flat + 1) * 256 + 2 * (256 + 1) * 256 + (256 + 1) * 5
-    assert _parameters(network) == 2 * convolutions + layers
 
 
 def test_the_values_are_those_of_the_layers_in_turn() -> None:
@@ -51,14 +32,6 @@ def test_the_values_are_those_of_the_layers_in_turn() -> None:
     for weight, bias in ((w[8], w[9]), (w[10], w[11]), (w[12], w[13])):
         hidden = (hidden @ weight.T + bias).clamp(min=0)
     torch.testing.assert_close(network(local, far, own), hidden @ w[14].T + w[15])
-
-
-def test_the_dueling_layers() -> None:
-    sizes = [30, 64, 32]
-    network = DuelingNetwork(sizes[0], sizes[1:])
-    hidden = sum((inputs + 1) * outputs for inputs, outputs in pairwise(sizes))
-    assert _parameters(network) == hidden + (32 + 1) * 1 + (32 + 1) * 5
-    assert network(torch.rand(7, 30)).shape == (7, 5)
 
 
 def test_advantages_have_mean_zero() -> None:

@@ -13,12 +13,10 @@ from dess import InputError
 from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.observations.guard import guard
-from dess.observations.maps import Maps
 from dess.observations.states import Layout, layout_of
 from dess.observations.vector import Vector
-from dess.scenario import Scenario, ScenarioSpace, load_scenario
-from policies.base import Policy
-from policies.ddqn.network import DuelingNetwork, PaperNetwork
+from dess.scenario import ScenarioSpace, load_scenario
+from policies.ddqn.network import DuelingNetwork
 from policies.ddqn.policy import DDQN
 from tests.drawn import Checked, Recorder, Wanderer, replications, seeds, spaces
 
@@ -59,10 +57,6 @@ def _checked(policy: DDQN) -> Checked:
     return Checked(policy, guard if policy.guarded else lambda view: view.legal)
 
 
-def test_it_is_a_policy() -> None:
-    assert isinstance(_random(layout_of(PAPER)), Policy)
-
-
 @given(spaces(), st.booleans(), seeds, replications)
 def test_what_is_not_allowed_is_never_chosen(
     space: ScenarioSpace, guarded: bool, seed: int, replication: int
@@ -90,14 +84,6 @@ def test_both_engines_give_the_same_records(guarded: bool) -> None:
     _assert_same_records([_random(layout_of(PAPER), guarded), Wanderer()], 62, 3, 3)
 
 
-def test_both_engines_give_the_same_records_with_maps() -> None:
-    torch.manual_seed(4)
-    layout = layout_of(PAPER)
-    maps = Maps(layout)
-    network = PaperNetwork(maps.shapes)
-    _assert_same_records(_exact(DDQN("maps", maps, network, True, layout)), 63, 2, 2)
-
-
 def _path(values: list[float], slots: int) -> list[tuple[float, float]]:
     """The cells of a lone UAV that starts at (2, 2) on a grid of 4, slot by slot."""
     space = ScenarioSpace.of(
@@ -122,14 +108,6 @@ def test_rounding_decides_nothing() -> None:
     assert _path([1 - 1e-6, 1, 1 + 1e-6, 1, 1], 1) == [(2, 3)]
 
 
-def test_a_network_computes_in_the_precision_of_its_weights() -> None:
-    layout = layout_of(PAPER)
-    for network in (_random(layout).network, _random(layout).network.double()):
-        policy = DDQN("any", Vector(layout), network, True, layout)
-        assert not policy.network.training
-        simulate(PAPER, policy, 64)
-
-
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
@@ -151,14 +129,3 @@ def test_away_from_home_it_refuses(changes: dict[str, Any], problem: str) -> Non
         assert line.startswith(f"policy random weights: has learned {problem}")
         assert "; allowed: " in line
         assert "\n" not in line
-
-
-def test_among_many_missions_it_names_the_strange_one() -> None:
-    scenarios = [PAPER, load_scenario("paper", zone=[20, 2, 4, 4])]
-    with pytest.raises(InputError, match="has learned zone_x 26, not 20"):
-        simulate_batch(scenarios, _random(layout_of(PAPER)), 0, 2)
-
-
-def test_all_else_may_differ() -> None:
-    other = {"uavs": 5, "quota": 100, "initial_data": 3.0, "charge_rate": 5, "edge_snr": -20.0}
-    simulate(Scenario.of(**other), _random(layout_of(PAPER)))

@@ -65,39 +65,7 @@ def _drawn(memory: ReplayMemory, size: int, n_step: int, discount: float = 0.5) 
     return memory.sample(size, n_step, discount, np.random.default_rng(1))
 
 
-def _returns(log: Log, n_step: int, capacity: int = 100) -> dict[int, tuple[float, float, int]]:
-    """By slot: the reward, the factor and the later slot that a sample of one environment holds."""
-    batch = _drawn(log.memory(capacity), 200, n_step)
-    slots, later = (batch.state.missions[rows, SLOT] for rows in (batch.rows, batch.later))
-    values = zip(batch.reward.tolist(), batch.discount.tolist(), later.tolist(), strict=True)
-    return dict(zip(slots.tolist(), values, strict=True))
-
-
 # --- by hand, with a discount factor of 1/2 ---
-
-
-def test_the_return_sums_discounted_rewards() -> None:
-    assert _returns(_lone([1, 2, 4, 8, 16]), 3) == {
-        0: (1 + 2 / 2 + 4 / 4, 1 / 8, 3),
-        1: (2 + 4 / 2 + 8 / 4, 1 / 8, 4),
-    }
-
-
-def test_after_termination_nothing_counts() -> None:
-    # The mission ends in slot 2; slot 3 is its last row, slot 4 the first of the next mission.
-    assert _returns(_lone([1, 2, 4, 99, 8, 16, 32], terminated=2), 3) == {
-        0: (1 + 2 / 2 + 4 / 4, 0, 3),
-        1: (2 + 4 / 2, 0, 3),
-        2: (4, 0, 3),
-    }
-
-
-def test_truncation_is_no_end_of_value() -> None:
-    # The slot that was cut, 2, is left out: its state is the last one with a choice.
-    assert _returns(_lone([1, 2, 4, 99, 8, 16, 32], truncated=2), 3) == {
-        0: (1 + 2 / 2, 1 / 4, 2),
-        1: (2, 1 / 2, 2),
-    }
 
 
 def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
@@ -106,20 +74,6 @@ def test_a_memory_of_nothing_but_cut_slots_is_refused() -> None:
     log = Log(zero.astype(int), zero, cut, ~cut, cut)
     with pytest.raises(ValueError, match="has a transition"):
         _drawn(log.memory(6), 4, 2)
-
-
-def test_the_ring_keeps_the_last_slots() -> None:
-    # Of eight slots the last four are left, 4 to 7; they lie in the rows 0 to 3.
-    rewards = [1.0, 2, 4, 8, 16, 32, 64, 128]
-    assert _returns(_lone(rewards), 2, capacity=4) == {
-        4: (16 + 32 / 2, 1 / 4, 6),
-        5: (32 + 64 / 2, 1 / 4, 7),
-    }
-    # Of six slots 2 to 5 are left: the return from slot 3 goes over the edge of the ring.
-    assert _returns(_lone(rewards[:6], terminated=4), 2, capacity=4) == {
-        2: (4 + 8 / 2, 1 / 4, 4),
-        3: (8 + 16 / 2, 0, 5),
-    }
 
 
 # --- against plain Python ---
@@ -175,20 +129,6 @@ def test_all_that_can_be_drawn_is_drawn_and_right(
         assert batch.discount[row] == pytest.approx(factor)
         assert batch.state.missions[batch.later[row]].tolist() == [later, environment]
         assert batch.action[row] == log.action[slot, environment, uav]
-
-
-def test_the_draw_is_uniform() -> None:
-    rng = np.random.default_rng(3)
-    shape = (12, 3, 2)
-    acted = rng.random(shape) < 0.4
-    never = np.zeros(shape, np.bool_)
-    log = Log(np.zeros(shape), np.zeros(shape), acted, never, never)
-    batch = _drawn(log.memory(12), 20_000, 2)
-    places = np.column_stack([batch.state.missions[batch.rows], batch.uav])
-    _, counts = np.unique(places, axis=0, return_counts=True)
-    assert len(counts) == acted[:10].sum()
-    share = 1 / len(counts)
-    assert abs(counts / 20_000 - share).max() < 5 * np.sqrt(share / 20_000)
 
 
 def test_too_few_slots_are_refused() -> None:

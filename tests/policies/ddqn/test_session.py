@@ -3,33 +3,28 @@
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from filelock import FileLock
 
 import policies
 from dess import InputError
 from dess.code import memory
-from dess.scenario import load_scenario
 from policies.ddqn import session
 from policies.ddqn.checkpoint import load_training
 from policies.ddqn.config import CHECKPOINT
 from policies.ddqn.description import CONFIG, MODEL
 from policies.ddqn.learner import DivergenceError
-from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.session import CURVE, EVENTS, LOCK, SIGNALS, device_of, memory_of, size_of, train
+from policies.ddqn.session import CURVE, LOCK, SIGNALS, device_of, train
 from policies.ddqn.training import Training
 from tests.analysis.small import files_of
-from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, story_of, tiny
+from tests.policies.ddqn.tiny import CPU, PHASES, assert_same, tiny
 
 SHORT = tiny(
     phases=[phase | {"ticks": 20} for phase in PHASES], learning_starts=20, evaluate_every=8
@@ -81,25 +76,9 @@ def test_the_folder_of_a_training(whole: Training, tmp_path: Path) -> None:
     assert json.loads((out / CONFIG).read_text("utf-8"))["name"] == "tiny"
 
 
-def test_the_folder_has_a_policy_from_the_first_evaluation_on(tmp_path: Path) -> None:
-    counts = []
-    train(SHORT, tmp_path, progress=lambda *_: counts.append(len(files_of(tmp_path))))
-    assert counts == [1] * 1 + [4] * 39
-
-
-def test_the_curve_has_the_columns_of_all_its_rows(tmp_path: Path) -> None:
-    # At first no mission has ended: the first rows say nothing of the missions of training.
-    config = tiny(low_battery_starts=0.0)
-    training = train(config, tmp_path)
-    first, last = training.curve[0], training.curve[-1]
-    assert set(first) < set().union(*training.curve)
-    table = pq.read_table(tmp_path / CURVE)
-    assert set(table.column_names) == set().union(*training.curve)
-    assert table["tick"].to_pylist()[-1] == last["tick"]
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-@pytest.mark.parametrize("tick", [5, 20, 33])
+@pytest.mark.parametrize(
+    ("number", "tick"), [(signal.SIGINT, 5), (signal.SIGTERM, 20), (signal.SIGHUP, 33)]
+)
 def test_a_signal_ends_it_after_the_tick_and_it_can_go_on(
     number: signal.Signals, tick: int, whole: Training, tmp_path: Path
 ) -> None:
@@ -133,13 +112,6 @@ def test_a_training_that_was_interrupted_is_a_policy_that_says_so(
     caplog.clear()
     policies.load(tmp_path)
     assert not caplog.records
-
-
-def test_a_training_without_weights_is_no_policy(tmp_path: Path) -> None:
-    train(SHORT, tmp_path)
-    (tmp_path / CONFIG).unlink()
-    with pytest.raises(InputError, match="is a training that has no weights yet; allowed: after"):
-        policies.load(tmp_path)
 
 
 def test_the_second_signal_ends_it_at_once(whole: Training, tmp_path: Path) -> None:
@@ -184,25 +156,6 @@ def test_it_is_saved_every_now_and_then(
         assert_same(train(SHORT, path, resume=True), whole)
 
 
-def test_what_is_done_stays_as_it_is(tmp_path: Path) -> None:
-    done = train(SHORT, tmp_path)
-    before = files_of(tmp_path)
-    again = train(SHORT, tmp_path, resume=True)
-    assert_same(again, done)
-    assert again.seconds == done.seconds
-    assert files_of(tmp_path) == before
-
-
-def test_a_signal_that_is_ignored_stays_ignored(tmp_path: Path) -> None:
-    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as nohup does
-    try:
-        stop = _at(3, lambda: signal.raise_signal(signal.SIGHUP))
-        assert train(SHORT, tmp_path, progress=stop).done
-        assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGHUP, before)
-
-
 def _refusal(out: Path, **arguments: Any) -> str:
     """The line with which a folder is refused; it stays as it is."""
     before = files_of(out.parent)
@@ -236,17 +189,6 @@ def test_a_folder_of_something_else_is_refused(name: str, tmp_path: Path) -> Non
     assert _refusal(out) == line
 
 
-def test_what_a_killed_run_leaves_is_no_obstacle_and_is_removed(
-    whole: Training, tmp_path: Path
-) -> None:
-    with subprocess.Popen([sys.executable, "-c", ""]) as ended:
-        left = tmp_path / f".dess-{ended.pid}-0a1b2c3d.tmp"
-    left.touch()
-    (tmp_path / ".lock").touch()
-    assert_same(train(SHORT, tmp_path), whole)
-    assert not left.exists()
-
-
 def test_one_folder_has_one_training_at_a_time(tmp_path: Path) -> None:
     lines = []
     line = f"{tmp_path}: in use by another training; allowed: another --out, or wait for its end"
@@ -261,23 +203,6 @@ def test_one_folder_has_one_training_at_a_time(tmp_path: Path) -> None:
     train(SHORT, tmp_path, progress=_at(9, intrude))
     assert lines == [line]
     train(SHORT, tmp_path, resume=True)  # the first one has released the folder
-
-
-def test_the_folder_is_released_at_every_end(tmp_path: Path) -> None:
-    def fail() -> None:
-        raise RuntimeError("the power failed")
-
-    with pytest.raises(RuntimeError):
-        train(SHORT, tmp_path / "failed", progress=_at(3, fail))
-    stop = _at(3, lambda: signal.raise_signal(signal.SIGTERM))
-    train(SHORT, tmp_path / "stopped", progress=stop)
-    (tmp_path / "damaged").mkdir()
-    (tmp_path / "damaged" / CHECKPOINT).touch()
-    with pytest.raises(InputError, match="damaged: .*; allowed: a safetensors file"):
-        train(SHORT, tmp_path / "damaged", resume=True)
-    for name in ("failed", "stopped", "damaged"):
-        with FileLock(tmp_path / name / LOCK, timeout=0):
-            pass
 
 
 class _Killed(BaseException):
@@ -358,38 +283,6 @@ def test_what_takes_more_memory_than_is_available_has_to_be_accepted(
     train(SHORT, out, accept_size=True)
 
 
-def test_the_estimate_of_the_memory_grows_with_what_takes_it() -> None:
-    least = size_of(tiny())
-    assert least > memory_of(tiny())
-    large = {
-        "hidden": [4096, 4096],
-        "num_envs": 1000,
-        "replay": 10**5,
-        "batch": 10**5,
-        "evaluation_missions": 10**5,
-        "updates": 100,
-        "observation": "maps",
-    }
-    for name, value in large.items():
-        assert size_of(tiny(**{name: value})) > 2 * least, name
-    # Six copies of the weights in a checkpoint, twice while it is written, and the gradient.
-    assert size_of(tiny(hidden=[4096] * 8)) > 13 * 4 * 7 * 4096**2
-
-
-def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    for out in (tmp_path / "file", tmp_path / "file" / "out"):
-        line = _refusal(out)
-        assert line.startswith(f"{out}: cannot be written: ")
-        assert "allowed" in line
-
-
-def test_devices() -> None:
-    assert device_of("cpu") == CPU
-    with pytest.raises(InputError, match="device: 'tpu' is unknown; allowed: auto, cpu, cuda"):
-        device_of("tpu")
-
-
 def test_without_cuda_there_is_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
     assert device_of("auto") == CPU
@@ -398,49 +291,3 @@ def test_without_cuda_there_is_the_cpu(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     assert device_of("auto").type == device_of("cuda").type == "cuda"
     assert device_of("cpu") == CPU
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs CUDA")
-def test_on_cuda_it_goes_on_as_well(tmp_path: Path) -> None:
-    stop = _at(13, lambda: signal.raise_signal(signal.SIGINT))
-    training = train(SHORT, tmp_path, device="cuda", progress=stop)
-    assert training.tick == 13
-    resumed = train(SHORT, tmp_path, device="cuda", resume=True)
-    assert resumed.done
-    assert next(resumed.learner.online.parameters()).is_cuda
-    undisturbed = train(SHORT, tmp_path / "undisturbed", device="cuda")
-    for row, other in zip(story_of(resumed), story_of(undisturbed), strict=True):
-        assert row["loss"] == pytest.approx(other["loss"], rel=0.05)
-
-
-def test_the_memory_that_it_takes_is_known_before() -> None:
-    training = Training(SHORT, CPU)
-    arrays = training.replay.arrays.values()
-    assert memory_of(SHORT) == sum(array.nbytes for array in arrays)
-    paper = load_scenario("paper")
-    assert memory_of(SHORT) == ReplayMemory.bytes_for(80, 8, paper.uavs[1], len(paper.nodes))
-
-
-def test_tensorboard_shows_the_curve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("tensorboard")
-    from tensorboard.backend.event_processing import (  # type: ignore[import-untyped]
-        event_accumulator,
-    )
-
-    monkeypatch.delitem(sys.modules, "torch.utils.tensorboard")
-    stop = _at(20, lambda: os.kill(os.getpid(), signal.SIGINT))
-    train(SHORT, tmp_path, progress=stop)
-    training = train(SHORT, tmp_path, resume=True)
-    shown = event_accumulator.EventAccumulator(str(tmp_path / EVENTS)).Reload()
-    tags = {
-        "evaluation/collection_ratio_and_communication": (
-            "evaluation_collection_ratio_and_communication"
-        ),
-        "losses/loss": "loss",
-        "charts/epsilon": "epsilon",
-    }
-    for tag, column in tags.items():
-        points = shown.Scalars(tag)
-        assert [point.step for point in points] == [row["tick"] for row in training.curve]
-        values = [row[column] for row in training.curve]
-        assert np.allclose([point.value for point in points], values)

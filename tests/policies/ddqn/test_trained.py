@@ -16,12 +16,11 @@ from safetensors.torch import load_file, save_file
 
 from dess import InputError
 from dess.batch import simulate_batch
-from dess.scenario import load_scenario
 from policies.ddqn import trained
 from policies.ddqn.description import CONFIG, MODEL
 from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training
-from tests.analysis.small import files_of, write_scenario
+from tests.analysis.small import files_of
 from tests.policies.ddqn.tiny import CPU, PHASES, tiny
 
 
@@ -92,25 +91,6 @@ def test_a_policy_comes_back_as_it_was(changes: dict[str, Any], tmp_path: Path) 
     assert flights[0].uavs.tobytes() == flights[1].uavs.tobytes()
 
 
-def test_weights_have_a_hash(training: Training, folder: Path) -> None:
-    weights = {name: value.clone() for name, value in training.learner.online.state_dict().items()}
-    first = load_policy(folder).weights
-    assert len(bytes.fromhex(first)) == 32
-    save_policy(folder, weights, training.config, training.space)
-    assert load_policy(folder).weights == first
-    weights["value.bias"] += 1e-3
-    save_policy(folder, weights, training.config, training.space)
-    assert load_policy(folder).weights != first
-
-
-def test_a_policy_needs_no_scenario_file(tmp_path: Path) -> None:
-    scenario = write_scenario(tmp_path)
-    training = Training(tiny(scenario=str(scenario)), CPU)
-    save_policy(tmp_path / "policy", training.best, training.config, training.space)
-    scenario.unlink()
-    assert load_policy(tmp_path / "policy").layout.grid == 8
-
-
 def _shape(tensors: dict[str, torch.Tensor]) -> None:
     tensors["value.bias"] = torch.zeros(2)
 
@@ -146,37 +126,6 @@ def test_other_weights_are_refused(
         load_policy(folder)
 
 
-def test_the_weights_of_another_config_are_refused(training: Training, folder: Path) -> None:
-    other = Training(tiny(hidden=[16, 8]), CPU)
-    weights = folder / MODEL
-    kept = weights.read_bytes()
-    save_policy(folder, other.best, other.config, other.space)
-    weights.write_bytes(kept)
-    _described(folder, model_sha256=[hashlib.sha256(kept).hexdigest()])
-    assert _refusal(folder).startswith(f"{weights}: ")
-
-
-@pytest.mark.parametrize("content", [b"", b"{}", b"PK\x03\x04" + bytes(100), bytes(100)])
-def test_a_foreign_file_is_refused(content: bytes, folder: Path) -> None:
-    _described(folder, model_sha256=None)
-    (folder / MODEL).write_bytes(content)
-    assert _refusal(folder).startswith(f"{folder / MODEL}: damaged: ")
-
-
-@pytest.mark.parametrize("share", [0.01, 0.5, 0.999])
-def test_a_truncated_file_is_refused(share: float, folder: Path) -> None:
-    content = (folder / MODEL).read_bytes()
-    _described(folder, model_sha256=None)
-    (folder / MODEL).write_bytes(content[: int(share * len(content))])
-    assert _refusal(folder).startswith(f"{folder / MODEL}: damaged: ")
-
-
-@pytest.mark.parametrize("name", [CONFIG, MODEL])
-def test_a_missing_file_is_named(name: str, folder: Path) -> None:
-    (folder / name).unlink()
-    assert _refusal(folder).startswith(f"{folder / name}: ")
-
-
 CONTENTS: dict[str, str] = {
     "{": "not valid JSON: ",
     "[" * 100_000: "not valid JSON: it is nested too deeply",
@@ -202,15 +151,10 @@ def test_a_damaged_description_is_refused(content: str, folder: Path) -> None:
 WRONG: list[tuple[list[str], Any, str]] = [
     (["layout", "grid"], "wide", "layout.grid: "),
     (["layout", "grid"], 10**9, "grid: 1000000000 is out of range"),
-    (["layout", "grid"], 10**4000, "layout.grid: "),
     (["layout", "grid"], 16, "zone: [26, 2, 4, 4] does not lie on the 16 x 16 grid"),
-    (["layout", "zone"], [26, 2, 4], "layout.zone"),
     (["layout", "nodes"], [[1, 2, 3]], "layout.nodes"),
-    (["layout", "nodes"], "none", "layout.nodes"),
     (["layout", "nodes"], [[1, 1]] * 10_000, "layout.nodes"),
-    (["layout", "nodes"], [[-1, 1]], "layout.nodes"),
     (["layout", "uavs"], 3, "layout.uavs: unknown key"),
-    (["layout", "nodez"], [], "layout.nodez: unknown key"),
     (["layout"], [], "layout: "),
     (["training", "hidden"], "wide", "hidden: "),
     (
@@ -219,15 +163,11 @@ WRONG: list[tuple[list[str], Any, str]] = [
         "training.hidden.0: 50000 is out of range",
     ),
     (["training", "speed"], 3, "speed: unknown key"),
-    (["training", "observation"], "radar", "observation: "),
     (["training", "discount"], "0.99", "training.discount: "),
-    (["training", "set"], 3, "training.set: "),
     (["name"], "a\nb\x1b[2J", "has control characters; allowed: printable characters"),
-    (["training", "name"], "\u202etxt", "has control characters"),
     (["name"], "x" * 10_000, "name: "),
     (["observation_version"], 2, "observation version 2; allowed: 1"),
     (["run", "ticks"], "many", "run.ticks: 'many' is not an integer"),
-    (["run", "ticks"], -5, "run.ticks: "),
     (["run", "seconds"], float("inf"), "run.seconds: "),
     (["model_sha256"], "0" * 64, "model_sha256: "),
     (["model_sha256"], ["0" * 64], "damaged: it has not the checksum in config.json"),
@@ -355,13 +295,3 @@ def test_a_policy_that_is_replaced_while_it_is_read_is_read_again(
     old = load_policy(folder).weights
     monkeypatch.setattr(trained, "read_description", late)
     assert load_policy(folder).weights != old
-
-
-def test_the_layout_is_that_of_the_scenario(training: Training, folder: Path) -> None:
-    paper = load_scenario("paper")
-    layout = json.loads((folder / CONFIG).read_text("utf-8"))["layout"]
-    assert layout == {
-        "grid": paper.grid,
-        "zone": list(paper.zone),
-        "nodes": [list(node) for node in paper.nodes],
-    }

@@ -118,22 +118,6 @@ def test_a_search_in_pieces_is_the_whole_search() -> None:
     assert found[0] == found[1] == found[2]
 
 
-def test_a_resumed_flight_is_the_whole_flight() -> None:
-    view = _view(load_scenario("paper", uavs=2), 777001)
-    (mission,), uavs, residual = view.state.missions, view.state.uavs[0], view.state.residual[0]
-    rates, whole = rates_of(view), empty_flight(500, 2, len(residual))
-    again = empty_flight(500, 2, len(residual))
-    plan = _plan(2, [(23, 6, 1), (18, 6, 2), (26, 5, CHARGE), (23, 11, 0)], [(27, 5, CHARGE)])
-    begin(mission, uavs, residual, rates, whole)
-    value = fly(mission, rates, plan, whole, 0, whole, 500)
-    begun = plan.waypoints["begun"].copy()
-    for first in range(whole.last[0]):
-        assert fly(mission, rates, plan, whole, first, again, 500) == value
-        assert (plan.waypoints["begun"] == begun).all()
-        assert (again.last == whole.last).all()
-    assert 0 == begun[0, 0] < begun[0, 1] < begun[0, 2] < begun[0, 3] < NEVER
-
-
 # --- hand-worked: a lone UAV at a single node ---
 
 ALONE = {
@@ -170,24 +154,3 @@ def test_a_uav_charges_at_its_waypoint_once_its_latch_is_set() -> None:
     # 20 slots until C_S = 10, five slots to C_C = 60, and then two cells to the east.
     assert batteries == [*range(30, 9, -1), 20, 30, 40, 50, 60, 59, 58, 57]
     assert [int(craft["x"][0]) for craft in crafts[-4:]] == [2, 3, 4, 4]
-
-
-def test_a_teammate_in_the_way_costs_something() -> None:
-    scenario = Scenario.of(**(ALONE | {"zone": [2, 2, 2, 1], "uavs": 2}), **CALM)
-    view = _view(scenario)
-    cells = [(int(u["x"]), int(u["y"])) for u in view.state.uavs[0]]
-    into = _plan(2, [], [(*cells[0], 0)])  # the second flies to the cell of the first
-    apart = _plan(2, [], [])
-    blocked, free = (_flown(view, plan, 3) for plan in (into, apart))
-    assert [tuple(map(tuple, craft[["x", "y"]].tolist())) for craft in blocked[0]] == [
-        tuple(cells)
-    ] * 4
-    assert blocked[1] < free[1]
-
-
-def test_a_depleted_battery_costs_more_than_all_data() -> None:
-    scenario = Scenario.of(**(ALONE | {"quota": 200}), shadowing_variance=0.0, arrival_rate=0.2)
-    away, home = _plan(1, [(6, 6, 90)]), _plan(1, [(2, 2, CHARGE)])
-    view = _view(scenario)
-    values = [_flown(view, plan, 200)[1] for plan in (away, home)]
-    assert values[0] < -100 < 0 < values[1]

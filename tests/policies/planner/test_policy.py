@@ -9,14 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import policies
-from dess import Scenario, load_scenario, simulate, simulate_batch, vector_env
+from dess import load_scenario, simulate, simulate_batch
 from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace
-from dess.state import TRUNCATED
 from dess.view import View
-from policies.planner import LongPlanner, Planner, plan_of
+from policies.planner import Planner, plan_of
 from policies.planner import policy as module
-from policies.planner.policy import _MEMORIES, Budget, memory_of
+from policies.planner.policy import _MEMORIES, Budget
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 
 
@@ -101,42 +100,12 @@ def test_missions_of_the_same_coordinates_do_not_meet() -> None:
     assert [simulate(space, QUICK, 3, 1).metrics for space in (one, other)] == alone
 
 
-def test_an_environment_flies_the_missions_of_the_engines() -> None:
-    space = load_scenario("paper", uavs=2, quota=60)
-    env = vector_env(space, num_envs=2, seed=4)
-    env.reset(seed=4)
-    done, collected = np.zeros(2, bool), np.zeros(2)
-    while not done.all():
-        view = env.view()
-        actions = np.full(env.num_envs, 4)
-        actions[view.mission * 2 + view.uav] = QUICK.act(view)
-        _, _, terminated, truncated, info = env.step(actions)
-        collected += ~done * info["team_collected"].reshape(2, -1)[:, 0]
-        done |= (terminated | truncated).reshape(2, -1).all(1)
-    expected = simulate_batch(space, QUICK, 4, 2).missions["collected"]
-    assert collected == pytest.approx(expected, rel=1e-12)
-
-
 def test_plans_go_with_the_missions_that_they_belong_to() -> None:
     gc.collect()
     before = len(_MEMORIES)
     simulate_batch(load_scenario("paper", uavs=1, quota=20), QUICK, 1, 3, batch_size=2)
     gc.collect()
     assert len(_MEMORIES) == before
-
-
-def test_plans_of_two_budgets_are_apart() -> None:
-    seen = []
-
-    class Both(Quick):
-        def act(self, view: View) -> np.ndarray:
-            seen.append(memory_of(view.state, self.budget))
-            seen.append(memory_of(view.state, LongPlanner.budget))
-            return super().act(view)
-
-    simulate(load_scenario("paper", uavs=1, quota=8), Both(), 1)
-    assert seen[0] is seen[2] and seen[0] is not seen[1]
-    assert seen[0].made.any() and not seen[1].made.any()
 
 
 # --- how good it is ---
@@ -158,31 +127,6 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
         assert missions["success"].all()
     assert (products["better"] - products["quick"]).mean() > 0.02
     assert (products["better"] - products["greedy"]).mean() > 0.02
-
-
-@pytest.mark.parametrize(
-    "sea",
-    [
-        {"grid": 20, "zone": [18, 18, 2, 2], "nodes": [[1, 1], [19, 3], [10, 10]], "uavs": 4},
-        {"grid": 16, "zone": [7, 7, 3, 2], "nodes": [[8, 7], [2, 2], [14, 14]], "uavs": 6},
-        {"grid": 8, "zone": [3, 3, 2, 1], "nodes": [[3, 3], [4, 3]], "uavs": 1},
-    ],
-)
-def test_it_succeeds_on_other_seas(sea: dict[str, Any]) -> None:
-    """Where next to no data are left, the guard lets a UAV of a team fail now and then."""
-    scenario = Scenario.of(**sea, arrival_rate=0.2, quota=200, flying_time=60)
-    missions = simulate_batch(scenario, QUICK, 777001, 20).missions
-    assert missions["success"].mean() >= 0.9
-    assert missions["collection_ratio"].mean() > 0.9
-
-
-def test_a_lone_uav_charges_again_and_again_where_no_data_are_left() -> None:
-    """Its quota cannot be filled, and its battery is never empty."""
-    sea = {"grid": 8, "zone": [3, 3, 2, 1], "nodes": [[3, 3], [6, 6]], "arrival_rate": 0.0}
-    scenario = Scenario.of(**sea, uavs=1, quota=2000, flying_time=60, max_slots=300)
-    records = simulate_batch(scenario, QUICK, 777001, 5)
-    assert (records.uavs["end"] == TRUNCATED).all()
-    assert (records.uavs["slots_charging"] > 10).all()
 
 
 # --- drawing ---

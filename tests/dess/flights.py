@@ -1,0 +1,55 @@
+"""Missions that are flown by a script on both engines, and what their logs say."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dess.batch import simulate_batch
+from dess.mission import simulate
+from dess.record import MissionRecord
+from dess.scenario import Scenario, ScenarioSpace
+from tests.drawn import Script
+
+Log = dict[str, np.ndarray]
+
+# The channel of the missions that are worked by hand: see test_missions.py.
+CHANNEL: dict[str, Any] = {
+    **{"grid": 4, "cell_size": 40.0, "altitude": 10.0, "path_loss_exponent": 2.0},
+    **{"edge_snr": 10 * math.log10(1.9921875), "shadowing_variance": 0.0},
+    **{"arrival_rate": 0.0, "communication_slots": 1},
+}
+
+
+def flown(
+    scenario: Scenario | ScenarioSpace, *routes: str, starts: Any = None
+) -> tuple[MissionRecord, Log]:
+    """The mission and its log; of the first replication in which UAV i starts at ``starts[i]``.
+
+    Both engines must agree on it.
+    """
+    for replication in range(1000):
+        record = simulate(scenario, Script(*routes), 0, replication, events=True)
+        assert record.events is not None
+        log = record.events.columns()
+        begins = (log["event"] == "mission_start") & (log["uav"] >= 0)
+        if starts in (None, list(zip(log["x"][begins], log["y"][begins], strict=True))):
+            batch = simulate_batch(scenario, Script(*routes), 0, [replication])
+            assert batch.missions[0].tobytes() == record.metrics.tobytes()
+            assert batch.uavs[0].tobytes() == record.uavs.tobytes()
+            if record.operations is not None:
+                assert batch.operations[0].tobytes() == record.operations.tobytes()
+            return record, log
+    raise AssertionError(f"no replication starts at {starts}")
+
+
+def rows_of(log: Log, event: str, *names: str) -> list:
+    """The columns of the rows of an event; plain values where there is one column."""
+    chosen = log["event"] == event
+    columns = [log[name][chosen].tolist() for name in names]
+    return columns[0] if len(names) == 1 else list(zip(*columns, strict=True))
+
+
+def batteries(log: Log, uav: int = 0) -> list[float]:
+    """The battery of a UAV at the end of every slot in which it was active."""
+    return [battery for i, battery in rows_of(log, "move", "uav", "value") if i == uav]
