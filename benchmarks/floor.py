@@ -12,7 +12,7 @@ from dess import channel, rules, streams
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
 from dess.scenario import ScenarioSpace
-from dess.state import constants_of, empty_state, ranges_of, types_of
+from dess.state import starts_of, state_of
 
 
 def needed_draws(
@@ -26,16 +26,12 @@ def needed_draws(
         seed: Their seed.
         missions: Replications 0, 1, ....
     """
-    state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
+    state = state_of([scenario], 1)
     blocks = deviates = 0
     for replication in range(missions):
-        state.missions[:] = constants_of(scenario)
-        state.missions["seed"], state.missions["replication"] = seed, replication
+        rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
         mission, uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
         sensors, teeth = state.sensors[0], state.teeth[0]
-        rules.launch(
-            mission, ranges_of(scenario), types_of(scenario), uavs, residual, sensors, teeth
-        )
         scratch = empty_scratch(len(uavs), len(residual))
         counts = _count(
             mission, uavs, residual, sensors, teeth, actions[replication],

@@ -13,8 +13,6 @@ Names are imported on first use, so that ``import dess`` is fast.
 from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
-from dess.env.registration import register
-
 if TYPE_CHECKING:  # for editors and mypy; a test compares it with _HOME
     from dess.batch import simulate_batch as simulate_batch
     from dess.env.parallel import parallel_env as parallel_env
@@ -39,8 +37,6 @@ _HOME = {
 }
 
 __all__ = ["__version__", *_HOME]
-
-register()  # the environment of ``gymnasium.make_vec``
 
 
 def __getattr__(name: str) -> Any:

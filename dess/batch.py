@@ -10,7 +10,7 @@ order of the missions nor on how they are divided into batches.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from ctypes import c_ulong, py_object, pythonapi
 from itertools import groupby
 from threading import Lock, get_ident
@@ -24,15 +24,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_record
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import (
-    check_seed,
-    constants_of,
-    empty_state,
-    ranges_of,
-    spaces_of,
-    teeth_lengths,
-    types_of,
-)
+from dess.state import check_seed, spaces_of, starts_of, state_of, teeth_lengths
 from dess.view import decide, team_of
 
 # Enough missions that the time spent in Python is a small part, few enough for the CPU's cache.
@@ -160,7 +152,7 @@ def _run_in_threads(workers: int, run: Callable[..., None], tasks: Iterable[tupl
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for future in [pool.submit(watched, task) for task in tasks]:
+            for future in as_completed([pool.submit(watched, task) for task in tasks]):
                 future.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
@@ -189,22 +181,17 @@ class _Batch:
 
     def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, batch_size: int):
         self.world, self.team, self.batch_size = world_of(spaces[0]), team, batch_size
-        self.constants = np.concatenate([constants_of(space) for space in spaces])
-        self.constants["seed"] = seed
-        self.ranges = np.stack([ranges_of(space) for space in spaces])
-        self.uavs, self.lengths = int(self.ranges[:, 0, 1].max()), teeth_lengths(spaces)
-        self.types = np.stack([types_of(space, self.uavs) for space in spaces])
+        self.spaces, self.starts = spaces, starts_of(spaces, seed)
         self.work = max(map(work_of, spaces))
 
     def run(self, jobs, which, numbers, records, progress) -> None:
         """Simulate the missions ``jobs`` and write their records."""
         size = min(self.batch_size, len(jobs), max(MOST_WORK // self.work, 1))
-        nodes = len(self.world.nodes)
-        state = empty_state(size, self.uavs, nodes, self.lengths, self.constants.dtype)
-        scratch = empty_scratch(self.uavs, nodes)
+        state = state_of(self.spaces, size)
+        scratch = empty_scratch(state.uavs.shape[1], len(self.world.nodes))
         job_of = np.full(size, -1)
         queue = np.array([0, 0])  # next job, jobs done
-        source = (self.constants, self.ranges, self.types, which, numbers, jobs)
+        source = (self.starts, which, numbers, jobs)
         for b in range(size):
             _next_mission(b, job_of, queue, source, state)
         # Reporting holds Python's global lock, so about a hundred reports are made in all.
@@ -220,21 +207,15 @@ class _Batch:
 @kernel
 def _next_mission(b, job_of, queue, source, state):
     """Start the next job in place ``b``; if no job is left, the place stays empty."""
-    constants, ranges, types, which, numbers, jobs = source
-    mission = state.missions[b]
+    starts, which, numbers, jobs = source
     if queue[0] == len(jobs):
         job_of[b] = -1
-        mission.active = 0
+        state.missions[b].active = 0
         return
     job = jobs[queue[0]]
     queue[0] += 1
     job_of[b] = job
-    state.missions[b] = constants[which[job]]
-    mission.replication = numbers[job]
-    rules.launch(
-        mission, ranges[which[job]], types[which[job]],
-        state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
-    )  # fmt: skip
+    rules.launch(state, b, starts, which[job], numbers[job])
 
 
 @kernel

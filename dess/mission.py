@@ -33,33 +33,14 @@ import simpy
 from dess import channel, rules
 from dess.channel import empty_scratch, world_of
 from dess.code.kernels import kernel
-from dess.record import (
-    PARAMETER_EVENTS,
-    EventLog,
-    MissionRecord,
-    empty_records,
-    write_records,
-)
+from dess.record import PARAMETER_EVENTS, EventLog, MissionRecord, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
 from dess.sections import fleet
 from dess.sections.failure_log import log_failures
 from dess.sections.failures import strike
-from dess.sections.packets import Packets, deliver
+from dess.sections.packets import Packets
 from dess.sections.zone import ChargingZone
-from dess.state import (
-    BATTERY,
-    LOST,
-    QUOTA,
-    UAV,
-    State,
-    check_seed,
-    constants_of,
-    empty_state,
-    ranges_of,
-    spaces_of,
-    teeth_lengths,
-    types_of,
-)
+from dess.state import BATTERY, LOST, QUOTA, UAV, State, check_seed, spaces_of, starts_of, state_of
 from dess.view import decide, team_of
 
 _NOBODY = np.zeros(0, np.int64)
@@ -111,20 +92,13 @@ class MissionModel:
     ):
         self.is_extended = scenario.is_extended
         self.team, self.log, self.world = team, log, world_of(scenario)
-        constants, lengths = constants_of(scenario), teeth_lengths([scenario])
-        self.state = empty_state(1, scenario.uavs[1], len(scenario.nodes), lengths, constants.dtype)
+        self.state = state_of([scenario], 1)
         self.scratch = empty_scratch(scenario.uavs[1], len(scenario.nodes))
         self.arrivals = np.zeros(len(scenario.nodes), np.int64)
-        self.state.missions[:] = constants
-        self.state.missions["seed"] = seed
-        self.state.missions["replication"] = replication
+        rules.launch(self.state, 0, starts_of([scenario], seed), 0, replication)
         self.mission = self.state.missions[0]
         self.uavs, self.residual = self.state.uavs[0], self.state.residual[0]
         self.sensors, self.teeth = self.state.sensors[0], self.state.teeth[0]
-        rules.launch(
-            self.mission, ranges_of(scenario), types_of(scenario),
-            self.uavs, self.residual, self.sensors, self.teeth,
-        )  # fmt: skip
         self.packets = Packets(scenario, self.state, log) if scenario.needs_events else None
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
@@ -164,13 +138,10 @@ class MissionModel:
             self._log_moves(slot)
             for n in range(1, m + 1):
                 yield env.timeout(slot + n / m - env.now)
-                if packets is None:
-                    _communicate(*arrays, n)
-                else:
-                    _communicate_packets(*arrays, n, *packets.buffers.arrays)
+                _communicate(*arrays, n)
                 self._log_communications(slot, n, m)
                 if packets is not None:
-                    packets.log_deliveries()
+                    packets.deliver(n)
             before = self._team() if self.log is not None else []
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1
@@ -246,8 +217,8 @@ class MissionModel:
         for i, u in enumerate(self._team()):
             self._log_uav(event, time, i, u, u.battery)
         for k, (x, y) in enumerate(self.world.nodes):
-            packet = self.packets.oldest(k) if is_start and self.packets is not None else -1
-            born = 0.0 if packet >= 0 else nan
+            waiting = self.packets.buffers.queues[k] if is_start and self.packets else ()
+            packet, born = (waiting[0], 0.0) if waiting else (-1, nan)
             self.log.add(
                 float(time), event, -1, k, self.residual[k], x, y, packet=packet, generated=born
             )
@@ -324,20 +295,6 @@ def _communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
         order, means, batches, search, n,
     )  # fmt: skip
-
-
-@kernel
-def _communicate_packets(
-    missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n,
-    packets, queues, delivered, counts, newest_first,
-):  # fmt: skip
-    if n == 1:
-        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, search)
-    rules.communicate(
-        missions[0], uavs[0], residual[0], sensors[0], teeth[0],
-        order, means, batches, search, n,
-    )  # fmt: skip
-    deliver(missions, uavs, residual, sensors, n, packets, queues, delivered, counts, newest_first)
 
 
 @kernel

@@ -13,41 +13,25 @@ from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
 from dess.sections.section import extension
-from dess.state import END_NAMES, QUOTA
+from dess.state import END_NAMES, QUOTA, fields
 
 # One mission. Data are in data units; rewards are summed over the slots and the UAVs (eq. 14).
 MISSION_RECORD = np.dtype(
     [
         ("seed", np.uint64),
-        ("replication", np.int64),
-        ("uavs", np.int64),
-        ("flying_time", np.int64),
-        ("charge_start", np.int64),
-        ("charge_complete", np.int64),
-        ("slots", np.int64),
-        ("uav_slots", np.int64),
-        ("success", np.int64),
-        ("collection_ratio", np.float64),
-        ("collection_ratio_and_communication", np.float64),
-        ("initial", np.float64),
-        ("arrived", np.float64),
-        ("collected", np.float64),
-        ("residual", np.float64),
-        ("reward", np.float64),
+        *fields(np.int64, "replication uavs flying_time charge_start charge_complete"),
+        *fields(np.int64, "slots uav_slots success"),
+        *fields(np.float64, "collection_ratio collection_ratio_and_communication"),
+        *fields(np.float64, "initial arrived collected residual reward"),
     ]
 )
 
-# One UAV of a mission. Where a mission has fewer UAVs than the array, the other rows have end 0.
+# One UAV of a mission; ``quota`` are the communications counted toward it. Where a mission has
+# fewer UAVs than the array, the other rows have end 0.
 UAV_RECORD = np.dtype(
     [
-        ("quota", np.int64),  # communications counted toward the quota
-        ("battery", np.int64),
-        ("slots_flying", np.int64),
-        ("slots_charging", np.int64),
-        ("slots_waiting", np.int64),
-        ("end", np.int64),
-        ("collected", np.float64),
-        ("reward", np.float64),
+        *fields(np.int64, "quota battery slots_flying slots_charging slots_waiting end"),
+        *fields(np.float64, "collected reward"),
     ]
 )
 
@@ -89,25 +73,30 @@ def measures_of(space: Constants) -> list[str]:
     return [name for names, is_measured in measured.items() if is_measured for name in names]
 
 
+class Event(NamedTuple):
+    """A row of the event log; ``docs/concepts/model.md`` says what its columns mean."""
+
+    time: float
+    event: str
+    uav: int
+    node: int
+    value: float
+    x: float = -1.0
+    y: float = -1.0
+    battery: int = -1
+    other: int = -1
+    snr: float = nan
+    packet: int = -1
+    generated: float = nan
+
+
 # Columns of the event log, and the types of their arrays.
-EVENT_COLUMNS = {
-    "time": np.float64,
-    "event": object,
-    "uav": np.int64,
-    "node": np.int64,
-    "value": np.float64,
-    "x": np.float64,
-    "y": np.float64,
-    "battery": np.int64,
-    "other": np.int64,
-    "snr": np.float64,
-    "packet": np.int64,
-    "generated": np.float64,
-}
-FAILURE_EVENTS = (
-    *("uav_failure", "uav_repair", "pad_failure", "pad_repair", "node_failure", "node_repair"),
-    "data_lost",
+_TYPES = {float: np.float64, int: np.int64, str: object}
+EVENT_COLUMNS = {name: _TYPES[kind] for name, kind in Event.__annotations__.items()}
+FAILURE_EVENTS = tuple(
+    f"{thing}_{event}" for thing in ("uav", "pad", "node") for event in ("failure", "repair")
 )
+FAILURE_EVENTS += ("data_lost",)
 # Parameters of the mission, a row each.
 PARAMETER_EVENTS = tuple(
     f"mission_{name}"
@@ -116,21 +105,10 @@ PARAMETER_EVENTS = tuple(
 # What becomes of packets in continuous time, besides ``arrival``.
 PACKET_EVENTS = ("delivery", "loss")
 EVENT_NAMES = (
-    "mission_start",
-    *PARAMETER_EVENTS,
-    "move",
-    "collision",
-    "charge_request",
-    "charge_start",
-    "charge_end",
-    "charge_withdrawal",
-    "communication",
-    "arrival",
-    "quota_filled",
-    "battery_empty",
-    *FAILURE_EVENTS,
-    *PACKET_EVENTS,
-    "mission_end",
+    *("mission_start", *PARAMETER_EVENTS, "move", "collision"),
+    *("charge_request", "charge_start", "charge_end", "charge_withdrawal"),
+    *("communication", "arrival", "quota_filled", "battery_empty"),
+    *(*FAILURE_EVENTS, *PACKET_EVENTS, "mission_end"),
 )
 
 
@@ -222,30 +200,14 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Record
 class EventLog:
     """The events of one mission, in the order in which they happened.
 
-    Every column is also an attribute, as in ``log.time``. The page ``docs/concepts/model.md`` says
-    what the columns and events mean.
+    Every column is also an attribute, as in ``log.time``.
     """
 
-    rows: list[tuple] = field(default_factory=list)
+    rows: list[Event] = field(default_factory=list)
 
-    def add(
-        self,
-        time: float,
-        event: str,
-        uav: int,
-        node: int,
-        value: float,
-        x: float = -1.0,
-        y: float = -1.0,
-        battery: int = -1,
-        other: int = -1,
-        snr: float = nan,
-        packet: int = -1,
-        generated: float = nan,
-    ) -> None:
-        """Append one event; the arguments are its columns."""
-        row = (time, event, uav, node, value, x, y, battery, other, snr, packet, generated)
-        self.rows.append(row)
+    def add(self, *values: Any, **others: Any) -> None:
+        """Append one event; the arguments are those of ``Event``."""
+        self.rows.append(Event(*values, **others))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -254,15 +216,11 @@ class EventLog:
         """A column as a list, as in ``log.event``."""
         if name not in EVENT_COLUMNS:
             raise AttributeError(name)
-        index = [*EVENT_COLUMNS].index(name)
-        return [row[index] for row in self.rows]
+        return [getattr(row, name) for row in self.rows]
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""
-        return {
-            name: np.array([row[index] for row in self.rows], dtype)
-            for index, (name, dtype) in enumerate(EVENT_COLUMNS.items())
-        }
+        return {name: np.array(getattr(self, name), kind) for name, kind in EVENT_COLUMNS.items()}
 
 
 @dataclass(frozen=True)

@@ -65,28 +65,23 @@ def zone_number(mission, x, y):
 
 
 @kernel
-def launch(mission, ranges, types, uavs, residual, sensors, teeth):
+def launch(state, b, starts, number, replication):
     """Start a mission: draw its parameters, start cells and initial data.
 
     Args:
-        mission: ``MISSION`` record with its seed, replication and constants set.
-        ranges: (4, 2) ranges of the sampled parameters.
-        types: (I,) ``UAV_TYPE`` records.
-        uavs: (I,) ``UAV`` records, overwritten.
-        residual: (K,) residual data [data units], overwritten.
-        sensors: (K,) ``SENSOR`` records, overwritten.
-        teeth: (G,) number of the teeth of ages, overwritten.
+        state: ``State``; what it has of mission ``b`` is overwritten.
+        b: The place of the mission in the state.
+        starts: ``Starts`` of the scenarios.
+        number: The number of its scenario.
+        replication: The number of its replication.
     """
-    draw_parameters(mission, ranges)
-    mission.slot = 0
+    state.missions[b] = starts.constants[number]
+    mission, residual, sensors = state.missions[b], state.residual[b], state.sensors[b]
+    mission.replication = replication
+    draw_parameters(mission, starts.ranges[number])
     mission.active = mission.uavs
-    mission.arrived = mission.collected = mission.slot_collected = mission.newest = 0.0
-    teeth[:] = 0
-    mission.lost = 0.0
-    mission.uav_failures = mission.slots_grounded = mission.pad_requests = 0
-    mission.pads_out[:] = 0
-    _launch_uavs(mission, types, uavs)
-    mission.initial = 0.0
+    state.teeth[b] = 0
+    _launch_uavs(mission, starts.uavs[number], state.uavs[b])
     spread = mission.initial_high - mission.initial_low
     for k in range(mission.nodes):
         if k % 4 == 0:
@@ -95,33 +90,25 @@ def launch(mission, ranges, types, uavs, residual, sensors, teeth):
             )
         residual[k] = mission.initial_low + spread * streams.uniform(words[k % 4])
         mission.initial += residual[k]
-        sensors[k].newest = 0.0
+        sensors[k].newest = sensors[k].hidden = 0.0
         sensors[k].silent = False
-        sensors[k].hidden = 0.0
 
 
 @kernel
 def _launch_uavs(mission, types, uavs):
     """Put the active UAVs on distinct cells of the zone, drawn at random."""
     for i in range(len(uavs)):
-        u, kind = uavs[i], types[i]
-        u.quota, u.slots_per_cell, u.rate = kind.quota, kind.slots_per_cell, kind.rate
-        u.slots_left = 0
+        uavs[i] = types[i]
+        u = uavs[i]
         u.active = i < mission.uavs
-        u.end = ACTIVE
-        u.latch = u.charging = u.overruled = u.grounded = False
-        u.battery = 0
-        if u.active:
-            u.battery = kind.flying_time if kind.flying_time > 0 else mission.flying_time
-        u.communications = u.slots_flying = u.slots_charging = u.slots_waiting = 0
-        u.action = u.executed = HOVER
-        u.pad_request = u.pad = u.served = u.overruled_by = -1
-        u.amount = u.snr = u.collected = u.reward = u.total_reward = 0.0
-        u.x = u.y = u.from_x = u.from_y = -1
-        if u.active:
-            u.x, u.y = zone_cell(mission, _start_cell(mission, i))
-            u.from_x, u.from_y = u.x, u.y
-            _update_latch(mission, u)  # a UAV may start at or below C_S
+        if not u.active:
+            u.battery = 0
+            continue
+        if u.battery == 0:
+            u.battery = mission.flying_time
+        u.x, u.y = zone_cell(mission, _start_cell(mission, i))
+        u.from_x, u.from_y = u.x, u.y
+        _update_latch(mission, u)  # a UAV may start at or below C_S
 
 
 @inlined

@@ -10,6 +10,8 @@ centre of their bounding box, which becomes the centre of the grid (J. P. Snyder
 working manual, U.S. Geological Survey 1987).
 """
 
+import csv
+import io
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -17,14 +19,15 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from dess.errors import InputError
+from dess.errors import InputError, shown
 from dess.files.documents import Document
-from dess.files.rows import LIMIT, rows_in
+from dess.files.reading import read_text
 
 Cell = tuple[int, int]
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
+LIMIT = 2**20  # bytes of the largest file
 
 
 GEOGRAPHIC = ("lon", "lat")
@@ -103,17 +106,38 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
 
 def _of_csv(path: Path) -> tuple[bool, list[Place]]:
     """Whether the nodes are geographic, and where they are."""
-    columns, rows = rows_in(path)
+    try:
+        text = read_text(path, LIMIT, "utf-8-sig", "a CSV file")
+        lines = csv.reader(io.StringIO(text), strict=True)
+        columns = [name.strip() for name in next(lines, [])]
+        rows = [(f"line {lines.line_num}", [text.strip() for text in row]) for row in lines]
+    except csv.Error as error:
+        raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
     found = [pair for pair in LIMITS if {*pair} <= {*columns}]
     if len(found) != 1:
         there = ", ".join(columns) or "none"
         raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
-    limits = LIMITS[found[0]]
-    places = [
-        Place(row.line, *(row.number(name, -most, most) for name, most in limits.items()))
-        for row in rows
-    ]
+    places = []
+    for line, texts in rows:
+        cells = dict.fromkeys(columns, "") | dict(zip(columns, texts, strict=False))
+        if any(texts):
+            numbers = (
+                _number(cells[name], f"{path}: {line}: {name}", most)
+                for name, most in LIMITS[found[0]].items()
+            )
+            places.append(Place(line, *numbers))
     return found[0] == GEOGRAPHIC, places
+
+
+def _number(text: str, place: str, most: float) -> float:
+    """A number of at most this size."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise InputError(f"{place} is {shown(text)}; allowed: a number") from None
+    if not -most <= number <= most:
+        raise InputError(f"{place} is {number:g}; allowed: {-most:,g}..{most:,g}")
+    return number
 
 
 def _of_geojson(path: Path) -> tuple[bool, list[Place]]:

@@ -1,7 +1,7 @@
 """The state of B missions with up to I UAVs and K nodes, as arrays; a single mission has B = 1.
 
-state = empty_state(1, space.uavs[1], len(space.nodes))
-state.missions[:] = constants_of(space)
+state = state_of([space], missions=1)
+rules.launch(state, 0, starts_of([space], seed=1), 0, replication=0)
 state.uavs[0, 0]["battery"], state.residual[0]
 """
 
@@ -15,10 +15,9 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError
-from dess.scenario import EXTENSIONS, SAMPLED, Scenario, ScenarioSpace
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
-from dess.sections.section import Section
 
 NORTH, EAST, SOUTH, WEST, HOVER = range(5)
 ACTION_NAMES = ("north", "east", "south", "west", "hover")
@@ -30,83 +29,51 @@ STEP_Y = np.array([-1, 0, 1, 0, 0])
 ACTIVE, QUOTA, BATTERY, TRUNCATED, LOST = range(5)
 END_NAMES = ("active", "quota", "battery", "truncated", "lost")
 
+
+def fields(kind: type, names: str) -> list[tuple[str, type]]:
+    """Fields of one type for a ``numpy.dtype``."""
+    return [(name, kind) for name in names.split()]
+
+
 # One mission: the constants of its scenario, then its progress.
 MISSION = np.dtype(
     [
         ("seed", np.uint64),
         ("replication", np.int64),
-        # world
-        ("grid", np.int64),
-        ("nodes", np.int64),
-        ("zone_x", np.int64),
-        ("zone_y", np.int64),
-        ("zone_width", np.int64),
-        ("zone_height", np.int64),
-        ("pads", np.int64),
-        ("forbid_swaps", np.int64),
-        ("is_extended", np.int64),  # whether a section of the scenario is on
-        # time
-        ("communication_slots", np.int64),
-        ("max_slots", np.int64),
-        # fleet and energy
-        ("uavs", np.int64),
-        ("flying_time", np.int64),
-        ("charge_start", np.int64),
-        ("charge_complete", np.int64),
-        ("charge_rate", np.int64),
-        ("flight_cost", np.int64),
-        ("quota", np.int64),
-        # charging (dess.sections.charging)
-        ("has_charging", np.int64),
-        ("plans_waits", np.int64),  # whether the return guard allows for the wait for a pad
-        ("lowest_battery_first", np.int64),
-        ("power", np.int64),
-        # failures (dess.sections.failures): probabilities per slot
+        # World; ``is_extended`` tells whether a section of the scenario is on.
+        *fields(np.int64, "grid nodes zone_x zone_y zone_width zone_height pads forbid_swaps"),
+        ("is_extended", np.int64),
+        # Time, fleet and energy.
+        *fields(np.int64, "communication_slots max_slots uavs flying_time charge_start"),
+        *fields(np.int64, "charge_complete charge_rate flight_cost quota"),
+        # Charging (dess.sections.charging); ``plans_waits`` tells whether the return guard allows
+        # for the wait for a pad.
+        *fields(np.int64, "has_charging plans_waits lowest_battery_first power"),
+        # Failures (dess.sections.failures): probabilities per slot.
         ("has_failures", np.int64),
-        ("uav_rate", np.float64),
-        ("uav_repair", np.float64),
+        *fields(np.float64, "uav_rate uav_repair"),
         ("uav_data_lost", np.int64),
-        ("pad_rate", np.float64),
-        ("pad_repair", np.float64),
-        ("node_rate", np.float64),
-        ("node_repair", np.float64),
+        *fields(np.float64, "pad_rate pad_repair node_rate node_repair"),
         ("node_data_lost", np.int64),
-        # channel and data
-        ("communication_slot_length", np.float64),
-        ("shadowing_deviation", np.float64),
-        # wind: its mean and its deviation from cell to cell, as pushes [% of battery per cell]
-        ("wind_x", np.float64),
-        ("wind_y", np.float64),
-        ("wind_gusts", np.float64),
+        # Channel.
+        *fields(np.float64, "communication_slot_length shadowing_deviation"),
+        # Wind: its mean and its deviation from cell to cell, as pushes [% of battery per cell], and
+        # the largest surcharge of a move [%], 0 without wind.
+        *fields(np.float64, "wind_x wind_y wind_gusts"),
         ("wind_seed", np.uint64),
-        ("wind_most", np.int64),  # the largest surcharge of a move [%], 0 without wind
+        ("wind_most", np.int64),
         ("slowest", np.int64),  # the most slots that a UAV of the fleet takes for a cell
-        ("initial_low", np.float64),
-        ("initial_high", np.float64),
-        ("arrival_rate", np.float64),
-        # reward weights
-        ("reward_data", np.float64),
-        ("reward_overruled", np.float64),
-        ("reward_depleted", np.float64),
-        ("reward_charging", np.float64),
-        ("reward_quota", np.float64),
-        ("reward_step", np.float64),
-        # sections
+        # Data and rewards.
+        *fields(np.float64, "initial_low initial_high arrival_rate reward_data reward_overruled"),
+        *fields(np.float64, "reward_depleted reward_charging reward_quota reward_step"),
         ("continuous", np.int64),  # whether arrivals are
         ("age_measured", np.int64),  # in the slotted model
         ("age_reward", np.float64),
-        # progress
-        ("slot", np.int64),  # mission slots done
-        ("active", np.int64),  # UAVs still active
-        ("initial", np.float64),  # data units
-        ("arrived", np.float64),
-        ("collected", np.float64),
-        ("slot_collected", np.float64),  # data units, in the present slot
-        ("newest", np.float64),  # sum of the nodes' ``newest`` [slots]
-        ("lost", np.float64),  # data units, by failures and full buffers
-        ("uav_failures", np.int64),
-        ("slots_grounded", np.int64),  # of UAVs under repair
-        ("pad_requests", np.int64),  # how often UAVs have asked for a pad
+        # Progress: mission slots done, UAVs still active, and data [data units], of which
+        # ``slot_collected`` are of the present slot; ``newest`` is the sum of that of the nodes.
+        *fields(np.int64, "slot active"),
+        *fields(np.float64, "initial arrived collected slot_collected newest lost"),
+        *fields(np.int64, "uav_failures slots_grounded pad_requests"),
         ("pads_out", np.int8, MOST_PADS),  # 1 for a pad out of order
     ],
     align=True,
@@ -122,36 +89,26 @@ PLAIN_MISSION = np.dtype(
 # One UAV: its state and the outcome of the present slot.
 UAV = np.dtype(
     [
-        ("x", np.int64),
-        ("y", np.int64),
-        ("from_x", np.int64),  # cell at the start of the slot
-        ("from_y", np.int64),
-        ("battery", np.int64),
-        ("communications", np.int64),  # communication slots counted toward the quota
-        ("quota", np.int64),
-        ("slots_per_cell", np.int64),  # that a move takes
-        ("slots_left", np.int64),  # of its move, after the present one
-        ("action", np.int64),  # chosen by the policy
-        ("executed", np.int64),  # what the safety controller made of it
+        # The cell, the cell at the start of the slot, the battery, and the communication slots
+        # counted toward the quota.
+        *fields(np.int64, "x y from_x from_y battery communications quota"),
+        # The slots that a move takes, and those of its move after the present one.
+        *fields(np.int64, "slots_per_cell slots_left"),
+        # What the policy chose, and what the safety controller made of it.
+        *fields(np.int64, "action executed"),
         ("end", np.int64),
         ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 if none
         ("pad", np.int64),  # index of the pad held, where pads may fail
-        ("slots_flying", np.int64),
-        ("slots_charging", np.int64),
-        ("slots_waiting", np.int64),  # for a pad
+        *fields(np.int64, "slots_flying slots_charging slots_waiting"),
         ("overruled_by", np.int64),  # if overruled: the UAV in its way, -1 at the edge of the grid
         ("served", np.int64),  # node served in the present communication slot, -1 for none
-        ("active", np.bool_),
-        ("latch", np.bool_),  # charging latch iota
-        ("charging", np.bool_),  # holds a pad
-        ("grounded", np.bool_),  # under repair
-        ("overruled", np.bool_),
+        # ``latch`` is the charging latch iota; who is ``charging`` holds a pad, and who is
+        # ``grounded`` is under repair.
+        *fields(np.bool_, "active latch charging grounded overruled"),
         ("rate", np.float64),  # factor of the rate at which it collects data
-        ("amount", np.float64),  # collected in the present communication slot
-        ("snr", np.float64),  # of the node served [dB]
-        ("collected", np.float64),  # in the mission
-        ("reward", np.float64),  # of the present slot
-        ("total_reward", np.float64),
+        # Data and SNR [dB] of the present communication slot, data of the mission, rewards of the
+        # present slot and of the mission.
+        *fields(np.float64, "amount snr collected reward total_reward"),
     ],
     align=True,
 )
@@ -204,6 +161,12 @@ def empty_state(
     )
 
 
+def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
+    """A state filled with zeros, for that many missions of scenarios with the same nodes."""
+    fleet, kind = max(space.uavs[1] for space in spaces), _constants_of(spaces[0]).dtype
+    return empty_state(missions, fleet, len(spaces[0].nodes), teeth_lengths(spaces), kind)
+
+
 def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:
     """How many lengths the teeth of ages can have in missions of these scenarios."""
     measured = (s for s in spaces if s.age.measured and not s.needs_events)
@@ -220,31 +183,27 @@ def constants_of(scenario: ScenarioSpace) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
+    low, high = scenario.initial_data
+    slotted_age = scenario.age.measured and not scenario.needs_events
+    values = {
+        **{
+            name: getattr(scenario, name) for name in MISSION.names or () if hasattr(scenario, name)
+        },
+        **{name: getattr(scenario, name)[0] for name in SAMPLED},
+        **dict(zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True)),
+        **{"nodes": len(scenario.nodes), "pads": scenario.charging_pads},
+        **{"initial_low": low, "initial_high": high, "slowest": fleet.slowest(scenario.fleet)},
+        "communication_slot_length": scenario.slot_length / scenario.communication_slots,
+        "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
+        **{"continuous": scenario.needs_events, "age_measured": slotted_age},
+        "age_reward": scenario.age.reward,
+        **wind.constants(scenario.wind, scenario.grid),
+        **scenario.charging.constants(),
+        **scenario.failures.constants(),
+    }
     mission = np.zeros(1, MISSION)
-    for field in MISSION.fields or ():
-        if field in SAMPLED:
-            mission[field] = getattr(scenario, field)[0]
-        elif field != "nodes" and hasattr(scenario, field):
-            name = "charging_pads" if field == "pads" else field
-            mission[field] = getattr(scenario, name)
-    mission["nodes"] = len(scenario.nodes)
-    mission["continuous"] = scenario.needs_events
-    mission["age_measured"] = scenario.age.measured and not scenario.needs_events
-    mission["age_reward"] = scenario.age.reward
-    for field, value in zip(
-        ("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True
-    ):
-        mission[field] = value
-    mission["initial_low"], mission["initial_high"] = scenario.initial_data
-    mission["communication_slot_length"] = scenario.slot_length / scenario.communication_slots
-    mission["shadowing_deviation"] = np.sqrt(scenario.shadowing_variance)
-    for name, constant in wind.constants(scenario.wind, scenario.grid).items():
-        mission[name] = constant
-    mission["slowest"] = fleet.slowest(scenario.fleet)
-    for section in (getattr(scenario, name) for name in EXTENSIONS):
-        if isinstance(section, Section):
-            for field, value in section.constants().items():
-                mission[field] = value
+    for name, value in values.items():
+        mission[name] = value
     return mission if scenario.is_extended else mission.view(PLAIN_MISSION)
 
 
@@ -254,8 +213,42 @@ def ranges_of(scenario: ScenarioSpace) -> np.ndarray:
 
 
 def types_of(scenario: ScenarioSpace, uavs: int | None = None) -> np.ndarray:
-    """(I,) ``UAV_TYPE`` records; without ``uavs``, as many as the largest fleet of the scenario."""
-    return fleet.types_of(scenario.fleet, scenario.quota, uavs or scenario.uavs[1])
+    """(I,) ``UAV`` records before a mission, off the grid; a battery of 0 is that of the mission.
+
+    Without ``uavs``, there are as many as the largest fleet of the scenario has.
+    """
+    records = np.zeros(uavs or scenario.uavs[1], UAV)
+    for i, record in enumerate(records):
+        kind = fleet.type_of(scenario.fleet, i)
+        record["battery"], record["slots_per_cell"] = kind.flying_time or 0, kind.slots_per_cell
+        record["quota"], record["rate"] = kind.quota or scenario.quota, kind.rate
+    records["action"] = records["executed"] = HOVER
+    for name in ("x", "y", "from_x", "from_y", "pad_request", "pad", "served", "overruled_by"):
+        records[name] = -1
+    return records
+
+
+class Starts(NamedTuple):
+    """What missions of P scenarios start from (``rules.launch``).
+
+    Attributes:
+        constants: (P,) records of ``constants_of``, with the seed.
+        ranges: (P, 4, 2) ranges of the sampled parameters.
+        uavs: (P, I) records of ``types_of``.
+    """
+
+    constants: np.ndarray
+    ranges: np.ndarray
+    uavs: np.ndarray
+
+
+def starts_of(spaces: Sequence[ScenarioSpace], seed: int = 0) -> Starts:
+    """What missions of these scenarios, which are all extended or all not, start from."""
+    fleet = max(space.uavs[1] for space in spaces)
+    constants = np.concatenate([constants_of(space) for space in spaces])
+    constants["seed"] = seed
+    ranges = np.stack([ranges_of(space) for space in spaces])
+    return Starts(constants, ranges, np.stack([types_of(space, fleet) for space in spaces]))
 
 
 @kernel

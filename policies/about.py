@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import dess
 from dess.files.reading import Missing, read_text
 from dess.scenario import SAMPLED, load_scenario, scenario_names
-from policies.base import Policy
 from policies.ddqn.description import read_description
 from policies.registry import FILE, SHIPPED, TypedByUser, folder_of, load, package_of, trained_names
 
@@ -57,7 +56,7 @@ def about(name: str) -> About:
         trained_on={field: scenarios[trained_on][field] for field in SAMPLED}
         if trained_on in scenarios
         else {},
-        card=_card(folder) or _docstring(policy),
+        card=_card(folder) or inspect.getdoc(type(policy)) or "",
     )
 
 
@@ -78,7 +77,3 @@ def _origin(name: str) -> str:
     if file := FILE.fullmatch(name):
         return f"the file {file['path']}"
     return f"the package {package_of(name)}"
-
-
-def _docstring(policy: Policy) -> str:
-    return inspect.getdoc(type(policy)) or ""

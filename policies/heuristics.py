@@ -11,18 +11,7 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.observations.guard import (
-    contest,
-    guard,
-    margin,
-    must_charge,
-    parking_cell,
-    path_length,
-    round_trip,
-    safe_moves,
-    slots_needed,
-    waiting_time,
-)
+from dess.observations import guard
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
 from dess.state import HOVER, STEP_X, STEP_Y
@@ -49,7 +38,9 @@ class Random:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        return _choose(view.state.missions, view.state.uavs, guard(view), view.mission, view.uav)
+        return _choose(
+            view.state.missions, view.state.uavs, guard.guard(view), view.mission, view.uav
+        )
 
 
 class RandomUnguarded:
@@ -123,7 +114,7 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
         moves = count = 0
         for action in range(4):
             x, y = team[i].x + STEP_X[action], team[i].y + STEP_Y[action]
-            if allowed[row, action] and contest(mission, team, i, x, y) == 0:
+            if allowed[row, action] and guard.contest(mission, team, i, x, y) == 0:
                 moves |= 1 << action
                 count += 1
         actions[row] = HOVER
@@ -157,11 +148,11 @@ def _decide(
 def _action(kind, mission, team, i, data, sensors, nodes, circuit, reach, taken):
     """The action of UAV ``i``; ``taken`` is working memory."""
     u = team[i]
-    charge = must_charge(mission, u, data_left(mission, data))
+    charge = guard.must_charge(mission, u, data_left(mission, data))
     home_x, home_y = u.x, u.y
     if charge:
-        home_x, home_y, _ = parking_cell(mission, team, i, taken)
-    safe = safe_moves(mission, team, i, charge, home_x, home_y, reach)
+        home_x, home_y, _ = guard.parking_cell(mission, team, i, taken)
+    safe = guard.safe_moves(mission, team, i, charge, home_x, home_y, reach)
     node = _goal(
         kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
     )
@@ -179,8 +170,8 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        cost = path_length(mission, team, i, x, y, goal_x, goal_y)
-        cost += _CONTEST_COST[contest(mission, team, i, x, y)]
+        cost = guard.path_length(mission, team, i, x, y, goal_x, goal_y)
+        cost += _CONTEST_COST[guard.contest(mission, team, i, x, y)]
         if cost < least:
             best, least = action, cost
     return best
@@ -192,9 +183,9 @@ def _goal(
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
-    spare = slots_needed(mission, u)
+    spare = guard.slots_needed(mission, u)
     if charge:
-        spare = u.battery - 1 - margin(mission, u) - waiting_time(mission, team, i)
+        spare = u.battery - 1 - guard.margin(mission, u) - guard.waiting_time(mission, team, i)
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):
@@ -202,7 +193,7 @@ def _goal(
             continue
         x, y = nodes[k, 0], nodes[k, 1]
         slots = _slots(u, x, y)
-        spent = round_trip(mission, u, x, y, home_x, home_y, reach) if charge else slots
+        spent = guard.round_trip(mission, u, x, y, home_x, home_y, reach) if charge else slots
         if spent > spare:
             continue
         if kind == _NEAREST:

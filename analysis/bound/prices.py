@@ -24,7 +24,7 @@ from dess.channel import world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
-from dess.state import constants_of, empty_state, ranges_of, sample_scenario, types_of
+from dess.state import sample_scenario, starts_of, state_of
 
 ITERATIONS = 20
 MOST_MEMORY = 4 * 2**30  # of the table of a mission [bytes]
@@ -138,14 +138,9 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     """What seed and replication tell of a mission."""
     sampled = sample_scenario(scenario, seed, replication)
     phases = phases_of(sampled)
-    state = empty_state(1, scenario.uavs[1], len(scenario.nodes))
+    state = state_of([scenario], 1)
+    rules.launch(state, 0, starts_of([scenario], seed), 0, replication)
     record = state.missions[0]
-    state.missions[:] = constants_of(scenario)
-    record["seed"], record["replication"] = seed, replication
-    rules.launch(
-        record, ranges_of(scenario), types_of(scenario),
-        state.uavs[0], state.residual[0], state.sensors[0], state.teeth[0],
-    )  # fmt: skip
     starts = np.stack([state.uavs[0][axis][: sampled.uavs] for axis in "xy"], axis=1)
     data = _data_by(record, state.residual[0], phases.slots)
     world = world_of(scenario)

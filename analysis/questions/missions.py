@@ -24,7 +24,7 @@ from analysis.stats.intervals import summary
 from dess import InputError
 from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, Scenario
-from dess.sections.fleet import types_of
+from dess.sections.fleet import type_of
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
 ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
@@ -212,7 +212,7 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
 
 def _uavs(mission: LoggedMission) -> pd.DataFrame:
     uavs, scenario = mission.uavs, mission.scenario
-    quotas = types_of(scenario.fleet, scenario.quota, scenario.uavs)["quota"][uavs["uav"]]
+    quotas = [type_of(scenario.fleet, i).quota or scenario.quota for i in uavs["uav"]]
     columns = {
         "UAVs": scenario.uavs,
         "UAV": uavs["uav"] + 1,

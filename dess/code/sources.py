@@ -11,12 +11,13 @@ not found this way and does not count.
 """
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 # Imports of other distributions are not followed: their versions identify their code.
 OURS = {"dess", "policies"}
@@ -68,7 +69,7 @@ def read(path: Path, module: str) -> Source:
     tree = ast.parse(path.read_bytes())
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     imports = tuple(dict.fromkeys(_imports(tree, package)))
-    return Source(sha256(repr(_outline(tree)).encode()).hexdigest(), imports)
+    return Source(sha256(_outline(tree).encode()).hexdigest(), imports)
 
 
 def _imports(tree: ast.Module, package: str) -> Iterator[str]:
@@ -86,28 +87,17 @@ def _imports(tree: ast.Module, package: str) -> Iterator[str]:
                 yield base
 
 
-def _outline(node: Any) -> Any:
-    """A syntax tree as nested lists, without positions, docstrings, contexts and empty fields.
-
-    Empty fields are left out because they differ between versions of Python. The context of a name
-    (whether it is read or written) is left out because it follows from its place in the tree.
-    """
-    if isinstance(node, list):
-        return [_outline(item) for item in node]
-    if not isinstance(node, ast.AST):
-        return node
-    outline = [type(node).__name__]
-    for field in node._fields:
-        value: Any = getattr(node, field, None)
-        if field == "body" and _has_docstring(node):
-            value = value[1:]
-        if value not in (None, []) and field != "ctx":
-            outline += [field, _outline(value)]
-    return outline
+# What `ast.dump` says of empty fields, which differ between versions of Python, and of the context
+# of a name (whether it is read or written), which follows from its place in the tree.
+_EMPTY = re.compile(r"(, )?\b\w+=(None\b|\[\]|(Load|Store|Del)\(\))")
 
 
-def _has_docstring(node: ast.AST) -> bool:
-    return isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None
+def _outline(tree: ast.Module) -> str:
+    """A syntax tree as text, without positions, docstrings, contexts and empty fields."""
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+    return _EMPTY.sub("", ast.dump(tree))
 
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

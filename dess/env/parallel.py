@@ -16,7 +16,7 @@ from gymnasium import spaces
 from pettingzoo import ParallelEnv
 
 from dess.env.render import Window, draw
-from dess.env.stepper import MissionStepper, Outcome, checked_actions, empty_outcome
+from dess.env.stepper import OUTCOME, MissionStepper, checked_actions
 from dess.errors import InputError, one_of
 from dess.errors import shown as quoted
 from dess.observations.components import Components, component_bounds
@@ -26,36 +26,6 @@ from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES, HOVER, TRUNCATED
 
 _MASKS, _ENDED, _MODES = ("observation", "info"), ("leave", "stay"), ("rgb_array", "human")
-
-
-def parallel_env(
-    scenario: Scenario | ScenarioSpace,
-    seed: int = 0,
-    render_mode: str | None = None,
-    observation: str = "vector",
-    mask: str = "observation",
-    ended: str = "leave",
-    guarded: bool = False,
-) -> "HarvestEnv":
-    """A PettingZoo environment of one mission.
-
-    Args:
-        scenario: The scenario, or the space from which each episode draws its parameters.
-        seed: Seed of the episodes, until ``reset`` is called with another seed.
-        render_mode: None, ``"rgb_array"``, or ``"human"`` for a window (needs matplotlib).
-        observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
-            ``state``, the components of ``dess.observations.components.component_names``.
-        mask: Where the mask of the allowed actions is: in the ``observation``, a dictionary of
-            ``observation`` and ``action_mask``, or in the ``info``.
-        ended: Whether UAVs that have ended ``leave`` the agents, or ``stay`` until the mission is
-            over.
-        guarded: Whether the masks leave out what the return guard does not allow, as for the
-            shipped learner.
-
-    Raises:
-        InputError: If one of the arguments is not allowed.
-    """
-    return HarvestEnv(scenario, seed, render_mode, observation, mask, ended, guarded)
 
 
 class HarvestEnv(ParallelEnv[str, Any, int]):
@@ -90,13 +60,31 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
     def __init__(
         self,
         scenario: Scenario | ScenarioSpace,
-        seed: int,
-        render_mode: str | None,
-        observation: str,
-        mask: str,
-        ended: str,
-        guarded: bool,
+        seed: int = 0,
+        render_mode: str | None = None,
+        observation: str = "vector",
+        mask: str = "observation",
+        ended: str = "leave",
+        guarded: bool = False,
     ):
+        """Make an environment.
+
+        Args:
+            scenario: The scenario, or the space from which each episode draws its parameters.
+            seed: Seed of the episodes, until ``reset`` is called with another seed.
+            render_mode: None, ``"rgb_array"``, or ``"human"`` for a window (needs matplotlib).
+            observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner,
+                or ``state``, the components of ``dess.observations.components.component_names``.
+            mask: Where the mask of the allowed actions is: in the ``observation``, a dictionary of
+                ``observation`` and ``action_mask``, or in the ``info``.
+            ended: Whether UAVs that have ended ``leave`` the agents, or ``stay`` until the mission
+                is over.
+            guarded: Whether the masks leave out what the return guard does not allow, as for the
+                shipped learner.
+
+        Raises:
+            InputError: If one of the arguments is not allowed.
+        """
         if render_mode is not None:
             _check("render_mode", render_mode, _MODES)
         _check("mask", mask, _MASKS)
@@ -144,7 +132,7 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         if self._window:
             self.render()
         active = self._stepper.state.uavs["active"]
-        return self._seen(empty_outcome(active.shape), active)
+        return self._seen(np.zeros(active.shape, OUTCOME), active)
 
     def step(self, actions: dict[str, int]) -> tuple[dict, dict, dict, dict, dict]:
         """Run one mission slot.
@@ -170,8 +158,8 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         for agent, i in self._flying.items():
             chosen[i] = actions[agent]
         outcome = self._stepper.step(checked_actions([chosen], (1, len(chosen))))
-        observations, infos = self._seen(outcome, outcome.acted)
-        rewards = self._of_agents(outcome.reward[0].tolist())
+        observations, infos = self._seen(outcome, outcome["acted"])
+        rewards = self._of_agents(outcome["reward"][0].tolist())
         terminated, truncated = map(self._of_agents, self._ends(outcome))
         self._gather()
         if self._window:
@@ -224,15 +212,17 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         """The values, one for each UAV, of those who are agents in this step."""
         return {agent: values[i] for agent, i in self._here.items()}
 
-    def _ends(self, outcome: Outcome) -> tuple[list[bool], list[bool]]:
+    def _ends(self, outcome: np.ndarray) -> tuple[list[bool], list[bool]]:
         """Who is terminated, and who is truncated."""
         if not self._stay:
-            return outcome.terminated[0].tolist(), outcome.truncated[0].tolist()
+            return outcome["terminated"][0].tolist(), outcome["truncated"][0].tolist()
         over = not self._stepper.state.missions["active"][0]
-        truncated = [over and end == TRUNCATED for end in outcome.end[0].tolist()]
+        truncated = [over and end == TRUNCATED for end in outcome["end"][0].tolist()]
         return [over and not cut for cut in truncated], truncated
 
-    def _seen(self, outcome: Outcome, shown: np.ndarray) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _seen(
+        self, outcome: np.ndarray, shown: np.ndarray
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """The observations and infos of the agents, after a slot."""
         state = self._stepper.state
         rows, masks = self._observer.observe_all(state, shown)
@@ -249,23 +239,17 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         return self._of_agents(observed), self._of_agents(infos)
 
 
+parallel_env = HarvestEnv
+
+
 def _check(name: str, value: str, allowed: tuple[str, ...]) -> None:
     if value not in allowed:
         raise InputError(f"{name}: {quoted(value)} is unknown{one_of(value, allowed)}")
 
 
-def _infos(outcome: Outcome, active: np.ndarray) -> Iterator[dict[str, Any]]:
+def _infos(outcome: np.ndarray, active: np.ndarray) -> Iterator[dict[str, Any]]:
     """What ``info`` says of each UAV of a single mission, but for the mask."""
-    team_collected = float(outcome.team_collected[0])
-    of_uavs = active, outcome.collected[0], outcome.end[0], outcome.overruled[0]
-    lists = (part.tolist() for part in of_uavs)
-    rows = zip(outcome.reward_terms[0], *lists, strict=True)
-    for terms, flies, collected, end, overruled in rows:
-        yield {
-            "active": flies,
-            "reward_terms": terms,
-            "collected": collected,
-            "team_collected": team_collected,
-            "end": end,
-            "overruled": overruled,
-        }
+    names = ["collected", "team_collected", "end", "overruled"]
+    rows = zip(active.tolist(), outcome[0]["reward_terms"], outcome[0][names].tolist(), strict=True)
+    for flies, terms, values in rows:
+        yield {"active": flies, "reward_terms": terms} | dict(zip(names, values, strict=True))

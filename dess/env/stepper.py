@@ -5,7 +5,7 @@ stepper.launch(stepper.indices)    # replications 0 to 3
 outcome = stepper.step(actions)    # (4, I) actions
 """
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,62 +16,27 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import (
-    ACTION_NAMES,
-    TRUNCATED,
-    check_seed,
-    constants_of,
-    empty_state,
-    ranges_of,
-    spaces_of,
-    teeth_lengths,
-    types_of,
-)
+from dess.state import ACTION_NAMES, TRUNCATED, check_seed, spaces_of, starts_of, state_of
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "age")
 
 
-class Outcome(NamedTuple):
-    """The outcome of one mission slot, for each mission (N,) or each UAV (N, I).
-
-    Attributes:
-        acted: (N, I) whether the UAV was active in the slot.
-        reward: (N, I) the reward of the slot; 0 for an inactive UAV.
-        reward_terms: (N, I, 7) the terms of the reward, in the order of ``REWARD_TERMS``.
-        end: (N, I) how the UAV's mission ended, an index of ``state.END_NAMES``.
-        terminated: (N, I) whether the UAV ended in this slot because its quota was filled or its
-            battery depleted.
-        truncated: (N, I) whether the UAV ended in this slot because of ``max_slots``.
-        overruled: (N, I) whether the safety controller overruled the UAV.
-        collected: (N, I) data that the UAV collected in the slot [data units].
-        team_collected: (N,) data that all UAVs of the mission collected in the slot [data units].
-    """
-
-    acted: np.ndarray
-    reward: np.ndarray
-    reward_terms: np.ndarray
-    end: np.ndarray
-    terminated: np.ndarray
-    truncated: np.ndarray
-    overruled: np.ndarray
-    collected: np.ndarray
-    team_collected: np.ndarray
-
-
-def empty_outcome(shape: tuple[int, ...]) -> Outcome:
-    """The outcome of a slot in which nothing happens, for (N, I) UAVs."""
-    return Outcome(
-        acted=np.zeros(shape, np.bool_),
-        reward=np.zeros(shape),
-        reward_terms=np.zeros((*shape, len(REWARD_TERMS))),
-        end=np.zeros(shape, np.int64),
-        terminated=np.zeros(shape, np.bool_),
-        truncated=np.zeros(shape, np.bool_),
-        overruled=np.zeros(shape, np.bool_),
-        collected=np.zeros(shape),
-        team_collected=np.zeros(shape[0]),
-    )
+# What a mission slot does to one UAV.
+OUTCOME = np.dtype(
+    [
+        ("acted", np.bool_),  # whether it was active in the slot
+        ("reward", np.float64),  # of the slot, 0 for an inactive UAV
+        ("reward_terms", np.float64, len(REWARD_TERMS)),
+        ("end", np.int64),  # how its mission ended, an index of ``state.END_NAMES``
+        ("terminated", np.bool_),  # ended in this slot: quota filled or battery depleted
+        ("truncated", np.bool_),  # ended in this slot because of ``max_slots``
+        ("overruled", np.bool_),  # by the safety controller
+        ("collected", np.float64),  # by this UAV in the slot [data units]
+        ("team_collected", np.float64),  # by all UAVs of the mission [data units]
+    ],
+    align=True,
+)
 
 
 class MissionStepper:
@@ -88,18 +53,15 @@ class MissionStepper:
         self.space = spaces_of([scenario])[0]
         check_slotted([self.space])
         self.indices = np.arange(num_envs)
-        fleet, nodes = self.space.uavs[1], len(self.space.nodes)
-        self.world, self._ranges = world_of(self.space), ranges_of(self.space)
-        self._constants, self._types = constants_of(self.space), types_of(self.space)
-        lengths, kind = teeth_lengths([self.space]), self._constants.dtype
-        self.state = empty_state(num_envs, fleet, nodes, lengths, kind)
-        self._scratch = empty_scratch(fleet, nodes)
+        self.world, self.state = world_of(self.space), state_of([self.space], num_envs)
+        self._starts = starts_of([self.space])
+        self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
         self.start_at(seed, 0)
 
     @property
     def seed(self) -> int:
         """Seed of the missions to be launched."""
-        return int(self._constants["seed"][0])
+        return int(self._starts.constants["seed"][0])
 
     @property
     def replication(self) -> int:
@@ -113,7 +75,7 @@ class MissionStepper:
             InputError: If one of them is out of range.
         """
         check_seed(seed, replication)
-        self._constants["seed"], self._next = seed, replication
+        self._starts.constants["seed"], self._next = seed, replication
 
     def start(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Launch a mission in every environment, as ``reset`` of an environment is asked to.
@@ -133,16 +95,19 @@ class MissionStepper:
     def launch(self, environments: np.ndarray) -> None:
         """Start the next replications in these environments, in this order."""
         check_seed(self.seed, self._next + len(environments) - 1)
-        _launch(environments, self._next, self._constants, self._ranges, self._types, self.state)
+        _launch(self.state, environments, self._starts, self._next)
         self._next += len(environments)
 
-    def step(self, actions: np.ndarray) -> Outcome:
+    def step(self, actions: np.ndarray) -> np.ndarray:
         """Run one slot of every environment.
 
         Args:
             actions: (N, I) integers 0..4, ignored where no UAV acts.
+
+        Returns:
+            (N, I) ``OUTCOME`` records.
         """
-        outcome = empty_outcome(self.state.uavs.shape)
+        outcome = np.zeros(self.state.uavs.shape, OUTCOME)
         _step(self.state, self.world, self._scratch, actions, outcome)
         return outcome
 
@@ -155,22 +120,15 @@ class MissionStepper:
 
 
 @kernel
-def _launch(environments, first, constants, ranges, types, state):
+def _launch(state, environments, starts, first):
     """Start the replications from ``first`` on in these environments."""
     for n in range(len(environments)):
-        b = environments[n]
-        state.missions[b] = constants[0]
-        mission = state.missions[b]
-        mission.replication = first + n
-        rules.launch(
-            mission, ranges, types,
-            state.uavs[b], state.residual[b], state.sensors[b], state.teeth[b],
-        )  # fmt: skip
+        rules.launch(state, environments[n], starts, 0, first + n)
 
 
 @kernel
 def _step(state, world, scratch, actions, out):
-    """Run one slot of every mission and write the ``Outcome``."""
+    """Run one slot of every mission and write the ``OUTCOME`` records."""
     nodes, mean_snr, order, means = world
     batches, search = scratch
     fleet = state.uavs.shape[1]
@@ -181,27 +139,26 @@ def _step(state, world, scratch, actions, out):
         for i in range(fleet):
             u = uavs[i]
             u.action = actions[b, i]
-            out.acted[b, i] = u.active
+            out[b, i].acted = u.active
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
             mission, uavs, state.residual[b], state.sensors[b], state.teeth[b], arrivals,
             nodes, mean_snr, order, means, batches, search,
         )  # fmt: skip
-        out.team_collected[b] = mission.slot_collected
         for i in range(fleet):
-            u, acted = uavs[i], out.acted[b, i]
-            ended = acted and not u.active
-            out.reward[b, i] = u.reward
-            out.end[b, i] = u.end
-            out.terminated[b, i] = ended and u.end != TRUNCATED
-            out.truncated[b, i] = ended and u.end == TRUNCATED
-            out.overruled[b, i] = u.overruled
-            out.collected[b, i] = u.collected - collected[i]
-            out.reward_terms[b, i] = 0.0
-            if acted:
+            u, to = uavs[i], out[b, i]
+            ended = to.acted and not u.active
+            to.reward = u.reward
+            to.end = u.end
+            to.terminated = ended and u.end != TRUNCATED
+            to.truncated = ended and u.end == TRUNCATED
+            to.overruled = u.overruled
+            to.collected = u.collected - collected[i]
+            to.team_collected = mission.slot_collected
+            if to.acted:
                 terms = rules.reward_terms(mission, u, u.slots_charging > charged[i])
                 for t in range(len(terms)):
-                    out.reward_terms[b, i, t] = terms[t]
+                    to.reward_terms[t] = terms[t]
 
 
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:

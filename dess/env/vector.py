@@ -7,12 +7,13 @@ observations, rewards, terminated, truncated, info = env.step(actions)   # (R,) 
 
 from typing import Any
 
+import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from dess.env.stepper import MissionStepper, Outcome, checked_actions
+from dess.env.stepper import MissionStepper, checked_actions
 from dess.errors import InputError
 from dess.observations.observer import Observation, Observer, rows_of
 from dess.record import Records
@@ -21,39 +22,6 @@ from dess.state import ACTION_NAMES, TRUNCATED, State
 from dess.view import View, acting_rows
 
 _MODES = (AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP)
-
-
-def vector_env(
-    scenario: Scenario | ScenarioSpace,
-    num_envs: int,
-    seed: int = 0,
-    observation: str = "vector",
-    guarded: bool = False,
-    autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
-) -> "HarvestVectorEnv":
-    """An environment of many missions that advance together, with a row for each UAV.
-
-    Args:
-        scenario: The scenario, or the space from which each mission draws its parameters.
-        num_envs: Number of missions in progress (N).
-        seed: Seed of the missions, until ``reset`` is called with another seed.
-        observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
-            ``state``, the components of ``dess.observations.components.component_names``.
-        guarded: Whether the masks leave out what the return guard does not allow, as for the
-            shipped learner.
-        autoreset_mode: Whether the mission after one that has ended starts in the ``SameStep`` or
-            in the ``NextStep``. Gymnasium's wrappers of observations need ``NextStep``.
-
-    Raises:
-        InputError: If one of the arguments is not allowed.
-    """
-    return HarvestVectorEnv(scenario, num_envs, seed, observation, guarded, autoreset_mode)
-
-
-def make_vec(num_envs: int, scenario: str | Scenario | ScenarioSpace, **options: Any) -> VectorEnv:
-    """``vector_env`` with the name of a scenario: what ``gymnasium.make_vec`` calls."""
-    space = load_scenario(scenario) if isinstance(scenario, str) else scenario
-    return vector_env(space, num_envs, **options)
 
 
 class HarvestVectorEnv(VectorEnv):
@@ -72,7 +40,7 @@ class HarvestVectorEnv(VectorEnv):
 
     ``info`` has an array with R rows for each of: ``action_mask`` (R, 5) and ``active``, for the
     next step; ``replication`` of the mission in progress; and, after a step, the arrays of
-    ``stepper.Outcome``, where ``acted`` tells which rows are transitions of a UAV. When missions
+    ``stepper.OUTCOME``, where ``acted`` tells which rows are transitions of a UAV. When missions
     have ended, it has ``final_info``, the record of the mission (``record.MISSION_RECORD``) and
     that of the UAV (``record.UAV_RECORD``) under ``uav``, and, with ``SameStep``, ``final_obs``;
     ``_final_info`` and ``_final_obs`` tell their rows.
@@ -93,11 +61,27 @@ class HarvestVectorEnv(VectorEnv):
         self,
         scenario: Scenario | ScenarioSpace,
         num_envs: int,
-        seed: int,
-        observation: str,
-        guarded: bool,
-        autoreset_mode: AutoresetMode | str,
+        seed: int = 0,
+        observation: str = "vector",
+        guarded: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     ):
+        """Make an environment.
+
+        Args:
+            scenario: The scenario, or the space from which each mission draws its parameters.
+            num_envs: Number of missions in progress (N).
+            seed: Seed of the missions, until ``reset`` is called with another seed.
+            observation: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner,
+                or ``state``, the components of ``dess.observations.components.component_names``.
+            guarded: Whether the masks leave out what the return guard does not allow, as for the
+                shipped learner.
+            autoreset_mode: Whether the mission after one that has ended starts in the ``SameStep``
+                or the ``NextStep``. Gymnasium's wrappers of observations need ``NextStep``.
+
+        Raises:
+            InputError: If one of the arguments is not allowed.
+        """
         if autoreset_mode not in [name for mode in _MODES for name in (mode, mode.value)]:
             allowed = " or ".join(mode.value for mode in _MODES)
             raise InputError(f"autoreset_mode: {autoreset_mode!r}; allowed: {allowed}")
@@ -154,16 +138,16 @@ class HarvestVectorEnv(VectorEnv):
         outcome = self._stepper.step(checked.reshape(state.uavs.shape))
         ended = state.missions["active"] == 0
         ended[starting] = False
-        over, shown, info = np.repeat(ended, fleet), outcome.acted.copy(), self._outcome(outcome)
+        over, shown, info = np.repeat(ended, fleet), outcome["acted"].copy(), self._outcome(outcome)
         if ended.any():
             info |= self._final(np.flatnonzero(ended), over, shown)
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             starting = np.flatnonzero(ended)
         self._stepper.launch(starting)
         shown[starting] = state.uavs["active"][starting]
-        truncated = over & (outcome.end.ravel() == TRUNCATED)
+        truncated = over & (outcome["end"].ravel() == TRUNCATED)
         observations = self._observe(shown)
-        rewards = outcome.reward.ravel()
+        rewards = outcome["reward"].ravel()
         return observations, rewards, over & ~truncated, truncated, info | self._present()
 
     def action_masks(self) -> np.ndarray:
@@ -180,13 +164,10 @@ class HarvestVectorEnv(VectorEnv):
         observations, self._mask = self._observer.observe_all(self.state, shown)
         return observations
 
-    def _outcome(self, outcome: Outcome) -> dict[str, Any]:
+    def _outcome(self, outcome: np.ndarray) -> dict[str, Any]:
         """The outcome of a slot, by row."""
-        info = outcome._asdict()
-        info["team_collected"] = np.repeat(outcome.team_collected, self.state.uavs.shape[1])
-        for name in ("reward", "terminated", "truncated"):
-            del info[name]
-        return {name: part.reshape(self.num_envs, *part.shape[2:]) for name, part in info.items()}
+        names = {*(outcome.dtype.names or ())} - {"reward", "terminated", "truncated"}
+        return {name: np.ascontiguousarray(outcome.ravel()[name]) for name in names}
 
     def _final(self, ended: np.ndarray, over: np.ndarray, shown: np.ndarray) -> dict[str, Any]:
         """The records of the missions that have ended, and their last observations if needed."""
@@ -216,3 +197,23 @@ class HarvestVectorEnv(VectorEnv):
             "active": self.state.uavs["active"].ravel(),
             "replication": np.repeat(self.state.missions["replication"], fleet),
         }
+
+
+vector_env = HarvestVectorEnv
+
+
+def make_vec(num_envs: int, scenario: str | Scenario | ScenarioSpace, **options: Any) -> VectorEnv:
+    """``vector_env`` with the name of a scenario, for ``gymnasium.make_vec``.
+
+    envs = gymnasium.make_vec("dess.env.vector:dess/Paper-v0", num_envs=64)
+    """
+    space = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    return vector_env(space, num_envs, **options)
+
+
+if "dess/Paper-v0" not in gymnasium.registry:
+    gymnasium.register(
+        "dess/Paper-v0",
+        vector_entry_point="dess.env.vector:make_vec",
+        kwargs={"scenario": "paper"},
+    )

@@ -8,7 +8,8 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.errors import InputError
-from dess.observations.states import ACTIVE, BATTERY, CompactStates, Layout, X, Y
+from dess.observations import states as column
+from dess.observations.states import CompactStates, Layout
 
 # The layers of a map: the charging zone, residual data / 20 [data units], remaining flying time
 # of the active UAVs / 100 [%], and their operational status.
@@ -89,8 +90,8 @@ def _encode(states, layout, missions, uavs, pool, local, far, own):
         if uavs[r] < 0:
             continue
         team, residual = states.uavs[missions[r]], states.residual[missions[r]]
-        x, y = team[uavs[r], X], team[uavs[r], Y]
-        own[r, 0] = team[uavs[r], BATTERY] / np.float32(BATTERY_SCALE)
+        x, y = team[uavs[r], column.X], team[uavs[r], column.Y]
+        own[r, 0] = team[uavs[r], column.BATTERY] / np.float32(BATTERY_SCALE)
         # All positions below are relative to the UAV's cell.
         _mark_zone(local[r, ZONE], middle, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
         _mark_zone(far[r, ZONE], centre, pool, zone[0] - x, zone[1] - y, zone[2], zone[3])
@@ -99,10 +100,10 @@ def _encode(states, layout, missions, uavs, pool, local, far, own):
             _add(local[r, DATA], middle, 1, nodes[k, 0] - x, nodes[k, 1] - y, data)
             _add(far[r, DATA], centre, pool, nodes[k, 0] - x, nodes[k, 1] - y, data)
         for i in range(len(team)):
-            if not team[i, ACTIVE]:
+            if not team[i, column.ACTIVE]:
                 continue
-            dx, dy = team[i, X] - x, team[i, Y] - y
-            battery = team[i, BATTERY] / np.float32(BATTERY_SCALE)
+            dx, dy = team[i, column.X] - x, team[i, column.Y] - y
+            battery = team[i, column.BATTERY] / np.float32(BATTERY_SCALE)
             _add(local[r, FLYING_TIME], middle, 1, dx, dy, battery)
             _add(far[r, FLYING_TIME], centre, pool, dx, dy, battery)
             _add(local[r, STATUS], middle, 1, dx, dy, np.float32(1))
@@ -112,10 +113,10 @@ def _encode(states, layout, missions, uavs, pool, local, far, own):
 @inlined
 def _add(layer, centre, pool, dx, dy, value):
     """Add a value at a cell to a pooled layer, if the cell lies in the layer."""
-    column, row = centre + dx, centre + dy
+    x, y = centre + dx, centre + dy
     end = len(layer) * pool
-    if 0 <= column < end and 0 <= row < end:
-        layer[row // pool, column // pool] += value / np.float32(pool * pool)
+    if 0 <= x < end and 0 <= y < end:
+        layer[y // pool, x // pool] += value / np.float32(pool * pool)
 
 
 @inlined
@@ -124,6 +125,6 @@ def _mark_zone(layer, centre, pool, dx, dy, width, height):
     end = len(layer) * pool
     left, right = max(centre + dx, 0), min(centre + dx + width, end)
     top, bottom = max(centre + dy, 0), min(centre + dy + height, end)
-    for row in range(top, bottom):
-        for column in range(left, right):
-            layer[row // pool, column // pool] += np.float32(1) / np.float32(pool * pool)
+    for y in range(top, bottom):
+        for x in range(left, right):
+            layer[y // pool, x // pool] += np.float32(1) / np.float32(pool * pool)

@@ -8,7 +8,8 @@ import numpy as np
 
 from dess.code.kernels import kernel
 from dess.code.portable import exp
-from dess.observations.states import CompactStates, Layout, X, Y
+from dess.observations import states as column
+from dess.observations.states import CompactStates, Layout
 from dess.observations.vector import DATA_UNIT, SCALES, Vector, nearest_teammates, spare_slots
 
 NODE = 22
@@ -64,7 +65,7 @@ def _encode(states, rows_mission, rows_uav, nodes, nearness, around, home, out):
         nearest_teammates(team, i, columns, rows, least)
         for k in range(count):
             line = out[row, k]
-            dx, dy = nodes[k, 0] - me[X], nodes[k, 1] - me[Y]
+            dx, dy = nodes[k, 0] - me[column.X], nodes[k, 1] - me[column.Y]
             slots = abs(dx) + abs(dy)
             lead = np.int64(least[k]) - slots
             units = data[k] / DATA_UNIT

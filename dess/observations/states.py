@@ -13,13 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
-from dess.observations.guard import (
-    battery_home,
-    must_charge,
-    parking_cell,
-    safe_moves,
-    slots_needed,
-)
+from dess.observations import guard
 from dess.observations.reach import reach_of
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
@@ -110,18 +104,18 @@ def _fill(missions, uavs, residual, guarded, reach, out):
         for i in range(mission.uavs):
             u, row = team[i], out.uavs[b, i]
             row[X], row[Y], row[BATTERY] = u.x, u.y, u.battery
-            row[NEEDED] = min(max(slots_needed(mission, u), 0), _MOST)
+            row[NEEDED] = min(max(guard.slots_needed(mission, u), 0), _MOST)
             row[ACTIVE], row[LATCH], row[CHARGING] = u.active, u.latch, u.charging
             row[MASK] = 1 << HOVER
             if not u.active:
                 continue
-            row[MUST_CHARGE] = must_charge(mission, u, data)
-            home_x, home_y, slots = parking_cell(mission, team, i, taken)
-            row[HOME] = min(battery_home(mission, u, slots, reach), _MOST)
+            row[MUST_CHARGE] = guard.must_charge(mission, u, data)
+            home_x, home_y, slots = guard.parking_cell(mission, team, i, taken)
+            row[HOME] = min(guard.battery_home(mission, u, slots, reach), _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
-                    row[MASK] = safe_moves(mission, team, i, charge, home_x, home_y, reach)
+                    row[MASK] = guard.safe_moves(mission, team, i, charge, home_x, home_y, reach)
                 else:
                     row[MASK] = legal_moves(mission, u)
 

@@ -10,22 +10,8 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.code.portable import exp
-from dess.observations.states import (
-    ACTIVE,
-    BATTERY,
-    CHARGE_COMPLETE,
-    CHARGE_START,
-    CHARGING,
-    HOME,
-    LATCH,
-    MASK,
-    MUST_CHARGE,
-    NEEDED,
-    CompactStates,
-    Layout,
-    X,
-    Y,
-)
+from dess.observations import states as column
+from dess.observations.states import CompactStates, Layout
 from dess.state import HOVER, STEP_X, STEP_Y
 
 MATES = 2  # teammates described one by one, the nearest first
@@ -119,7 +105,7 @@ def _encode(states, rows_mission, rows_uav, grid, nodes, home, nearness, around,
                 total += data[k]
                 units[k] = data[k] / DATA_UNIT
         me = team[i]
-        x, y = np.int64(me[X]), np.int64(me[Y])
+        x, y = np.int64(me[column.X]), np.int64(me[column.Y])
         at = _own(mission, team, i, total / (count * DATA_UNIT), line)
         line[at + x] = 1.0
         line[at + grid + y] = 1.0
@@ -153,21 +139,21 @@ def _own(mission, team, i, mean, line):
     me = team[i]
     active = 0
     for j in range(len(team)):
-        active += team[j, ACTIVE]
-    slack = me[BATTERY] - 1 - me[HOME]
-    line[0] = me[BATTERY] / 100.0
-    line[1] = me[NEEDED] / 100.0
-    line[2] = me[LATCH]
-    line[3] = me[MUST_CHARGE]
-    line[4] = mission[CHARGE_START] / 100.0
-    line[5] = mission[CHARGE_COMPLETE] / 100.0
-    line[6] = me[HOME] / 30.0
+        active += team[j, column.ACTIVE]
+    slack = me[column.BATTERY] - 1 - me[column.HOME]
+    line[0] = me[column.BATTERY] / 100.0
+    line[1] = me[column.NEEDED] / 100.0
+    line[2] = me[column.LATCH]
+    line[3] = me[column.MUST_CHARGE]
+    line[4] = mission[column.CHARGE_START] / 100.0
+    line[5] = mission[column.CHARGE_COMPLETE] / 100.0
+    line[6] = me[column.HOME] / 30.0
     line[7] = min(slack, 50) / 50.0
     line[8] = min(max(slack, 0), 8) / 8.0
-    line[9] = (me[BATTERY] - mission[CHARGE_START]) / 50.0
-    line[10] = min(max(me[BATTERY] - mission[CHARGE_START], -5), 10) / 10.0
-    line[11] = min(max(me[NEEDED] - mission[CHARGE_COMPLETE], -20), 60) / 40.0
-    line[12] = min(me[NEEDED], 10) / 10.0
+    line[9] = (me[column.BATTERY] - mission[column.CHARGE_START]) / 50.0
+    line[10] = min(max(me[column.BATTERY] - mission[column.CHARGE_START], -5), 10) / 10.0
+    line[11] = min(max(me[column.NEEDED] - mission[column.CHARGE_COMPLETE], -20), 60) / 40.0
+    line[12] = min(me[column.NEEDED], 10) / 10.0
     line[13] = active - 1.0
     line[14] = active == 1
     line[15] = mean
@@ -177,7 +163,7 @@ def _own(mission, team, i, mean, line):
 @inlined
 def spare_slots(me, home, slots):
     """The spare slots / 20, within -1..1, if the UAV visits a node and then charges if it must."""
-    left = me[BATTERY] - 1 - home if me[MUST_CHARGE] else me[NEEDED]
+    left = me[column.BATTERY] - 1 - home if me[column.MUST_CHARGE] else me[column.NEEDED]
     return _SPARES[min(max(left - slots, -_SPARE), _SPARE) + _SPARE]
 
 
@@ -189,8 +175,8 @@ def nearest_teammates(team, i, columns, rows, least):
     """
     least[:] = 10_000
     for j in range(len(team)):
-        if j != i and team[j, ACTIVE] and not team[j, CHARGING]:
-            x, y = np.float32(team[j, X]), np.float32(team[j, Y])
+        if j != i and team[j, column.ACTIVE] and not team[j, column.CHARGING]:
+            x, y = np.float32(team[j, column.X]), np.float32(team[j, column.Y])
             for k in range(len(least)):
                 least[k] = min(least[k], abs(columns[k] - x) + abs(rows[k] - y))
 
@@ -200,11 +186,11 @@ def _actions(team, i, near, free, line, at):
     """Write per action the mask, the teammates near the cell it leads to, and the data near it."""
     me, scales = team[i], len(SCALES)
     for action in range(5):
-        x, y = me[X] + STEP_X[action], me[Y] + STEP_Y[action]
-        line[at] = me[MASK] >> action & 1
+        x, y = me[column.X] + STEP_X[action], me[column.Y] + STEP_Y[action]
+        line[at] = me[column.MASK] >> action & 1
         for j in range(len(team)):
-            if j != i and team[j, ACTIVE]:
-                slots = abs(team[j, X] - x) + abs(team[j, Y] - y)
+            if j != i and team[j, column.ACTIVE]:
+                slots = abs(team[j, column.X] - x) + abs(team[j, column.Y] - y)
                 if slots <= 1:
                     line[at + 1] += 1.0 if slots == 0 else 0.3
         for s in range(scales):
@@ -221,23 +207,25 @@ def _mates(team, i, line, at):
     for _ in range(MATES):
         nearest, least = -1, 10_000
         for j in range(len(team)):
-            slots = abs(team[j, X] - team[i, X]) + abs(team[j, Y] - team[i, Y])
+            slots = abs(team[j, column.X] - team[i, column.X]) + abs(
+                team[j, column.Y] - team[i, column.Y]
+            )
             after = slots > last_slots or (slots == last_slots and j > last)
-            if j != i and team[j, ACTIVE] and after and slots < least:
+            if j != i and team[j, column.ACTIVE] and after and slots < least:
                 nearest, least = j, slots
         if nearest < 0:
             return
         last_slots, last = least, nearest
         mate = team[nearest]
         line[at] = 1.0
-        line[at + 1] = (mate[X] - team[i, X]) / 30.0
-        line[at + 2] = (mate[Y] - team[i, Y]) / 30.0
-        line[at + 3] = min(max(mate[X] - team[i, X], -3), 3) / 3.0
-        line[at + 4] = min(max(mate[Y] - team[i, Y], -3), 3) / 3.0
-        line[at + 5] = mate[BATTERY] / 100.0
-        line[at + 6] = mate[NEEDED] / 100.0
-        line[at + 7] = mate[CHARGING]
-        line[at + 8] = mate[MUST_CHARGE]
-        line[at + 9] = mate[X] / 30.0
-        line[at + 10] = mate[Y] / 30.0
+        line[at + 1] = (mate[column.X] - team[i, column.X]) / 30.0
+        line[at + 2] = (mate[column.Y] - team[i, column.Y]) / 30.0
+        line[at + 3] = min(max(mate[column.X] - team[i, column.X], -3), 3) / 3.0
+        line[at + 4] = min(max(mate[column.Y] - team[i, column.Y], -3), 3) / 3.0
+        line[at + 5] = mate[column.BATTERY] / 100.0
+        line[at + 6] = mate[column.NEEDED] / 100.0
+        line[at + 7] = mate[column.CHARGING]
+        line[at + 8] = mate[column.MUST_CHARGE]
+        line[at + 9] = mate[column.X] / 30.0
+        line[at + 10] = mate[column.Y] / 30.0
         at += _MATE

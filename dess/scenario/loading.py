@@ -7,7 +7,6 @@ from dess.files.shipped import Shipped
 from dess.scenario.fields import merged
 from dess.scenario.space import ScenarioSpace, validated
 from dess.sea import nodes_in
-from dess.sections.arrivals import schedule_in
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
@@ -18,7 +17,6 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     Args:
         name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
             ``nodes`` may be the name of a file in the same folder, which ``dess.sea`` reads.
-            The ``schedule`` of ``[arrivals]`` may be a CSV file there (``schedule_in``).
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
@@ -28,11 +26,6 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     where, read = _SCENARIOS.load(name_or_path)
     read.pop("description", None)
     values = merged(read, overrides)
-    table = read.get("arrivals")
-    schedule = table.get("schedule") if isinstance(table, dict) else None
-    if isinstance(schedule, str) and not {"arrivals", "arrivals.schedule"} & {*overrides}:
-        path = _SCENARIOS.beside(name_or_path, "arrivals.schedule", schedule)
-        values["arrivals"]["schedule"] = schedule_in(path)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
         without = validated(ScenarioSpace, values | {"nodes": [[0, 0]], "arrivals": {}}, where)
         path = _SCENARIOS.beside(name_or_path, "nodes", read["nodes"])

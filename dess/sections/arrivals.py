@@ -9,7 +9,6 @@ the policy nor on those of other nodes.
 
 import math
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -17,8 +16,6 @@ from pydantic import Field, model_validator
 
 from dess import streams
 from dess.code.kernels import kernel
-from dess.errors import InputError
-from dess.files.rows import rows_in
 from dess.sections.section import Integer, Number, Section
 
 # The highest rate or factor, the last slot and the largest number of a schedule.
@@ -26,8 +23,6 @@ MOST, LAST, MOST_ROWS = 100, 1_000_000, 10_000
 
 Rate = Annotated[Number, Field(ge=0, le=MOST)]
 Time = Annotated[Number, Field(ge=0, le=LAST)]
-
-_COLUMNS = ("slot", "factor")
 
 # The Poisson process of one node.
 SOURCE = np.dtype(
@@ -57,8 +52,7 @@ class Arrivals(Section):
         (),
         max_length=MOST_ROWS,
         description="factors of the rates over time: a list of [slot, factor], the factor 0..100 "
-        "from this slot on and 1 before the first; or in a TOML file the name of a CSV file with "
-        "the columns slot and factor",
+        "from this slot on and 1 before the first",
     )
     buffer: Integer = Field(
         0, ge=0, le=1_000_000, description="packets that a node can hold; 0 for no limit"
@@ -81,26 +75,6 @@ class Arrivals(Section):
                     f"schedule: slot {later:g} comes after slot {earlier:g}; allowed: growing slots"
                 )
         return self
-
-
-def schedule_in(path: Path) -> tuple[tuple[float, float], ...]:
-    """The schedule in a CSV file: a header line with ``slot`` and ``factor``, then numbers.
-
-    Raises:
-        InputError: If the file cannot be read, or has other columns, or rows that are no schedule.
-    """
-    columns, rows = rows_in(path)
-    if not {*_COLUMNS} <= {*columns}:
-        there = ", ".join(columns) or "none"
-        raise InputError(f"{path}: has columns {there}; allowed: {' and '.join(_COLUMNS)}")
-    if len(rows) > MOST_ROWS:
-        raise InputError(f"{path}: has {len(rows):,} rows; allowed: {MOST_ROWS:,} at most")
-    schedule = [(row.number("slot", 0, LAST), row.number("factor", 0, MOST)) for row in rows]
-    for row, (earlier, later) in zip(rows[1:], pairwise(schedule), strict=True):
-        if later[0] <= earlier[0]:
-            line = f"slot {later[0]:g} comes after slot {earlier[0]:g}"
-            raise InputError(f"{path}: {row.line}: {line}; allowed: growing slots")
-    return tuple(schedule)
 
 
 def sources_of(arrivals: Arrivals, arrival_rate: float, nodes: int) -> np.ndarray:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from math import lcm
 from typing import Any
 
-import numpy as np
 from pydantic import Field
 
 from dess.code.kernels import inlined
@@ -37,34 +36,10 @@ class UavType(Section):
 
 Fleet = Sequence[UavType]
 
-# What ``rules.launch`` needs to know of a UAV. The fields are those of ``UavType``; a flying time
-# of 0 is that of the mission.
-UAV_TYPE = np.dtype(
-    [
-        ("flying_time", np.int64),
-        ("slots_per_cell", np.int64),
-        ("quota", np.int64),
-        ("rate", np.float64),
-    ]
-)
-
 
 def type_of(fleet: Fleet, uav: int) -> UavType:
     """The type of a UAV by its index."""
     return fleet[uav % len(fleet)] if fleet else UavType.off()
-
-
-def types_of(fleet: Fleet, quota: int, uavs: int) -> np.ndarray:
-    """(I,) ``UAV_TYPE`` records.
-
-    Args:
-        fleet: The types of a scenario.
-        quota: Its quota, for types without one.
-        uavs: The number of UAVs (I).
-    """
-    kinds = [type_of(fleet, i) for i in range(uavs)]
-    rows = [(k.flying_time or 0, k.slots_per_cell, k.quota or quota, k.rate) for k in kinds]
-    return np.array(rows, UAV_TYPE)
 
 
 def slowest(fleet: Fleet) -> int:

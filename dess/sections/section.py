@@ -40,10 +40,6 @@ class Section(BaseModel):
         """Whether a field differs from its default."""
         return self != self.off()
 
-    def constants(self) -> dict[str, Any]:
-        """The fields of ``MISSION`` that the section sets, for compiled code."""
-        return {}
-
     @classmethod
     def off(cls) -> Self:
         """The section with all fields at their defaults."""

@@ -32,8 +32,6 @@ HEADER_LIMIT = 10**8
 _WHOLE = "a checkpoint as dess train has written it"
 
 Amount = Annotated[float, Field(ge=0.0)]
-Word = Annotated[int, Field(ge=0, lt=2**32)]
-Words = Annotated[int, Field(ge=0, lt=2**128)]
 
 
 class Progress(Document):
@@ -47,22 +45,6 @@ class Progress(Document):
     phase_start: Number
     scores: list[float]
     best_score: float | None
-
-
-class Pcg64(Document):
-    """The 128-bit integers of the state of numpy's generator."""
-
-    state: Words
-    inc: Words
-
-
-class Generator(Document):
-    """The state of numpy's generator."""
-
-    bit_generator: Literal["PCG64"]
-    state: Pcg64
-    has_uint32: Annotated[int, Field(ge=0, le=1)]
-    uinteger: Word
 
 
 class _Row(Document):
@@ -97,7 +79,7 @@ class Header(Document):
     scenario: dict[str, Any] = Field(description="fields of the scenario")
     observation_version: Number = Field(description="version of the encoding of observations")
     progress: Progress = Field(description="progress of the training")
-    random: Generator = Field(description="state of the random generator")
+    random: dict[str, Any] = Field(description="state of numpy's generator, which checks it")
     stepper: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
         description="seed and next replication of the missions"
     )
@@ -174,7 +156,7 @@ def load_training(
         )
     try:
         _restore(training, values, raw)
-    except (LookupError, ValueError, TypeError, RuntimeError) as error:
+    except (LookupError, ValueError, TypeError, RuntimeError, OverflowError) as error:
         problem = str(error).partition("; allowed:")[0]
         raise InputError(
             f"{path}: damaged, or of another scenario: {problem}; allowed: {_WHOLE}"

@@ -65,7 +65,20 @@ class PaperNetwork(nn.Module):
         return self.values(hidden.to(self.values.weight.dtype))
 
 
-class DuelingNetwork(nn.Module):
+class _Dueling(nn.Module):
+    """The end of a dueling network: a value V and advantages A; ``Q = V + A - mean A``."""
+
+    def _make_end(self, width: int) -> None:
+        self.value = nn.Linear(width, 1)
+        self.advantage = nn.Linear(width, ACTIONS)
+
+    def _values(self, hidden: Tensor) -> Tensor:
+        hidden = hidden.to(self.value.weight.dtype)
+        advantage = self.advantage(hidden)
+        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
+
+
+class DuelingNetwork(_Dueling):
     """A dueling network: dense layers, then a value V and advantages A; ``Q = V + A - mean A``.
 
     Source: Z. Wang et al., Dueling network architectures for deep reinforcement learning, ICML
@@ -86,19 +99,16 @@ class DuelingNetwork(nn.Module):
         self.precision = precision
         sizes = [inputs, *hidden]
         self.hidden = _dense(sizes)
-        self.value = nn.Linear(sizes[-1], 1)
-        self.advantage = nn.Linear(sizes[-1], ACTIONS)
+        self._make_end(sizes[-1])
 
     def forward(self, vector: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, inputs)."""
         with _hidden_precision(self, self.precision, vector):
             hidden = self.hidden(vector)
-        hidden = hidden.to(self.value.weight.dtype)
-        advantage = self.advantage(hidden)
-        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
+        return self._values(hidden)
 
 
-class NodeNetwork(nn.Module):
+class NodeNetwork(_Dueling):
     """A dueling network that applies the same layers to every node and pools the outputs."""
 
     def __init__(
@@ -125,8 +135,7 @@ class NodeNetwork(nn.Module):
         self.own = _dense([inputs, own])
         sizes = [own + 2 * per_node, *joint]
         self.hidden = _dense(sizes)
-        self.value = nn.Linear(sizes[-1], 1)
-        self.advantage = nn.Linear(sizes[-1], ACTIONS)
+        self._make_end(sizes[-1])
 
     def forward(self, vector: Tensor, nodes: Tensor) -> Tensor:
         """The values (R, 5) of the actions, from vectors (R, F) and nodes (R, K, features)."""
@@ -134,9 +143,7 @@ class NodeNetwork(nn.Module):
             per_node = self.nodes(torch.relu(self.node(nodes) + self.context(vector)[:, None]))
             pooled = [self.own(vector), per_node.amax(1), per_node.mean(1)]
             hidden = self.hidden(torch.cat([part.to(pooled[0].dtype) for part in pooled], 1))
-        hidden = hidden.to(self.value.weight.dtype)
-        advantage = self.advantage(hidden)
-        return self.value(hidden) + advantage - advantage.mean(1, keepdim=True)
+        return self._values(hidden)
 
 
 def units_of(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:
@@ -170,12 +177,7 @@ def _hidden_precision(
 
 def _convolutions(channels: int) -> nn.Sequential:
     first = nn.Conv2d(channels, KERNELS, KERNEL_SIZE)
-    return nn.Sequential(
-        first,
-        nn.ReLU(),
-        nn.Conv2d(KERNELS, KERNELS, KERNEL_SIZE),
-        nn.ReLU(),
-    )
+    return nn.Sequential(first, nn.ReLU(), nn.Conv2d(KERNELS, KERNELS, KERNEL_SIZE), nn.ReLU())
 
 
 def _convolved(width: int) -> int:

@@ -5,19 +5,12 @@ file are checked once, when the file is read.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from dess.env.stepper import MissionStepper
-from dess.observations.states import (
-    BATTERY,
-    HOME,
-    MASK,
-    NEEDED,
-    UAV_COLUMNS,
-    X,
-    Y,
-)
+from dess.observations import states as column
 from dess.scenario import SAMPLED, ScenarioSpace
 from dess.state import ACTION_NAMES, END_NAMES, State, constants_of, ranges_of, types_of
 
@@ -45,34 +38,40 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
     for name in sorted(set(constants.dtype.names or ()) - {*SAMPLED, *_PROGRESS}):
         if (missions[name] != constants[name]).any():
             raise ValueError(f"missions: {name} is not that of the scenario")
-    for name, (low, high) in zip(SAMPLED, ranges_of(space), strict=True):
-        _require(missions, name, low, high)
-    _require(missions, "replication", 0, stepper.replication - 1)
-    _require(missions, "slot", 0, space.max_slots)
-    _require(missions, "pads_out", 0, 1)
-    edge, slots = space.grid - 1, space.max_slots
-    is_there = np.arange(uavs.shape[1]) < missions["uavs"][:, None]
-    for name in ("x", "y", "from_x", "from_y"):
-        _require(uavs, name, -1, edge)
-        _require(uavs[is_there], name, 0, edge)
-    _require(uavs, "battery", 0, 100)
-    types = np.broadcast_to(types_of(space, uavs.shape[1]), uavs.shape)
+    edge, slots, fleet = space.grid - 1, space.max_slots, uavs.shape[1]
+    is_there = np.arange(fleet) < missions["uavs"][:, None]
+    types = np.broadcast_to(types_of(space, fleet), uavs.shape)
     for name in ("quota", "slots_per_cell", "rate"):
         if (uavs[name] != types[name])[is_there].any():
             raise ValueError(f"uavs: {name} is not that of the scenario")
-    _require(uavs, "communications", 0, int(types["quota"].max()) + space.communication_slots)
-    if not ((uavs["slots_left"] >= 0) & (uavs["slots_left"] < uavs["slots_per_cell"])).all():
-        raise ValueError("uavs: slots_left is out of range")
-    for name in ("action", "executed"):
-        _require(uavs, name, 0, len(ACTION_NAMES) - 1)
-    _require(uavs, "end", 0, len(END_NAMES) - 1)
-    _require(uavs, "pad_request", -1, slots)
-    _require(uavs, "pad", -1, space.charging_pads - 1)
-    _require(uavs, "served", -1, len(space.nodes) - 1)
-    for name in ("slots_flying", "slots_charging", "slots_waiting"):
-        _require(uavs, name, 0, slots)
-    for name in ("active", "latch", "charging", "grounded", "overruled"):
-        _require(uavs.view(_as_bytes(uavs.dtype)), name, 0, 1)
+    cells, actions = ("x", "y", "from_x", "from_y"), ("action", "executed")
+    counters = ("slots_flying", "slots_charging", "slots_waiting")
+    of_missions = dict(zip(SAMPLED, ranges_of(space).tolist(), strict=True)) | {
+        "replication": (0, stepper.replication - 1),
+        "slot": (0, slots),
+        "pads_out": (0, 1),
+    }
+    of_uavs = {
+        **dict.fromkeys(cells, (-1, edge)),
+        **dict.fromkeys(actions, (0, len(ACTION_NAMES) - 1)),
+        **dict.fromkeys(counters, (0, slots)),
+        "battery": (0, 100),
+        "communications": (0, int(types["quota"].max()) + space.communication_slots),
+        "slots_left": (0, uavs["slots_per_cell"] - 1),
+        "end": (0, len(END_NAMES) - 1),
+        "pad_request": (-1, slots),
+        "pad": (-1, space.charging_pads - 1),
+        "served": (-1, len(space.nodes) - 1),
+    }
+    truths = dict.fromkeys(("active", "latch", "charging", "grounded", "overruled"), (0, 1))
+    allowed: list[tuple[np.ndarray, Any]] = [(missions, of_missions), (uavs, of_uavs | truths)]
+    allowed.append((uavs[is_there], dict.fromkeys(cells, (0, edge))))
+    for records, ranges in allowed:
+        for name, (low, high) in ranges.items():
+            # A truth value of a file may be any byte.
+            values = records[name].view(np.uint8) if name in truths else records[name]
+            if ((values < low) | (values > high)).any():
+                raise ValueError(f"{name} is out of range")
     if (uavs["active"] & ~is_there).any() or (uavs["active"].sum(1) != missions["active"]).any():
         raise ValueError("missions: active UAVs that are not there")
     check_finite(missions)
@@ -91,10 +90,11 @@ def check_replay(arrays: Mapping[str, np.ndarray], grid: int) -> None:
     Raises:
         ValueError: If a value is out of range.
     """
-    most = np.ones(UAV_COLUMNS, np.int64)  # truth values, but for:
-    most[[X, Y]] = grid - 1
-    most[[BATTERY, NEEDED, HOME]] = 100, np.iinfo(np.int16).max, np.iinfo(np.int16).max
-    most[MASK] = 2 ** len(ACTION_NAMES) - 1
+    most = np.ones(column.UAV_COLUMNS, np.int64)  # truth values, but for:
+    most[[column.X, column.Y]] = grid - 1
+    most[column.BATTERY] = 100
+    most[[column.NEEDED, column.HOME]] = np.iinfo(np.int16).max
+    most[column.MASK] = 2 ** len(ACTION_NAMES) - 1
     for name, highest in (("missions", 100), ("uavs", most), ("action", len(ACTION_NAMES) - 1)):
         if (arrays[name] < 0).any() or (arrays[name] > highest).any():
             raise ValueError(f"replay memory: {name} out of range")
@@ -109,24 +109,3 @@ def check_finite(records: np.ndarray) -> None:
     for name in records.dtype.names or ():
         if records[name].dtype.kind == "f" and not np.isfinite(records[name]).all():
             raise ValueError(f"{name} is not finite")
-
-
-def _require(records: np.ndarray, name: str, low: int, high: int) -> None:
-    values = records[name]
-    if values.size and not low <= values.min() <= values.max() <= high:
-        raise ValueError(f"{name} is out of range; allowed: {low}..{high}")
-
-
-def _as_bytes(dtype: np.dtype) -> np.dtype:
-    """The type with truth values as bytes, which may have any value in a file."""
-    fields = {name: (kind, offset) for name, (kind, offset, *_) in (dtype.fields or {}).items()}
-    formats = [np.dtype(np.uint8) if kind.kind == "b" else kind for kind, _ in fields.values()]
-    offsets = [offset for _, offset in fields.values()]
-    return np.dtype(
-        {
-            "names": [*fields],
-            "formats": formats,
-            "offsets": offsets,
-            "itemsize": dtype.itemsize,
-        }
-    )

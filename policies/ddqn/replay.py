@@ -6,7 +6,7 @@ every state is stored only once, for every n. Each mission has a last row after 
 UAV acts.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,19 +51,11 @@ class ReplayMemory:
         self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
         self.count = 0
         self._states = empty_states(capacity * num_envs, uavs, nodes)
+        kinds: dict[str, type] = {"action": np.int8, "reward": np.float32}
+        kinds |= dict.fromkeys(("acted", "terminated", "truncated"), np.bool_)
         shape = (capacity * num_envs, uavs)
-        self._action = np.zeros(shape, np.int8)
-        self._reward = np.zeros(shape, np.float32)
-        self._acted = np.zeros(shape, np.bool_)
-        self._terminated = np.zeros(shape, np.bool_)
-        self._truncated = np.zeros(shape, np.bool_)
-        self.arrays = dict(self._states._asdict()) | {
-            "action": self._action,
-            "reward": self._reward,
-            "acted": self._acted,
-            "terminated": self._terminated,
-            "truncated": self._truncated,
-        }
+        outcomes: dict[str, Any] = {name: np.zeros(shape, kind) for name, kind in kinds.items()}
+        self.arrays = self._states._asdict() | outcomes
 
     @staticmethod
     def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
@@ -71,23 +63,19 @@ class ReplayMemory:
         one = ReplayMemory(1, 1, uavs, nodes)
         return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
-    def add(
-        self,
-        states: CompactStates,
-        action: np.ndarray,
-        reward: np.ndarray,
-        acted: np.ndarray,
-        terminated: np.ndarray,
-        truncated: np.ndarray,
-    ) -> None:
-        """Add one slot of all environments: the states before it and (N, I) arrays of outcomes."""
+    def add(self, states: CompactStates, *outcome: np.ndarray) -> None:
+        """Add one slot of all environments.
+
+        Args:
+            states: The states before the slot.
+            *outcome: (N, I) arrays: actions, rewards, and which UAVs acted, terminated and were
+                truncated.
+        """
         first = self.count % self.capacity * self.num_envs
         here = slice(first, first + self.num_envs)
-        for ring, new in zip(self._states, states, strict=True):
-            ring[here] = new
         with np.errstate(over="ignore"):  # an infinite reward ends the training with a message
-            self._action[here], self._reward[here], self._acted[here] = action, reward, acted
-        self._terminated[here], self._truncated[here] = terminated, truncated
+            for ring, new in zip(self.arrays.values(), (*states, *outcome), strict=True):
+                ring[here] = new
         self.count += 1
 
     def sample(
@@ -120,7 +108,7 @@ class ReplayMemory:
                 0, self.num_envs, len(slot)
             )
             uav = generator.integers(0, self.uavs, len(slot))
-            good = self._acted[row, uav] & ~self._truncated[row, uav]
+            good = self.arrays["acted"][row, uav] & ~self.arrays["truncated"][row, uav]
             keep = np.nonzero(good)[0][:missing]
             if not len(keep) and len(rows) > 1000:
                 raise InputError(
@@ -133,13 +121,10 @@ class ReplayMemory:
         row, uav = np.concatenate(rows), np.concatenate(uavs)
         later, reward = np.empty(size, np.int64), np.empty(size, np.float32)
         factor = np.empty(size, np.float32)
-        _returns(
-            row, uav, n_step, discount, self.num_envs, self._reward, self._terminated,
-            self._truncated, later, reward, factor,
-        )  # fmt: skip
-        return Batch(
-            self._states, row, later, uav, self._action[row, uav].astype(np.int64), reward, factor
-        )
+        known = (self.arrays[name] for name in ("reward", "terminated", "truncated"))
+        _returns(row, uav, n_step, discount, self.num_envs, *known, later, reward, factor)
+        action = self.arrays["action"][row, uav].astype(np.int64)
+        return Batch(self._states, row, later, uav, action, reward, factor)
 
 
 @kernel

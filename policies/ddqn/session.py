@@ -135,11 +135,11 @@ def train(
         if announce:
             announce(memory_of(config))
         try:
-            training = (
-                load_training(path, config, place, size_of(config))
-                if resume
-                else Training(config, place)
-            )
+            if resume:
+                training = load_training(path, config, place, size_of(config))
+            else:
+                training = Training(config, place)
+                save_training(path, training)
         except (MemoryError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "alloc" not in str(error):
                 raise  # torch has no error of its own for memory
@@ -147,8 +147,6 @@ def train(
                 f"training {config.name}: about {size_of(config) / 2**30:.1f} GiB of memory are "
                 "too much for this machine; allowed: fewer environments or slots"
             ) from error
-        if not resume:
-            save_training(path, training)
         _run(training, out, progress)
         _save_results(out, training)
     return training

@@ -16,23 +16,10 @@ from dess.batch import simulate_batch
 from dess.code.kernels import kernel
 from dess.env.stepper import MissionStepper
 from dess.errors import InputError
+from dess.observations import states as column
 from dess.observations.maps import POOL
 from dess.observations.observer import ENCODERS
-from dess.observations.states import (
-    ACTIVE,
-    BATTERY,
-    CHARGE_START,
-    CHARGING,
-    LATCH,
-    MUST_CHARGE,
-    CompactStates,
-    Layout,
-    X,
-    Y,
-    compact_states,
-    layout_of,
-    masks,
-)
+from dess.observations.states import CompactStates, Layout, compact_states, layout_of, masks
 from dess.scenario import ScenarioSpace
 from dess.state import HOVER, STEP_X, STEP_Y
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
@@ -47,14 +34,8 @@ SELECT_BY = "collection_ratio_and_communication"
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
 _PROGRESS = (
-    "tick",
-    "updates",
-    "uav_slots",
-    "seconds",
-    "phase_index",
-    "phase_start",
-    "scores",
-    "best_score",
+    *("tick", "updates", "uav_slots", "seconds"),
+    *("phase_index", "phase_start", "scores", "best_score"),
 )
 
 
@@ -202,16 +183,18 @@ class Training:
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
         states = compact_states(state, self.config.guard)
-        missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
+        missions, uavs = np.nonzero(
+            states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
+        )
         actions = np.full(state.uavs.shape, HOVER)
         if len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
         outcome = self.stepper.step(actions)
         self.replay.add(
-            states, actions, outcome.reward, outcome.acted, outcome.terminated, outcome.truncated
+            states, actions, *(outcome[n] for n in ("reward", "acted", "terminated", "truncated"))
         )
-        self.uav_slots += int(outcome.acted.sum())
-        ended = np.nonzero((state.missions["active"] == 0) & outcome.acted.any(1))[0]
+        self.uav_slots += int(outcome["acted"].sum())
+        ended = np.nonzero((state.missions["active"] == 0) & outcome["acted"].any(1))[0]
         if len(ended):
             self.finished.append(self.stepper.records(ended).missions)
         self._launch(over)
@@ -244,13 +227,13 @@ class Training:
         The actions lead nearer to the zone; in the zone, a latched UAV hovers.
         """
         rows, layout = states.uavs[missions, uavs], self.layout
-        cells = rows[:, [X, Y]].astype(np.int64)
+        cells = rows[:, [column.X, column.Y]].astype(np.int64)
         home = layout.zone_slots(cells)
-        reserve = rows[:, BATTERY] - states.missions[missions, CHARGE_START]
-        due = self.early[missions, uavs] & (rows[:, MUST_CHARGE] > 0) & (reserve <= home)
+        reserve = rows[:, column.BATTERY] - states.missions[missions, column.CHARGE_START]
+        due = self.early[missions, uavs] & (rows[:, column.MUST_CHARGE] > 0) & (reserve <= home)
         steps = np.stack([STEP_X, STEP_Y], 1)
         nearer = np.stack([layout.zone_slots(cells + step) < home for step in steps], 1)
-        nearer[:, HOVER] = (home == 0) & (rows[:, LATCH] > 0)
+        nearer[:, HOVER] = (home == 0) & (rows[:, column.LATCH] > 0)
         return nearer & due[:, None]
 
     def _evaluate(self) -> None:

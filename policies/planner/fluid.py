@@ -19,7 +19,7 @@ from dess.code.kernels import inlined, kernel
 from dess.observations.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.rules import in_zone
 from dess.sections.failures import working_pads
-from dess.state import HOVER, STEP_X, STEP_Y
+from dess.state import HOVER, STEP_X, STEP_Y, fields
 from policies.planner.plan import CHARGE, NEVER
 
 # The data of a flight are records: the compiled code passes them on without counting references,
@@ -27,27 +27,15 @@ from policies.planner.plan import CHARGE, NEVER
 # A UAV in the model.
 CRAFT = np.dtype(
     [
-        ("x", np.int64),
-        ("y", np.int64),
-        ("battery", np.int64),
-        ("counted", np.int64),  # communication slots counted toward the quota
-        ("active", np.int64),
-        ("latch", np.int64),
-        ("charging", np.int64),
-        ("next", np.int64),  # its waypoint
-        ("stayed", np.int64),  # slots that it has hovered there
-        ("action", np.int64),
-        ("left", np.int64),  # slots of its move, after the present one
-        # of the slot
-        ("place", np.int64),
-        ("pace", np.int64),  # places per communication slot
-        # of the plan
-        ("waypoints", np.int64),
-        ("last_charge", np.int64),  # the last waypoint to charge at, -1 without one
-        # constants
-        ("quota", np.int64),
-        ("slots_per_cell", np.int64),
-        ("part", np.int64),  # places that it flies per communication slot
+        # Its state: ``counted`` are the communication slots counted toward the quota, ``next`` is
+        # its waypoint, ``stayed`` the slots that it has hovered there, ``left`` those of its move.
+        *fields(np.int64, "x y battery counted active latch charging next stayed action left"),
+        # Of the slot: its place, and the places per communication slot.
+        *fields(np.int64, "place pace"),
+        # Of the plan: its waypoints, and the last one to charge at, -1 without one.
+        *fields(np.int64, "waypoints last_charge"),
+        # Constants: ``part`` are the places that it flies per communication slot.
+        *fields(np.int64, "quota slots_per_cell part"),
         ("rate", np.float64),
     ]
 )
@@ -151,12 +139,8 @@ def fly(mission, rates, plan, source, first, flight, slots):
     """
     extra, candidates, parts = rates.extra, rates.candidates, rates.parts
     waypoints, team, sea = plan.waypoints, flight.team[-1], flight.sea[-1]
-    fleet, m, cost, grid = (
-        mission.uavs,
-        mission.communication_slots,
-        mission.flight_cost,
-        mission.grid,
-    )
+    fleet, m = mission.uavs, mission.communication_slots
+    cost, grid = mission.flight_cost, mission.grid
     copy_snapshot(mission, source, first, flight, -1)
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
     for i in range(fleet):

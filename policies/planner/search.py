@@ -17,26 +17,10 @@ from dess import streams
 from dess.code.kernels import inlined, kernel
 from dess.rules import in_zone, on_grid, zone_cell
 from dess.state import STEP_X, STEP_Y
-from policies.planner.fluid import (
-    MOST_SLOTS,
-    STRIDE,
-    Flight,
-    begin,
-    copy_snapshot,
-    empty_flight,
-    fly,
-)
-from policies.planner.plan import (
-    CHARGE,
-    MOST_WAYPOINTS,
-    NEVER,
-    Plan,
-    copy_plan,
-    empty_plan,
-    insert,
-    remove,
-    set_waypoint,
-)
+from policies.planner import fluid
+from policies.planner import plan as plans
+from policies.planner.fluid import Flight
+from policies.planner.plan import Plan
 
 # The temperature [data units] falls to this in the last step.
 _COLDEST = 0.05
@@ -73,9 +57,9 @@ class Workspace(NamedTuple):
 
 def empty_workspace(slots: int, uavs: int, nodes: int) -> Workspace:
     """Working memory for missions of at most that many slots, UAVs and nodes."""
-    slots = min(slots, MOST_SLOTS)
-    flight, ahead = (empty_flight(slots, uavs, nodes) for _ in range(2))
-    return Workspace(empty_plan(uavs), empty_plan(uavs), flight, ahead, np.zeros(4))
+    slots = min(slots, fluid.MOST_SLOTS)
+    flight, ahead = (fluid.empty_flight(slots, uavs, nodes) for _ in range(2))
+    return Workspace(plans.empty_plan(uavs), plans.empty_plan(uavs), flight, ahead, np.zeros(4))
 
 
 @kernel
@@ -101,13 +85,13 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         search has ended.
     """
     present, trial, flight, ahead, course = workspace
-    slots, first = min(mission.max_slots - mission.slot, MOST_SLOTS), int(course[TRIED])
+    slots, first = min(mission.max_slots - mission.slot, fluid.MOST_SLOTS), int(course[TRIED])
     if first == 0:
-        begin(mission, uavs, residual, rates, flight)
-        course[VALUE] = course[BEST] = fly(mission, rates, plan, flight, 0, flight, slots)
+        fluid.begin(mission, uavs, residual, rates, flight)
+        course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)
         course[HEAT] = hottest
-        copy_plan(mission, plan, present)
-        copy_plan(mission, plan, trial)
+        plans.copy_plan(mission, plan, present)
+        plans.copy_plan(mission, plan, trial)
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
     words = np.empty(4, np.uint64)
     cooling, last = (_COLDEST / hottest) ** (1.0 / max(steps, 1)), min(first + most, steps)
@@ -120,21 +104,21 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         if slot == _NO_EDIT:
             continue
         if slot >= flight.last[1]:
-            copy_plan(mission, present, trial)
+            plans.copy_plan(mission, present, trial)
             continue
-        new = fly(mission, rates, trial, flight, slot // STRIDE, ahead, slots)
+        new = fluid.fly(mission, rates, trial, flight, slot // fluid.STRIDE, ahead, slots)
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
         if new >= value or new - value > heat * math.log(luck):
             value = new
-            _keep(mission, ahead, flight, slot // STRIDE)
+            _keep(mission, ahead, flight, slot // fluid.STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
                 trial.lengths[i] = min(trial.lengths[i], flight.team[flight.last[0], i].next + 1)
-            copy_plan(mission, trial, present)
+            plans.copy_plan(mission, trial, present)
             if value > best:
                 best = value
-                copy_plan(mission, present, plan)
+                plans.copy_plan(mission, present, plan)
         else:
-            copy_plan(mission, present, trial)
+            plans.copy_plan(mission, present, trial)
     course[TRIED] = last if last < steps else 0
     course[VALUE], course[BEST], course[HEAT] = value, best, heat
     return last - first
@@ -144,7 +128,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
 def _keep(mission, ahead, flight, first):
     """Make a flight that of a trial, which was simulated from a snapshot on."""
     for s in range(first, ahead.last[0] + 1):
-        copy_snapshot(mission, ahead, s, flight, s)
+        fluid.copy_snapshot(mission, ahead, s, flight, s)
         flight.sums[s, 0], flight.sums[s, 1] = ahead.sums[s, 0], ahead.sums[s, 1]
     flight.last[0], flight.last[1] = ahead.last[0], ahead.last[1]
 
@@ -178,17 +162,17 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     w = plan.waypoints[i, p]
     slot = w.begun
     if kind == _REMOVE:
-        remove(plan, i, p)
+        plans.remove(plan, i, p)
     elif kind == _TURN:
         w.turned = 1 - w.turned
     elif kind == _STAY:
-        if w.stay == CHARGE:
+        if w.stay == plans.CHARGE:
             return _NO_EDIT
         w.stay += 1 if w.stay == 0 or _pick(words[2], 2) == 0 else -1
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
         x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
-        if not on_grid(mission, x, y) or (w.stay == CHARGE and not in_zone(mission, x, y)):
+        if not on_grid(mission, x, y) or (w.stay == plans.CHARGE and not in_zone(mission, x, y)):
             return _NO_EDIT
         w.x, w.y = x, y
     elif kind == _REVERSE:
@@ -213,32 +197,29 @@ def _edit(mission, uavs, nodes, flight, plan, words):
 def _move(flight, plan, i, p, j, words):
     """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
     count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
-    if plan.lengths[j] + count > MOST_WAYPOINTS:
+    if plan.lengths[j] + count > plans.MOST_WAYPOINTS:
         return _NO_EDIT
-    moved, slot, has_charge = (
-        np.empty((_MOST_MOVED, 4), np.int64),
-        plan.waypoints[i, p].begun,
-        False,
-    )
+    moved, has_charge = np.empty((_MOST_MOVED, 4), np.int64), False
+    slot = plan.waypoints[i, p].begun
     for number in range(count):
         w = plan.waypoints[i, p + number]
         moved[number, 0], moved[number, 1] = w.x, w.y
         moved[number, 2], moved[number, 3] = w.stay, w.turned
-        has_charge = has_charge or w.stay == CHARGE
+        has_charge = has_charge or w.stay == plans.CHARGE
     if has_charge and j != i:
         return _NO_EDIT
     for _ in range(count):
-        remove(plan, i, p)
+        plans.remove(plan, i, p)
     q = _pick(words[3], plan.lengths[j] + 1)
     if not has_charge and _pick_low(words[2], 1 << 16) < _SHORTEST:
         q = _shortest_detour(flight, plan, j, moved[0, 0], moved[0, 1])
     if j == i and q == p:
-        return NEVER
+        return plans.NEVER
     slot = min(slot, plan.waypoints[j, q].begun)
     is_reversed = words[0] & np.uint64(1) == np.uint64(1)
     for number in range(count):
         x, y, stay, turned = moved[number]
-        insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
+        plans.insert(plan, j, q if is_reversed else q + number, x, y, stay, turned)
     return slot
 
 
@@ -248,7 +229,7 @@ def _swap_with(plan, i, p, j, q):
     if q == plan.lengths[j] or (i == j and p == q):
         return _NO_EDIT
     w, other = plan.waypoints[i, p], plan.waypoints[j, q]
-    if j != i and (w.stay == CHARGE or other.stay == CHARGE):
+    if j != i and (w.stay == plans.CHARGE or other.stay == plans.CHARGE):
         return _NO_EDIT
     slot = min(w.begun, other.begun)
     _swap(w, other)
@@ -261,12 +242,12 @@ def _cross(plan, i, p, j, q):
     slot = min(plan.waypoints[i, p].begun, plan.waypoints[j, q].begun)
     own, other = plan.lengths[i] - p, plan.lengths[j] - q
     count, charges = max(own, other), 0
-    if j == i or max(p, q) + count > MOST_WAYPOINTS:
+    if j == i or max(p, q) + count > plans.MOST_WAYPOINTS:
         return _NO_EDIT
     for number in range(own):
-        charges += plan.waypoints[i, p + number].stay == CHARGE
+        charges += plan.waypoints[i, p + number].stay == plans.CHARGE
     for number in range(other):
-        charges -= plan.waypoints[j, q + number].stay == CHARGE
+        charges -= plan.waypoints[j, q + number].stay == plans.CHARGE
     if charges != 0:
         return _NO_EDIT
     for number in range(count):
@@ -278,20 +259,17 @@ def _cross(plan, i, p, j, q):
 @kernel
 def _insert_node(mission, nodes, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
-    if plan.lengths[i] == MOST_WAYPOINTS:
+    if plan.lengths[i] == plans.MOST_WAYPOINTS:
         return _NO_EDIT
-    k, other, end = (
-        _pick(words[2], mission.nodes),
-        _pick_low(words[2], mission.nodes),
-        flight.last[0],
-    )
+    k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
+    end = flight.last[0]
     if flight.sea[end, other].base > flight.sea[end, k].base:
         k = other
     x, y = nodes[k, 0], nodes[k, 1]
     if _pick_low(words[0], 1 << 16) < _SHORTEST:
         p = _shortest_detour(flight, plan, i, x, y)
     slot = plan.waypoints[i, p].begun
-    insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
+    plans.insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
     return slot
 
 
@@ -301,19 +279,19 @@ def _edit_charge(mission, plan, i, p, words):
     x, y = zone_cell(mission, _pick(words[2], mission.zone_width * mission.zone_height))
     w = plan.waypoints[i, p]
     slot = w.begun
-    if p < plan.lengths[i] and w.stay == CHARGE:
+    if p < plan.lengths[i] and w.stay == plans.CHARGE:
         w.x, w.y = x, y
-    elif plan.lengths[i] == MOST_WAYPOINTS or mission.flight_cost == 0:
+    elif plan.lengths[i] == plans.MOST_WAYPOINTS or mission.flight_cost == 0:
         slot = _NO_EDIT
     else:
-        insert(plan, i, p, x, y, CHARGE, np.int64(words[3] & np.uint64(1)))
+        plans.insert(plan, i, p, x, y, plans.CHARGE, np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
 def _shortest_detour(flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
-    least, place = NEVER, 0
+    least, place = plans.NEVER, 0
     from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
         detour = abs(x - from_x) + abs(y - from_y)
@@ -330,5 +308,5 @@ def _shortest_detour(flight, plan, i, x, y):
 def _swap(one, other):
     """Swap two waypoints, but for when their legs begin."""
     x, y, stay, turned = one.x, one.y, one.stay, one.turned
-    set_waypoint(one, other.x, other.y, other.stay, other.turned)
-    set_waypoint(other, x, y, stay, turned)
+    plans.set_waypoint(one, other.x, other.y, other.stay, other.turned)
+    plans.set_waypoint(other, x, y, stay, turned)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from dess import rules
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y, State, constants_of, empty_state, ranges_of, types_of
+from dess.state import HOVER, STEP_X, STEP_Y, State, starts_of, state_of
 from tests import compiled
 from tests.drawn import EAST, NORTH, SOUTH, WEST, cells, replications, seeds, spaces
 
@@ -18,11 +18,8 @@ STEPS = list(zip(STEP_X.tolist(), STEP_Y.tolist(), strict=True))
 
 def _launched(space: ScenarioSpace, seed: int = 1, replication: int = 2) -> State:
     """A mission at the start of slot 0."""
-    state = empty_state(1, space.uavs[1], len(space.nodes))
-    state.missions[:] = constants_of(space)
-    state.missions["seed"], state.missions["replication"] = seed, replication
-    mission, uavs, *others = (array[0] for array in state)
-    rules.launch(mission, ranges_of(space), types_of(space), uavs, *others)
+    state = state_of([space], 1)
+    rules.launch(state, 0, starts_of([space], seed), 0, replication)
     return state
 
 

@@ -19,8 +19,8 @@ from tests.reports.small import STUDIES, quick
 # The names of the ready inputs.
 SCENARIO, STUDY, SELECTION, TRAINING = "sea.toml", "study.toml", "selection.toml", "training.toml"
 RESULTS, SELECTED, PAGE, POLICY = "results", "selected", "page.html", "policy"
-# A scenario with all sections, a table that it reads, a study of it, and the results of the study.
-SECTIONS, STORM, STUDIED, EXTENDED = "sections.toml", "storm.csv", "studied.toml", "extended"
+# A scenario with all sections, a study of it, and the results of the study.
+SECTIONS, STUDIED, EXTENDED = "sections.toml", "studied.toml", "extended"
 # Small results of the shipped studies with what reports keep beside them, the trained policies,
 # and the results that reports and sweeps keep of questions.
 REPORTS, TRAINED, ASKED, SWEPT = "reports", "trained", "asked", "swept"

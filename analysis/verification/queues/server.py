@@ -65,7 +65,7 @@ class Server:
 
     @property
     def _held(self) -> int:
-        return int(self.buffers.queues["count"][0])
+        return len(self.buffers.queues[0])
 
     def _count(self) -> None:
         """Add the number in the buffer over the time since it has changed."""

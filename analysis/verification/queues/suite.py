@@ -141,12 +141,13 @@ def _served(space: ScenarioSpace, seed: int, replication: int, places: int) -> d
     times = arrivals_of(world, 0, seed, replication)
     work = np.random.default_rng([seed, replication]).exponential(1.0, len(times))
     server = Server(times, work, places)
-    done, counts = server.buffers.packets[server.buffers.delivered], server.buffers.counts
+    buffers = server.buffers
+    done = buffers.packets[buffers.delivered]
     return {
-        "share of packets lost": counts[2] / counts[0],
+        "share of packets lost": buffers.lost / len(buffers.all),
         "packets in the buffer": server.numbers.sum() / times[-1],
         "time in the buffer": (done["left"] - done["generated"]).mean(),
-        "age": ages_of(server.buffers, done["left"].max())[0],
+        "age": ages_of(buffers, done["left"].max())[0],
     }
 
 

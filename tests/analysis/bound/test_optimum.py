@@ -9,7 +9,7 @@ from analysis.bound import upper_bound
 from dess import load_scenario, rules, simulate_batch
 from dess.channel import empty_scratch, world_of
 from dess.scenario import ScenarioSpace
-from dess.state import State, constants_of, empty_state, ranges_of, types_of
+from dess.state import State, starts_of, state_of
 from policies import load
 from tests import compiled
 from tests.analysis.bound.tiny_sea import TinySea, contraction
@@ -30,10 +30,8 @@ def optimum(space: ScenarioSpace, seed: int) -> float:
     uavs = space.uavs[1]
     world, scratch = world_of(space), empty_scratch(uavs, len(space.nodes))
     arrivals = np.empty(len(space.nodes), np.int64)
-    state = empty_state(1, uavs, len(space.nodes))
-    state.missions[:] = constants_of(space)
-    state.missions["seed"] = seed
-    rules.launch(state.missions[0], ranges_of(space), types_of(space), *(a[0] for a in state[1:]))
+    state = state_of([space], 1)
+    rules.launch(state, 0, starts_of([space], seed), 0, 0)
 
     def best(before: State) -> float:
         ratios = []

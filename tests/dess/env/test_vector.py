@@ -157,9 +157,11 @@ def test_missions_are_numbered_as_they_start(num_envs: int) -> None:
 
 
 def test_gymnasium_makes_it_from_a_name_with_options() -> None:
-    env = gymnasium.make_vec("dess/Paper-v0", num_envs=64)
+    env = gymnasium.make_vec("dess.env.vector:dess/Paper-v0", num_envs=64)
     assert env.num_envs == 64 * PAPER.uavs[1]
-    small_vision = gymnasium.make_vec("dess/Paper-v0", 2, observation="maps", guarded=True)
+    small_vision = gymnasium.make_vec(
+        "dess.env.vector:dess/Paper-v0", 2, observation="maps", guarded=True
+    )
     assert set(small_vision.single_observation_space.keys()) == {"local", "global", "battery"}
 
 

@@ -1,6 +1,5 @@
 """Poisson processes in continuous time: their gaps, thinning, and what is refused."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -41,49 +40,6 @@ def test_a_node_has_its_own_rate() -> None:
 
 
 # --- scenarios ---
-
-
-def _file(folder: Path, schedule: str | None, **others: str) -> Path:
-    """A scenario whose schedule is in a CSV file."""
-    if schedule is not None:
-        (folder / "storm.csv").write_text(schedule)
-    lines = ['schedule = "storm.csv"', 'process = "continuous"', *others.values()]
-    path = folder / "sea.toml"
-    path.write_text("\n".join(["[arrivals]", *lines]))
-    return path
-
-
-def test_a_schedule_is_read_from_a_file_beside_the_scenario(tmp_path: Path) -> None:
-    path = _file(tmp_path, "place,slot,factor\nsea,0,0.5\n\nsea,20.5,3\n")
-    space = load_scenario(path)
-    assert space.arrivals.schedule == ((0.0, 0.5), (20.5, 3.0))
-    (tmp_path / "same.toml").write_text(space.to_toml())  # the values, not the name
-    (tmp_path / "storm.csv").unlink()
-    assert load_scenario(tmp_path / "same.toml") == space
-    replaced = load_scenario(path, **{"arrivals.schedule": [[1, 2]]})
-    assert replaced.arrivals.schedule == ((1.0, 2.0),)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (None, "storm.csv: no such file; allowed: a CSV file"),
-        ("", "has columns none; allowed: slot and factor"),
-        ("slot,rate\n1,2\n", "has columns slot, rate; allowed: slot and factor"),
-        ("slot,factor\n1,2\n2,much\n", "line 3: factor is 'much'; allowed: a number"),
-        ("slot,factor\n1\n", "storm.csv: line 2: factor is ''; allowed: a number"),
-        ("slot,factor\n1,-2\n", "storm.csv: line 2: factor is -2; allowed: 0..100"),
-        ("slot,factor\n1,2\n\nnan,2\n", "storm.csv: line 4: slot is nan; allowed: 0..1"),
-        ("slot,factor\n5,1\n\n4,1\n", "storm.csv: line 4: slot 4 comes after slot 5; allowed"),
-        ("slot,factor\n" + "1,1\n" * 10_001, "storm.csv: has 10,001 rows; allowed: 10,000 at"),
-    ],
-)
-def test_a_file_without_a_schedule_is_refused(
-    tmp_path: Path, content: str | None, message: str
-) -> None:
-    with pytest.raises(InputError, match=message) as error:
-        load_scenario(_file(tmp_path, content))
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize(

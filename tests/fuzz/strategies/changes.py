@@ -41,7 +41,6 @@ _nodes = st.sampled_from(NODES)
 # Code that a document names, and tables that lie elsewhere.
 _names = st.sampled_from(
     [("policies", f'["{steps.EVIL}:Evil0"]'), ("policies", f'["greedy", "{steps.EVIL}:Evil1"]')]
-    + [("schedule", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "../in")]
     + [("nodes", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "fifo.csv")]
     + [("scenario", f'"{path}"') for path in ("../home/secret.csv", "../in", "/dev/stdin")]
 )

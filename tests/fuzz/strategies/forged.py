@@ -19,7 +19,7 @@ from tests.fuzz.strategies.changes import (
     training_changes,
 )
 
-_NAMES = (ready.SCENARIO, ready.SECTIONS, ready.STORM, "bay.csv", ready.STUDY, ready.SELECTION)
+_NAMES = (ready.SCENARIO, ready.SECTIONS, "bay.csv", ready.STUDY, ready.SELECTION)
 _NAMES += (ready.STUDIED, ready.TRAINING, ready.RESULTS, ready.SELECTED, ready.EXTENDED)
 INPUTS: tuple[Step, ...] = tuple(
     copy(name, f"in/{name}") for name in (*_NAMES, ready.POLICY, ready.PAGE)
@@ -71,8 +71,7 @@ def forged(
 
 def _changes(kind: str, path: str, place: str) -> st.SearchStrategy[Step]:
     if kind in ("scenario", "study", "config"):
-        tables = st.one_of(*map(table_changes, (f"in/{ready.STORM}", "in/bay.csv")))
-        return st.one_of(*[document_changes(path)] * 5, tables)
+        return st.one_of(*[document_changes(path)] * 5, table_changes("in/bay.csv"))
     if kind == "policy":
         return training_changes(
             path, "model.safetensors" if place == IN else "checkpoint.safetensors"

@@ -10,7 +10,7 @@ from tests.fuzz.strategies.commands import line
 from tests.fuzz.strategies.sections import PLAIN, odd_numbers
 from tests.fuzz.strategies.values import numbers, toml_values
 
-_INPUTS = tuple(copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.SECTIONS, ready.STORM))
+_INPUTS = tuple(copy(name, f"in/{name}") for name in (ready.SCENARIO, ready.SECTIONS))
 _INPUTS += (copy(ready.RESULTS, f"in/{ready.RESULTS}"),)
 _COMMANDS = (("simulate",), ("evaluate",), ("scenarios", "show"), ("sweep",))
 # Values of a field that are equal, or of no field at all.
