@@ -185,13 +185,18 @@ class Origin(Document):
 
 
 def scenario_of(fields: dict[str, Any]) -> ScenarioSpace:
-    """The scenario with the fields that a document has.
+    """The scenario with the fields that a document has; manifests have the same ones many times.
 
     Raises:
         InputError: If they are not valid.
     """
+    return _scenario_of(json.dumps(fields))
+
+
+@lru_cache(maxsize=2**15)
+def _scenario_of(fields: str) -> ScenarioSpace:
     try:
-        return ScenarioSpace.model_validate(fields)
+        return ScenarioSpace.model_validate(json.loads(fields))
     except ValidationError as error:
         raise InputError(validation_line(error, "scenario", ScenarioSpace)) from None
 

@@ -53,7 +53,9 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
     elif len(settings(results)) == 1:
         _print_means(summary.means(results), "mean, 95 % interval", printed)
     elif short:
-        _print_by_point(settings(results), summary.means(results), [PRODUCT])
+        points = settings(results)
+        means = summary.means(results) if len(points) <= MANY_POINTS else pd.DataFrame()
+        _print_by_point(points, means, [PRODUCT])
 
 
 def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
