@@ -141,7 +141,7 @@ class MissionModel:
                 _communicate(*arrays, n)
                 self._log_communications(slot, n, m)
                 if packets is not None:
-                    packets.deliver(n)
+                    packets.deliver(slot + n / m)
             before = self._team() if self.log is not None else []
             active = _close(missions, uavs, residual, self.arrivals)
             slot += 1

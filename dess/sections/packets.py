@@ -33,6 +33,7 @@ class Packets:
         self._log, self._nodes, self._missions = log, scenario.nodes, state.missions
         self._mission, self._uavs = state.missions[0], state.uavs[0]
         self._residual, self._sensors = state.residual[0], state.sensors[0]
+        self._served, self._amounts = self._uavs["served"], self._uavs["amount"]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
         self._measures_age = scenario.age.measured
         self._sources = sources_of(arrivals, scenario.arrival_rate, nodes)
@@ -72,15 +73,11 @@ class Packets:
         self._log_events("arrival", [len(b.all) - 1])
         self._log_events("loss", [lost] if lost >= 0 else [])
 
-    def deliver(self, n: int) -> None:
-        """Take what the UAVs collected in communication slot ``n`` from the packets, in order."""
-        fleet, b = range(len(self._uavs)), self.buffers
-        nodes, amounts = self._uavs["served"].tolist(), self._uavs["amount"].tolist()
-        served = [(i, nodes[i], amounts[i]) for i in fleet if nodes[i] >= 0]
-        if not served:
-            return
-        mission, before = self._mission, len(b.delivered)
-        time = int(mission["slot"]) + n / int(mission["communication_slots"])
+    def deliver(self, time: float) -> None:
+        """Take what the UAVs collected at a time from the packets, in the order of the UAVs."""
+        b, amounts = self.buffers, self._amounts.tolist()
+        served = [(i, k, amounts[i]) for i, k in enumerate(self._served.tolist()) if k >= 0]
+        before = len(b.delivered)
         for i, k, amount in served:
             b.serve(k, time, amount, i)
         for i, k, _ in served:  # rounding: no packets means no data, and vice versa
@@ -92,7 +89,7 @@ class Packets:
             packet = b.all[number]
             sensor = self._sensors[packet.node]
             if packet.generated > sensor["newest"]:
-                mission["newest"] += packet.generated - sensor["newest"]
+                self._mission["newest"] += packet.generated - sensor["newest"]
                 sensor["newest"] = packet.generated
         self._log_events("delivery", b.delivered[before:])
 
