@@ -177,7 +177,8 @@ VALUES: list[tuple[str, Any, Any]] = [
 ]
 # A field of the first record of a tensor that holds records.
 UAVS = {"x": 10**6, "y": -1, "from_x": 32, "battery": 10**12, "executed": 77, "end": 5}
-UAVS |= {"served": 25, "pad_request": 10**6, "active": False, "collected": np.nan}
+UAVS |= {"served": 25, "pad_request": 10**6, "slots_left": 1}
+UAVS |= {"active": False, "collected": np.nan}
 MISSIONS = {"grid": 10**9, "nodes": 10**6, "uavs": 64, "active": 9, "slot": -1, "replication": 8}
 MISSIONS |= {"arrived": np.inf}
 TRUTHS = {"replay.acted": 0, "early": 0, "stepper.uavs": UAV.fields["latch"][1]}  # type: ignore[index]
