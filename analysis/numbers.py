@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import pandas as pd
 
+from analysis.names import METRICS
+
 # What a spreadsheet takes as the beginning of a formula.
 _FORMULA = re.compile(r"^[=+\-@\t\r]")
 
@@ -51,6 +53,19 @@ def quantity(value: float) -> str:
 def quantities(mean: float, low: float, high: float) -> str:
     """An estimate and its interval as ``1,042 [1,010, 1,074]``."""
     return f"{quantity(mean)} [{quantity(low)}, {quantity(high)}]"
+
+
+def written(metric: str) -> Callable[[float, float, float], str]:
+    """The function that writes an estimate of a metric and its interval."""
+    return interval if metric in METRICS else quantities
+
+
+def estimates(
+    rows: pd.DataFrame, name: str, write: Callable[[float, float, float], str] = interval
+) -> pd.Series:
+    """The column ``NAME`` of estimates with its ends ``NAME_low`` and ``NAME_high``, as text."""
+    ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy(float)
+    return pd.Series([write(*row) for row in ends], rows.index, dtype=object)
 
 
 def minus(number: str) -> str:

@@ -22,7 +22,7 @@ ROOMS = {
         *("replication", "verification", "figures", "sweeps"),
     ),
     "reports": (
-        *("folders", "player", "tools", "pages", "explorer", "crate"),
+        *("folders", "tables", "player", "tools", "pages", "explorer", "crate"),
         *("interrupts", "cli", "__main__"),
     ),
 }

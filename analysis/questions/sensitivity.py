@@ -90,8 +90,8 @@ def index_table(indices: pd.DataFrame) -> pd.DataFrame:
         "Policy": rows["policy"],
         "Metric": rows["metric"].map(METRIC_NAMES),
         "Parameter": rows["parameter"].map(lambda p: "noise" if p == NOISE else parameter(p).name),
-        "Alone": _shares(rows, "first"),
-        "With all interactions": _shares(rows, "total"),
+        "Alone": numbers.estimates(rows, "first"),
+        "With all interactions": numbers.estimates(rows, "total"),
     }
     return pd.DataFrame(columns)
 
@@ -108,11 +108,6 @@ def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
     return numbers.words(
         [f"{parameter(field).within} {value_text(ends)}" for field, ends in ranges.items()]
     )
-
-
-def _shares(rows: pd.DataFrame, index: str) -> list[str]:
-    ends = rows[[index, f"{index}_low", f"{index}_high"]].to_numpy(float)
-    return [numbers.interval(*estimate) for estimate in ends]
 
 
 def _indices(

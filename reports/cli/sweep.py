@@ -148,26 +148,24 @@ def _render(folder: Path, out: Path, parameters: dict[str, str]) -> Path | None:
 
 def _print(answer: "Sweep", metric: str) -> None:
     """Print the first settings of the ranking, and the cheapest ones."""
+    import numpy as np
+    import pandas as pd
+
     from analysis import numbers
     from analysis.names import COST, MEASURES, SHORT_METRICS, metric_label, metric_name, value_text
     from analysis.questions.settings import varied
 
     table, fields, prices = answer.table(metric), [*varied(answer.results)], answer.study.costs
-    more = [metric_label(metric)] if metric in MEASURES else []
-    heads = ["rank", "", "policy", *fields, *more, *SHORT_METRICS.values()]
-    heads += [COST] if prices else []
-    rows = []
-    for row in table.head(SHOWN).to_dict("records"):
-        ends = [[row[m], row[f"{m}_low"], row[f"{m}_high"]] for m in SHORT_METRICS]
-        cost = [numbers.money(row[COST], prices.currency)] if prices else []
-        mark = "≈" if row["tied"] else ""
-        values = [value_text(row[field]) for field in fields]
-        metrics = [numbers.interval(*estimate) for estimate in ends]
-        if more:
-            estimate = [row[metric], row[f"{metric}_low"], row[f"{metric}_high"]]
-            metrics.insert(0, numbers.quantities(*estimate))
-        rows.append([f"{row['rank']}", mark, row["policy"], *values, *metrics, *cost])
-    console.print_table(heads, rows)
+    top = table.head(SHOWN)
+    cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
+    cells["policy"] = top["policy"]
+    cells[fields] = top[fields].map(value_text)
+    for name in [*([metric] if metric in MEASURES else []), *SHORT_METRICS]:
+        head = SHORT_METRICS.get(name) or metric_label(name)
+        cells[head] = numbers.estimates(top, name, numbers.written(name))
+    if prices:
+        cells[COST] = [numbers.money(cost, prices.currency) for cost in top[COST]]
+    console.print_table([*map(str, cells)], cells.astype(str).to_numpy().tolist())
     first = f", the first {SHOWN} are shown" if len(table) > SHOWN else ""
     what = SHORT_METRICS.get(metric) or metric_name(metric).lower()
     console.say(

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import METRICS, parameter, value_text
+from analysis.names import parameter, value_text
 from analysis.questions import settings
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
@@ -94,7 +94,7 @@ def listed(
     """
     if metric is not None:
         rows = rows[rows["metric"] == metric]
-    write = write or (numbers.interval if metric in METRICS else numbers.quantities)
+    write = write or numbers.written(metric or "")
 
     def cell(mean: float, low: float, high: float) -> str:
         return "" if isnan(mean) else write(mean, low, high)

@@ -63,8 +63,7 @@ def listed(table: pd.DataFrame) -> pd.DataFrame:
     columns["Missions"] = table["n"].map("{:,}".format)
     for metric, head in _SHOWN.items():
         write = _points if metric == GAP else numbers.interval
-        ends = table[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy(float)
-        columns[head] = pd.Series([write(*row) for row in ends], table.index)
+        columns[head] = numbers.estimates(table, metric, write)
     return pd.DataFrame(columns)
 
 

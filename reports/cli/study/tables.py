@@ -7,9 +7,9 @@ import pandas as pd
 
 from analysis import numbers
 from analysis.names import (
-    COST,
     LESS_IS_BETTER,
     MEASURES,
+    METRICS,
     PRODUCT,
     RATIO,
     SHORT_METRICS,
@@ -21,11 +21,15 @@ from analysis.names import (
 from analysis.questions import costs, summary
 from analysis.questions.head_to_head import new_training
 from analysis.questions.optimality import gap
+from analysis.questions.sensitivity import index_table
 from analysis.questions.summary import settings
 from analysis.replication import paper
 from analysis.results.tables import Results
+from reports import tables
 from reports.cli import console
 
+_SHORT = {METRICS[metric]: name for metric, name in SHORT_METRICS.items()}
+_QUANTILES = (0.05, 0.5, 0.95)
 MANY_POINTS = 40  # more design points are not listed
 
 
@@ -58,31 +62,43 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         _print_by_point(points, means, [PRODUCT])
 
 
-def print_details(results: Results, tables: Mapping[str, pd.DataFrame]) -> None:
+def print_details(results: Results, frames: Mapping[str, pd.DataFrame]) -> None:
     """Print the tables of ``dess study show``, by their names in its JSON; none that is empty."""
     points = settings(results)
     printers = {
-        "sensitivities": _print_sensitivities,
+        "sensitivities": lambda table: _print_titled(
+            "shares of the collection ratio's variance:",
+            index_table(table[table["metric"] == RATIO]).drop(columns="Metric"),
+        ),
         "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
         "means": lambda means: _print_by_point(
             points, means, [*SHORT_METRICS, *measured_in({*means["metric"]})]
         ),
         "distributions": _print_distributions,
-        "precisions": lambda precisions: _print_precisions(points, precisions),
+        "precisions": lambda table: _print_titled(
+            "precision:",
+            tables.precisions(table).assign(Point=table["point"].map(points.__getitem__)),
+        ),
         "comparisons": _print_comparisons,
         "gaps": lambda table: print_frame("optimality gap", gap.listed(table).set_index("Policy")),
         "learned_against_heuristic": _print_learners,
         "worst": _print_worst,
     }
     for name, print_rows in printers.items():
-        if not tables[name].empty:
-            print_rows(tables[name])
+        if not frames[name].empty:
+            print_rows(frames[name])
 
 
 def print_frame(title: str, cells: pd.DataFrame) -> None:
     """Print a table of text under its title; the index is its first column."""
     rows = [[str(name), *map(str, row)] for name, *row in cells.itertuples(name=None)]
-    console.print_table([title, *map(str, cells.columns)], rows)
+    console.print_table([title, *(_SHORT.get(head, head) for head in map(str, cells))], rows)
+
+
+def _print_titled(title: str, cells: pd.DataFrame) -> None:
+    """Print a table of text below its title."""
+    console.say(title)
+    print_frame(str(cells.columns[0]), cells.set_index(cells.columns[0]))
 
 
 def _print_selections(selected: pd.DataFrame) -> None:
@@ -100,23 +116,18 @@ def _print_costs(table: pd.DataFrame, currency: str) -> None:
     if len(table) > MANY_POINTS:
         console.say(f"the costs of {len(table)} settings are too many to list; --json has them")
         return
-    cells = table[["condition", "policy"]].set_index(table["fleet"])
-    ends = table[[COST, f"{COST}_low", f"{COST}_high"]].to_numpy(float)
-    cells[f"cost [{currency}]"] = [numbers.amounts(*costs) for costs in ends]
-    shares = table[[SUCCESS, f"{SUCCESS}_low", f"{SUCCESS}_high"]].to_numpy(float)
-    cells["success"] = [numbers.interval(*share) for share in shares]
-    cells["on the front"] = [numbers.percent(share) for share in table["probability"]]
-    if not any(cells["condition"]):
-        cells = cells.drop(columns="condition")
-    print_frame("cost against success", cells)
+    cells = tables.priced(table, [SUCCESS])
+    cells["On the front"] = table["probability"].map(numbers.percent)
+    _print_titled(f"cost [{currency}] against success:", cells)
 
 
 def _print_means(means: pd.DataFrame, title: str, printed: Mapping[str, float]) -> None:
     """A row per policy, and one with the values that the paper prints; a column per metric."""
-    cells = numbers.wide(means[means["metric"].isin(SHORT_METRICS)], "policy")
+    cells = tables.means(means).drop(columns="Missions").set_index("Policy")
     if printed:
-        cells.loc["paper"] = [numbers.percent(printed[metric]) for metric in cells.columns]
-    print_frame(title, cells.rename(columns=SHORT_METRICS))
+        names = {name: metric for metric, name in METRICS.items()}
+        cells.loc["paper"] = [numbers.percent(printed[names[head]]) for head in cells.columns]
+    print_frame(title, cells)
     measured = means[means["metric"].isin(MEASURES)]
     if not measured.empty:
         cells = numbers.wide(measured, "metric", "policy", numbers.quantities).fillna("")
@@ -132,8 +143,7 @@ def _print_by_point(points: list[str], means: pd.DataFrame, metrics: list[str]) 
         return
     for metric in metrics:
         rows = means[means["metric"] == metric]
-        write = numbers.quantities if metric in MEASURES else numbers.interval
-        cells = numbers.wide(rows, "point", "policy", write).fillna("")
+        cells = numbers.wide(rows, "point", "policy", numbers.written(metric)).fillna("")
         if metric == PRODUCT and "verdict" in rows and len(cells.columns) > 1:
             cells["best"] = _best(rows)
         title = SHORT_METRICS.get(metric) or metric_label(metric)
@@ -181,43 +191,8 @@ def print_meeting(results: Results, means: pd.DataFrame, targets: Mapping[str, f
 
 def _print_distributions(table: pd.DataFrame) -> None:
     """Quantiles of the product over the missions, and the mean of the worst ones."""
-    rows = []
-    for policy, views in table.groupby("policy", sort=False):
-        quantiles = views[views["view"] == "quantile"].set_index("share")["value"]
-        (worst,) = views[views["view"] == "worst mean"].itertuples()
-        cells = [numbers.percent(quantiles[share]) for share in (0.05, 0.5, 0.95)]
-        rows.append([policy, *cells, numbers.interval(worst.value, worst.low, worst.high)])
-    head = ["spread of the product", "5 % quantile", "median", "95 % quantile"]
-    console.print_table([*head, "mean of the worst 5 %"], rows)
-
-
-def _print_precisions(points: list[str], table: pd.DataFrame) -> None:
-    """The precision that each estimate reached, beside its target."""
-    rows = [
-        [
-            f"{row.policy} {points[row.point]}".strip(),
-            row.metric,
-            f"{row.missions:,}",
-            f"{row.mean:.4g} ± {row.half_width:.2g}",
-            f"{row.target:.2g}",
-            "yes" if row.met else "no: the budget ended",
-        ]
-        for row in table.itertuples()
-    ]
-    console.print_table(["precision", "metric", "missions", "mean", "target", "reached"], rows)
-
-
-def _print_sensitivities(table: pd.DataFrame) -> None:
-    """A table per policy, a row per parameter: its effect alone, and with all interactions."""
-    for policy, indices in table[table["metric"] == RATIO].groupby("policy", sort=False):
-        rows = []
-        for row in indices.itertuples():
-            alone = numbers.interval(row.first, row.first_low, row.first_high)
-            total = numbers.interval(row.total, row.total_low, row.total_high)
-            rows.append([row.parameter, alone, total])
-        console.print_table(
-            [f"{policy}: share of the collection ratio's variance", "alone", "total"], rows
-        )
+    rows = table[(table["view"] != "quantile") | table["share"].isin(_QUANTILES)]
+    print_frame("spread of the product", tables.spread(rows, PRODUCT).set_index("Policy"))
 
 
 def _print_comparisons(table: pd.DataFrame) -> None:
@@ -236,12 +211,9 @@ def _print_learners(table: pd.DataFrame) -> None:
 
 
 def differences(table: pd.DataFrame, who: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Differences in every metric and the p-value of the product, as text; rows of the product."""
-    estimates = table.rename(columns={"difference": "mean"})
-    cells = numbers.wide(estimates, who, write=numbers.points).rename(columns=SHORT_METRICS)
-    product = table[table["metric"] == PRODUCT].set_index(who)
-    cells["p (Holm)"] = product["p_adjusted"].map(numbers.p_value)
-    return cells, product
+    """``tables.compared`` by what is compared, and the rows of the product."""
+    cells = tables.compared(table, who).set_index(who.capitalize())
+    return cells, table[table["metric"] == PRODUCT].set_index(who)
 
 
 def _gain(reduction: float) -> str:

@@ -16,6 +16,7 @@ from analysis.questions import costs as questions
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.study.cheapest import Cheapest
+from reports import tables
 from reports.pages import html
 from reports.pages.html import Drawing
 from reports.pages.study.words import MOST_ROWS
@@ -59,7 +60,7 @@ def front_table(results: Results, fronts: Fronts) -> HTML:
     first = next(iter(fronts.values()))
     shares = pd.DataFrame({metric: front["probability"] for metric, front in fronts.items()})
     top = first[(shares >= CERTAIN).any(axis=1)].head(MOST_ROWS)
-    shown = _settings(top, [*fronts])
+    shown = tables.priced(top, [*fronts])
     for metric in fronts:
         head = f"On the front of {metric_name(metric).lower()}"
         shown[head] = shares.loc[top.index, metric].map(numbers.percent)
@@ -76,7 +77,7 @@ def parts_table(results: Results) -> HTML:
     rows = questions.priced(results)
     rows = rows.merge(questions.parts(results).drop(columns=COST), on=["policy", "point"])
     top = rows.head(MOST_ROWS)
-    shown = _settings(top, [])
+    shown = tables.priced(top, [])
     for part in questions.PARTS:
         shown[part.capitalize()] = top[part].map("{:,.0f}".format)
     caption = f"The mean cost of the settings [{_currency(results)}], and its parts"
@@ -96,7 +97,7 @@ def judged_table(results: Results) -> HTML:
     """A table of the settings and whether they meet the requirements."""
     table = questions.judged(results)
     top = table.head(MOST_ROWS)
-    shown = _settings(top, [*required(results)])
+    shown = tables.priced(top, [*required(results)])
     shown["Requirements"] = top["verdict"].map(questions.VERDICTS)
     shown["Selected"] = top["selected"].map({True: "yes", False: ""})
     shown["Missions"] = top["n"].map("{:,}".format)
@@ -109,21 +110,10 @@ def checked_table(results: Results) -> HTML:
     if results.checks.empty:
         return HTML("<p>No setting was checked.</p>")
     rows = questions.checks(results)
-    shown = _settings(rows, [*METRICS])
+    shown = tables.priced(rows, [*METRICS])
     shown["Missions"] = rows["n"].map("{:,}".format)
     caption = f"The check of the selected settings: means with {_LEVEL} intervals"
     return html.table(shown, caption, data=rows)
-
-
-def _settings(rows: pd.DataFrame, metrics: list[str]) -> pd.DataFrame:
-    """Condition, fleet, policy, cost and metrics of settings, as text."""
-    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
-    columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
-    write = {COST: numbers.amounts} | dict.fromkeys(metrics, numbers.interval)
-    for name, writing in write.items():
-        ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy(float)
-        columns[metric_name(name)] = pd.Series([writing(*row) for row in ends], rows.index)
-    return pd.DataFrame(columns)
 
 
 def _currency(results: Results) -> str:

@@ -7,13 +7,14 @@ import pandas as pd
 from IPython.display import HTML
 
 from analysis import numbers
-from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
+from analysis.names import METRICS, metric_name, parameter, value_text
 from analysis.questions import sensitivity as indices
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
+from reports import tables
 from reports.pages import html
-from reports.pages.study.words import MOST_ROWS, metrics_of, written
+from reports.pages.study.words import MOST_ROWS, metrics_of
 
 _LEVEL = numbers.level(LEVEL)
 
@@ -98,19 +99,8 @@ def means(results: Results) -> HTML:
 def precisions(results: Results) -> HTML:
     """The precision that a study had to reach, and whether it did."""
     data = summary.precisions(results)
-    top = data.head(MOST_ROWS)
-    columns = {
-        "Policy": top["policy"],
-        "Point": top["point"],
-        "Metric": top["metric"].map(metric_name),
-        "Missions": top["missions"].map("{:,}".format),
-        "Mean": top["mean"].map(numbers.quantity),
-        "Half-width": top["half_width"].map("{:.2g}".format),
-        "Target": top["target"].map("{:.2g}".format),
-        "Reached": top["met"].map({True: "yes", False: "no: the budget ended"}),
-    }
     caption = f"Half-widths of {_LEVEL} intervals, and their targets"
-    return html.table(pd.DataFrame(columns), caption, data=data)
+    return html.table(tables.precisions(data.head(MOST_ROWS)), caption, data=data)
 
 
 def against(results: Results, baseline: int, metric: str) -> HTML:
@@ -171,24 +161,15 @@ def spread(distributions: pd.DataFrame, metric: str) -> HTML:
         distributions: Rows of ``analysis.distribution``.
         metric: The metric.
     """
-    heads = [
-        f"{numbers.level(row.share)} quantile"
-        if row.view == "quantile"
-        else f"Mean of the worst {numbers.level(row.share)}"
-        for row in distributions.itertuples()
-    ]
-    rows = distributions.assign(head=heads).rename(columns={"value": "mean"})
-    shown = numbers.wide(rows, "policy", "head", written(metric)).reset_index(names="Policy")
     caption = f"Quantiles of {metric_name(metric).lower()} over missions, with {_LEVEL} intervals"
-    return html.table(shown, caption, data=distributions)
+    return html.table(tables.spread(distributions, metric), caption, data=distributions)
 
 
 def _settings(results: Results, rows: pd.DataFrame, metric: str) -> pd.DataFrame:
     """Rows of ``settings.ranked`` as text."""
     columns = {"Policy": rows["policy"], "Point": rows["point"]} | _fields(results, rows)
     for name in metrics_of(metric):
-        ends = rows[[name, f"{name}_low", f"{name}_high"]].to_numpy()
-        columns[metric_name(name)] = pd.Series([written(name)(*row) for row in ends], rows.index)
+        columns[metric_name(name)] = numbers.estimates(rows, name, numbers.written(name))
     return pd.DataFrame(columns | {"Missions": rows["n"].map("{:,}".format)})
 
 
@@ -198,20 +179,10 @@ def _fields(results: Results, rows: pd.DataFrame) -> dict[str, pd.Series]:
 
 
 def _means(rows: pd.DataFrame, caption: str) -> HTML:
-    """Rows of ``analysis.summary`` by policy: a column per metric."""
-    of_metrics = rows[rows["metric"].isin(METRICS)]
-    shown = numbers.wide(of_metrics, ["policy", "n"]).reset_index()
-    shown["n"] = shown["n"].map("{:,}".format)
-    shown = shown.rename(columns={"policy": "Policy", "n": "Missions", **METRICS})
-    return html.table(shown, caption, data=rows)
+    return html.table(tables.means(rows), caption, data=rows)
 
 
 def _compared(rows: pd.DataFrame, of: str, caption: str) -> HTML:
-    """Rows of ``analysis.compare``: differences in every metric."""
-    estimates = rows.rename(columns={"difference": "mean"})
-    shown = numbers.wide(estimates, of, write=numbers.points).rename(columns=METRICS)
-    p = rows[rows["metric"] == PRODUCT].set_index(of)["p_adjusted"]
-    shown["p of the product"] = p.map(numbers.p_value)
     units = f"[percentage points], with {_LEVEL} intervals; p corrected for the number of"
     caption = f"{caption} {units} comparisons and the choice of the best by these data"
-    return html.table(shown.reset_index(names=of.capitalize()), caption, data=rows)
+    return html.table(tables.compared(rows, of), caption, data=rows)

@@ -1,6 +1,6 @@
 """Sentences of the page of a study, in Markdown: what was simulated, and what is the best."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import pandas as pd
@@ -47,11 +47,6 @@ def metrics_of(metric: str) -> list[str]:
     return [*dict.fromkeys((metric, *METRICS))]
 
 
-def written(metric: str) -> Callable[[float, float, float], str]:
-    """The function that writes an estimate of a metric and its interval."""
-    return numbers.interval if metric in METRICS else numbers.quantities
-
-
 def simulated(results: Results) -> html.Marked:
     """What was simulated: scenario, policies, design and missions, as a list."""
     manifest = results.store.manifest
@@ -82,7 +77,7 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> html.Marked:
         metric: The metric.
     """
     best, others, tied = ranked.iloc[0], len(ranked) - 1, int(ranked["tied"].sum()) - 1
-    value = written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
+    value = numbers.written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     where = settings.in_words(results)[best["point"]]
     what = "setting" if settings.varied(results) else "policy"
     setting = html.marked(" with {where}", where=where) if where != settings.AS_IT_IS else ""

@@ -1,0 +1,68 @@
+"""What both the page of a study and the terminal show of it, as tables of text.
+
+Every function turns rows of ``analysis.questions`` into text, with the same columns and words for
+both; ``reports.pages.html.table`` and ``reports.cli.study.tables.print_frame`` write them.
+"""
+
+import pandas as pd
+
+from analysis import numbers
+from analysis.names import COST, METRICS, PRODUCT, metric_name
+
+
+def means(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``analysis.summary`` by policy: a column per metric of the paper."""
+    of_metrics = rows[rows["metric"].isin(METRICS)]
+    shown = numbers.wide(of_metrics, ["policy", "n"]).reset_index()
+    shown["n"] = shown["n"].map("{:,}".format)
+    return shown.rename(columns={"policy": "Policy", "n": "Missions", **METRICS})
+
+
+def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
+    """Rows of ``analysis.compare``: differences in every metric, and the p-value of the product.
+
+    Args:
+        rows: The rows.
+        of: The column that tells what is compared.
+    """
+    estimates = rows.rename(columns={"difference": "mean"})
+    shown = numbers.wide(estimates, of, write=numbers.points).rename(columns=METRICS)
+    p = rows[rows["metric"] == PRODUCT].set_index(of)["p_adjusted"]
+    shown["p of the product"] = p.map(numbers.p_value)
+    return shown.reset_index(names=of.capitalize())
+
+
+def precisions(rows: pd.DataFrame) -> pd.DataFrame:
+    """Rows of ``summary.precisions``: the precision of each estimate beside its target."""
+    columns = {
+        "Policy": rows["policy"],
+        "Point": rows["point"],
+        "Metric": rows["metric"].map(metric_name),
+        "Missions": rows["missions"].map("{:,}".format),
+        "Mean": rows["mean"].map(numbers.quantity),
+        "Half-width": rows["half_width"].map("{:.2g}".format),
+        "Target": rows["target"].map("{:.2g}".format),
+        "Reached": rows["met"].map({True: "yes", False: "no: the budget ended"}),
+    }
+    return pd.DataFrame(columns)
+
+
+def spread(distributions: pd.DataFrame, metric: str) -> pd.DataFrame:
+    """Rows of ``analysis.distribution``: quantiles of a metric, and means of the worst missions."""
+    heads = [
+        f"{numbers.level(row.share)} quantile"
+        if row.view == "quantile"
+        else f"Mean of the worst {numbers.level(row.share)}"
+        for row in distributions.itertuples()
+    ]
+    rows = distributions.assign(head=heads).rename(columns={"value": "mean"})
+    return numbers.wide(rows, "policy", "head", numbers.written(metric)).reset_index(names="Policy")
+
+
+def priced(rows: pd.DataFrame, metrics: list[str]) -> pd.DataFrame:
+    """Rows of ``costs.priced``: condition, fleet, policy, cost and metrics of settings."""
+    columns = {"Condition": rows["condition"]} if rows["condition"].any() else {}
+    columns |= {"Fleet": rows["fleet"], "Policy": rows["policy"]}
+    write = {COST: numbers.amounts} | dict.fromkeys(metrics, numbers.interval)
+    columns |= {metric_name(name): numbers.estimates(rows, name, write[name]) for name in write}
+    return pd.DataFrame(columns)
