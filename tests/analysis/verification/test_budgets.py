@@ -42,24 +42,16 @@ def charging(logs: list[Log]) -> list[Log]:
     return sorted(logs, key=lambda log: -(log.events["event"] == "charge_end").sum())
 
 
-def test_charging_that_begins_too_early_is_noticed(logs: list[Log]) -> None:
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("charge_start", 0), ("zone", (0, 6, 2, 2)), ("charge_complete", 100)],
+    ids=["begins too early", "outside the zone", "ends too early"],
+)
+def test_charging_that_breaks_a_rule_is_noticed(logs: list[Log], field: str, value: object) -> None:
     first, *rest = charging(logs)
-    early = replace(first, scenario=first.scenario.model_copy(update={"charge_start": 0}))
+    changed = replace(first, scenario=first.scenario.model_copy(update={field: value}))
     assert not fails(budgets.battery_check([first, *rest]))
-    assert fails(budgets.battery_check([early, *rest]))
-
-
-def test_charging_outside_the_zone_is_noticed(logs: list[Log]) -> None:
-    first, *rest = charging(logs)
-    elsewhere = replace(first, scenario=first.scenario.model_copy(update={"zone": (0, 6, 2, 2)}))
-    assert fails(budgets.battery_check([elsewhere, *rest]))
-
-
-def test_charging_that_ends_too_early_is_noticed(logs: list[Log]) -> None:
-    first, *rest = charging(logs)
-    fuller = first.scenario.charge_complete + 1
-    longer = replace(first, scenario=first.scenario.model_copy(update={"charge_complete": fuller}))
-    assert fails(budgets.battery_check([longer, *rest]))
+    assert fails(budgets.battery_check([changed, *rest]))
 
 
 def test_data_that_are_recorded_as_lost_are_no_imbalance(results: Results) -> None:

@@ -58,14 +58,6 @@ def test_initial_data_of_few_nodes_by_hand() -> None:
     assert two.cdf(17.5) == pytest.approx(0.125)  # a triangle, a quarter of the way
 
 
-def test_initial_data_of_many_nodes_have_the_moments_of_a_sum() -> None:
-    for count in (50, 51):
-        cells = [[k % 32, k // 32] for k in range(count)]
-        law = closed_forms.initial_total(Scenario.of(nodes=cells))
-        assert law.mean() == pytest.approx(12.5 * count)
-        assert law.std() == pytest.approx(15 * np.sqrt(count / 12))
-
-
 @pytest.mark.parametrize("successes", [0, 2, 6, 9])
 def test_coverage_of_wilson_counts_all_ways_to_draw_a_block(successes: int) -> None:
     missions = [1] * successes + [0] * (9 - successes)

@@ -58,17 +58,3 @@ def test_the_loss_at_a_server_with_fixed_gaps() -> None:
     assert theory.loss_of_slotted_md1k(0.5, 1) == pytest.approx(1 - (1 - np.exp(-0.5)) / 0.5)
     assert theory.loss_of_slotted_md1k(0.5, 40) == pytest.approx(0.0, abs=1e-9)
     assert theory.loss_of_slotted_md1k(50.0, 3) == pytest.approx(1 - 1 / 50)
-
-
-def test_the_latency_is_that_of_the_chain_of_numbers() -> None:
-    """Little's law: half of a gap's arrivals, and the number after a gap, over the rate."""
-    load, places = 0.6, 200
-    number = np.zeros(places)
-    number[0] = 1.0
-    arrived = np.exp(-load) * np.cumprod([1.0, *(load / np.arange(1, places))])
-    for _ in range(400):
-        came = np.convolve(number, arrived)[:places]
-        number = np.append(came[1:], 0.0)
-        number[0] += came[0]
-    mean = number @ np.arange(places) + load / 2
-    assert theory.latency_of_slotted_md1(load, 1.0) == pytest.approx(mean / load)
