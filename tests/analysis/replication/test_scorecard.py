@@ -155,6 +155,8 @@ def test_what_a_uav_changes_is_that_of_the_parquet(
         low, high = stats.t.interval(0.95, len(change) - 1, change.mean(), stats.sem(change))
         (quantity,) = learned(rows, words).quantities
         assert quantity[:4] == pytest.approx((change.mean(), low, high, len(change)))
+        printed, gain = row_of(rows, words).claim.printed, paper.FIG_4[uavs][RATIO]
+        assert printed and printed.value == gain - paper.FIG_4[uavs - 1][RATIO]
     verdict = HOLDS if low > 0 else REFUTED if high < 0 else INCONCLUSIVE
     assert learned(rows, "further").verdict == verdict
 
