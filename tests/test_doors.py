@@ -109,6 +109,8 @@ PARSED = {
     "reports.pages.verify": {"validate_json"},
     # Keys of a dictionary, which are texts of JSON.
     "analysis.study.candidates": {"loads"},
+    # Lines between a process and the one that it has started.
+    "reports.pages.kernels": {"loads"},
 }
 
 

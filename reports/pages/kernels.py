@@ -67,11 +67,11 @@ def run(reports: Sequence[Report], progress: Progress | None = None) -> None:
                 report.failure = ": ".join([_cell(report), "its process ended", *last])
 
 
-def _fail(report: Report, kind: str, message: str, traceback: str) -> None:
+def _fail(report: Report, kind: str, error: str, traceback: str) -> None:
     """Store the error of a cell in its report, or raise it if the notebook refuses its input."""
     if kind == InputError.__name__:
-        raise InputError(f"report {report.name}: {message}")
-    report.failure, report.traceback = f"{_cell(report)}: {kind}: {message}", traceback
+        raise InputError(f"report {report.name}: {error}")
+    report.failure, report.traceback = f"{_cell(report)}: {kind}: {error}", traceback
 
 
 def _cell(report: Report) -> str:

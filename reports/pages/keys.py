@@ -40,7 +40,7 @@ def key_of(report: Report, studies: Mapping[str, Path]) -> str:
 
 
 def has_key(page: Path, key: str) -> bool:
-    """Whether a file is a page with this key that nobody has altered."""
+    """Whether a file is a page with this key that has not been altered."""
     try:
         content = read_text(page, LARGEST)
     except (OSError, InputError):

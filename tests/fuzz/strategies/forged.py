@@ -53,7 +53,7 @@ def forged(
     path = f"{place}/changed{Path(source).suffix}"
     values: dict[str, str | None] = {name: f"../{path}"}
     if name == "--out" and kind == "results":
-        values["study run name"] = f"../in/{_STUDY_OF[source]}"
+        values["study run names"] = f"../in/{_STUDY_OF[source]}"
     elif name == "--out" and kind == "policy":
         values["--resume"] = None
     flags = [p for _, all_ in commands.COMMANDS if _ == words for p in all_ if commands.is_flag(p)]
