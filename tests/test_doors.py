@@ -107,6 +107,8 @@ PARSED = {
     # Lists and tables that are no objects of JSON, by types of pydantic.
     "analysis.results.parquet": {"validate_json"},
     "reports.pages.verify": {"validate_json"},
+    # A template of this project.
+    "reports.player.layout": {"loads"},
     # Keys of a dictionary, which are texts of JSON.
     "analysis.study.candidates": {"loads"},
     # Lines between a process and the one that it has started.

@@ -17,9 +17,9 @@ from plotly.offline import get_plotlyjs
 
 from analysis.results.event_log import Events
 from dess.scenario import Scenario
-from reports.player import layout, mission_map, panels
+from reports.player.layout import arranging, layout
 from reports.player.playback import Playback
-from reports.player.trace import Json
+from reports.player.scene import Json, moving, still
 
 READING = (
     "A disc shows the data that is left at a node, and the ring around it the largest amount that "
@@ -73,7 +73,7 @@ def player(
         config={"displayModeBar": False},
         auto_play=False,
         include_plotlyjs=False,
-        post_script=layout.arranging(playback),
+        post_script=arranging(playback),
         full_html=False,
         default_height="auto",
         validate=False,  # a test validates the figure
@@ -86,14 +86,13 @@ def player(
 
 def _figure(playback: Playback) -> Json:
     """The figure as plotly's JSON; later traces are drawn above earlier ones."""
-    still = [mission_map.rings(playback), *panels.at_rest(playback)]
-    moving = [*mission_map.moving(playback), *panels.moving(playback)]
-    numbers = list(range(len(still), len(still) + len(moving)))
+    below, above = still(playback), moving(playback)
+    numbers = list(range(len(below), len(below) + len(above)))
     return {
-        "data": still + [trace.at_start() for trace in moving],
+        "data": below + [trace.at(0) for trace in above],
         "frames": [
-            {"name": str(t), "data": [trace.frames[t] for trace in moving], "traces": numbers}
+            {"name": str(t), "data": [trace.frames[t] for trace in above], "traces": numbers}
             for t in range(playback.end + 1)
         ],
-        "layout": layout.layout(playback),
+        "layout": layout(playback),
     }

@@ -1,120 +1,101 @@
-"""The layout of a player: axes, notes, controls, and where each of them is on the page."""
+"""The layout of a player: its panels and their notes; the rest is ``templates/player.json``."""
 
 import json
 from typing import Any, TypeAlias
 
-from analysis.figures.style import GRID, INK, MUTED, SEA, ZONE, ZONE_EDGE
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from analysis.figures import style
+from analysis.figures.style import MUTED, SEA, ZONE, ZONE_EDGE
 from dess.scenario import Scenario
-from reports.player import ages
-from reports.player.mission_map import STATUS, counted
-from reports.player.panels import BATTERY, CHARGING, RESIDUAL, ranges
 from reports.player.playback import Playback
-from reports.player.trace import Json
+from reports.player.scene import (
+    AGE,
+    BATTERY,
+    CHARGING,
+    NODE_AGES,
+    RESIDUAL,
+    STATUS,
+    Json,
+    counted,
+    ranges,
+)
 
 WIDE = 720  # width [px] from which the curves are beside the map, and not below it
-MARGINS = {"l": 44, "r": 38, "t": 6, "b": 40}
-FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", Arial, sans-serif'
-SECONDS_PER_SLOT = {"Play": 0.3, "Fast": 0.1}
-
-# Defaults of all axes, notes, controls and traces.
-_AXIS = {
-    "fixedrange": True,
-    "constrain": "domain",
-    "showgrid": False,
-    "gridcolor": GRID,
-    "zeroline": False,
-    "showline": True,
-    "linecolor": MUTED,
-    "ticks": "outside",
-    "ticklen": 3,
-    "tickcolor": MUTED,
-    "tickfont": {"size": 11},
-    "title": {"standoff": 4, "font": {"size": 12}},
+MARGINS = 6, 40  # above and below [px]
+# Of each panel and of the controls: the gap above it and its height [px].
+_SIZES = {
+    str(STATUS): (0, 18),
+    "": (6, 288),
+    "controls": (50, 90),
+    str(NODE_AGES): (56, 76),
+    str(BATTERY): (24, 118),
+    str(RESIDUAL): (36, 118),
+    str(AGE): (36, 118),
+    str(CHARGING): (36, 78),
 }
-_NOTE = {"xanchor": "left", "yanchor": "middle", "showarrow": False, "font": {"size": 11.5}}
-_CONTROL = {"xanchor": "left", "yanchor": "top", "bgcolor": "white", "bordercolor": MUTED}
-_TEMPLATE = {
-    "data": {"scatter": [{"hoverinfo": "skip"}]},
-    "layout": {
-        "font": {"family": FONT, "size": 12, "color": INK},
-        "margin": {**MARGINS, "autoexpand": False},
-        "plot_bgcolor": "white",
-        "paper_bgcolor": "white",
-        "xaxis": _AXIS,
-        "yaxis": _AXIS,
-        "annotationdefaults": _NOTE,
-    },
-}
-
-# Left and right end [share of the width], top and bottom end [px] of the axes of each panel and of
-# the controls, in a plot of that height [px] without its margins.
-_Boxes: TypeAlias = dict[str, tuple[float, float, int, int]]
-_NARROW: tuple[int, _Boxes] = 824, {
-    "5": (0, 1, 0, 18), "": (0, 1, 24, 312), "controls": (0, 1, 354, 440),
-    "2": (0, 1, 470, 574), "3": (0, 1, 608, 712), "4": (0, 1, 746, 824),
-}  # fmt: skip
-_WIDE: tuple[int, _Boxes] = 584, {
-    "5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "controls": (0.58, 1, 492, 584),
-    "2": (0.58, 1, 24, 154), "3": (0.58, 1, 190, 320), "4": (0.58, 1, 356, 434),
-}  # fmt: skip
-# The same for a player that shows ages.
-_NARROW_AGES: tuple[int, _Boxes] = 1092, {
-    "5": (0, 1, 0, 18), "": (0, 1, 24, 312), "controls": (0, 1, 354, 440), "7": (0, 1, 470, 540),
-    "2": (0, 1, 608, 698), "3": (0, 1, 736, 840), "6": (0, 1, 874, 978), "4": (0, 1, 1014, 1092),
-}  # fmt: skip
-_WIDE_AGES: tuple[int, _Boxes] = 720, {
-    "5": (0, 0.52, 0, 18), "": (0, 0.52, 24, 584), "7": (0, 0.52, 640, 720),
-    "2": (0.58, 1, 24, 144), "3": (0.58, 1, 180, 300), "6": (0.58, 1, 336, 456),
-    "4": (0.58, 1, 492, 570), "controls": (0.58, 1, 628, 720),
-}  # fmt: skip
+_TEMPLATES = Environment(
+    loader=PackageLoader("reports", "templates"), undefined=StrictUndefined, trim_blocks=True
+)
+Boxes: TypeAlias = dict[str, tuple[float, float, int, int]]
 
 
 def layout(playback: Playback) -> Json:
     """The plotly layout: everything except the traces and the frames."""
+    fixed = _TEMPLATES.get_template("player.json").render(
+        style=style, margins=MARGINS, end=playback.end
+    )
     return {
-        "template": _TEMPLATE,
-        "showlegend": False,
-        "hovermode": "closest",
-        "dragmode": False,
+        **json.loads(fixed),
         **_axes(playback),
         "shapes": _shapes(playback.scenario),
         "annotations": _annotations(playback),
-        "updatemenus": [_buttons()],
-        "sliders": [_slider(playback.end)],
     }
+
+
+def _boxes(playback: Playback, wide: bool) -> tuple[int, Boxes]:
+    """Where the panels are: beside the map if there is room, and otherwise below it.
+
+    Returns:
+        The height of all [px], and for each panel its left and right end [share of the width] and
+        its top and bottom end [px].
+    """
+    of_nodes = [str(NODE_AGES)] if playback.measures_age else []
+    over_time = [str(panel) for panel in ranges(playback)]
+    narrow = [((0.0, 1.0), [str(STATUS), "", "controls", *of_nodes, *over_time])]
+    columns = [
+        ((0.0, 0.52), [str(STATUS), "", *of_nodes]),
+        ((0.58, 1.0), [*over_time, "controls"]),
+    ]
+    places: Boxes = {}
+    for (left, right), names in columns if wide else narrow:
+        bottom = 0
+        for name in names:
+            gap, height = _SIZES[name]
+            top, bottom = bottom + gap, bottom + gap + height * (1 + (wide and not name))
+            places[name] = (left, right, top, bottom)
+    return max(bottom for *_, bottom in places.values()), places
 
 
 def arranging(playback: Playback) -> str:
     """The script that puts the curves beside the map if there is room, and otherwise below."""
-    narrow, wide = (_NARROW_AGES, _WIDE_AGES) if playback.measures_age else (_NARROW, _WIDE)
-    layouts = {"narrow": _arrangement(*narrow), "wide": _arrangement(*wide)}
-    return f"""
-        const plot = document.getElementById("{{plot_id}}"), layouts = {json.dumps(layouts)};
-        let shown;
-        function arrange() {{
-            const fits = layouts[plot.clientWidth < {WIDE} ? "narrow" : "wide"];
-            if (fits === shown) return;
-            shown = fits;
-            plot.style.height = fits.height + "px";
-            Plotly.relayout(plot, fits.change);
-        }}
-        arrange();
-        window.addEventListener("resize", arrange);
-    """
+    layouts = {
+        "narrow": _arrangement(*_boxes(playback, wide=False)),
+        "wide": _arrangement(*_boxes(playback, wide=True)),
+    }
+    return _TEMPLATES.get_template("player.js").render(layouts=layouts, wide=WIDE)
 
 
-def _arrangement(height: int, boxes: _Boxes) -> Json:
+def _arrangement(height: int, places: Boxes) -> Json:
     """The height of the whole plot [px] and the arguments of ``Plotly.relayout``."""
-    change: Json = {"autosize": True}
-    for name, (left, right, top, bottom) in boxes.items():
-        if name == "controls":
-            for control in ("updatemenus[0]", "sliders[0]"):
-                change |= {f"{control}.x": left, f"{control}.y": 1 - top / height}
-            change["sliders[0].len"] = right - left
-        else:
-            change[f"xaxis{name}.domain"] = [left, right]
-            change[f"yaxis{name}.domain"] = [1 - bottom / height, 1 - top / height]
-    return {"height": height + MARGINS["t"] + MARGINS["b"], "change": change}
+    left, right, top, _ = places.pop("controls")
+    change: Json = {"autosize": True, "sliders[0].len": right - left}
+    for control in ("updatemenus[0]", "sliders[0]"):
+        change |= {f"{control}.x": left, f"{control}.y": 1 - top / height}
+    for name, (left, right, top, bottom) in places.items():
+        change[f"xaxis{name}.domain"] = [left, right]
+        change[f"yaxis{name}.domain"] = [1 - bottom / height, 1 - top / height]
+    return {"height": height + sum(MARGINS), "change": change}
 
 
 def _axes(playback: Playback) -> Json:
@@ -132,7 +113,10 @@ def _axes(playback: Playback) -> Json:
         y = {"range": ends, "anchor": f"x{panel}", "showgrid": panel != CHARGING, "nticks": 5}
         axes |= {f"xaxis{panel}": x, f"yaxis{panel}": y}
     if playback.measures_age:
-        axes |= ages.axes(playback)
+        most, nodes = round(1.05 * float(playback.ages.max(axis=None)), 2), len(playback.ages.T)
+        x = {"range": [-0.7, nodes - 0.3], "anchor": f"y{NODE_AGES}", "title": {"text": "node"}}
+        y = {"range": [0, most], "anchor": f"x{NODE_AGES}", "showgrid": True, "nticks": 4}
+        axes |= {f"xaxis{NODE_AGES}": x, f"yaxis{NODE_AGES}": y}
     uavs = playback.scenario.uavs
     axes[f"xaxis{CHARGING}"]["title"] = {"text": "time [mission slots]"}
     axes[f"yaxis{CHARGING}"]["tickvals"] = list(range(1, uavs + 1, -(-uavs // 6)))
@@ -165,7 +149,7 @@ def _annotations(playback: Playback) -> list[Json]:
         CHARGING: f"Charging, {counted(playback.pads, 'pad')}{queue}",
     }
     if playback.measures_age:
-        titles |= ages.TITLES
+        titles |= {AGE: "Mean age of the nodes [slots]", NODE_AGES: "Age of each node [slots]"}
     heading = {"yanchor": "bottom", "font": {"size": 12.5}}
     notes = [
         _note(f"<b>{title}</b>", (0, f"x{n} domain"), (1, f"y{n} domain"), **heading)
@@ -182,51 +166,6 @@ def _annotations(playback: Playback) -> list[Json]:
     return notes
 
 
-def _note(text: str, x: tuple[float, str], y: tuple[float, str], **style: Any) -> Json:
+def _note(text: str, x: tuple[float, str], y: tuple[float, str], **look: Any) -> Json:
     """A text to the right of a point, which is given by coordinates and their axes."""
-    return {"text": text, "x": x[0], "xref": x[1], "y": y[0], "yref": y[1], **style}
-
-
-def _animate(seconds: float) -> Json:
-    """The options of ``Plotly.animate`` for a duration of a slot [s]."""
-    duration = round(1000 * seconds)
-    return {
-        "mode": "immediate",
-        "fromcurrent": True,
-        "frame": {"duration": duration, "redraw": False},
-        "transition": {"duration": duration, "easing": "linear"},
-    }
-
-
-def _buttons() -> Json:
-    """The buttons: play slowly, play fast, and pause."""
-    calls: Json = {label: [None, _animate(seconds)] for label, seconds in SECONDS_PER_SLOT.items()}
-    calls["Pause"] = [[None], _animate(0)]
-    return {
-        **_CONTROL,
-        "type": "buttons",
-        "direction": "right",
-        "showactive": False,
-        "pad": {"t": 0, "l": 0, "r": 0, "b": 0},
-        "font": {"size": 14},
-        "buttons": [{"label": k, "method": "animate", "args": args} for k, args in calls.items()],
-    }
-
-
-def _slider(end: int) -> Json:
-    """The slider, with a step per mission slot."""
-    shown = {"size": 15, "color": INK}
-    return {
-        **_CONTROL,
-        "steps": [
-            {"label": str(t), "method": "animate", "args": [[str(t)], _animate(0)]}
-            for t in range(end + 1)
-        ],
-        "currentvalue": {"xanchor": "right", "prefix": "slot ", "offset": 16, "font": shown},
-        "pad": {"t": 4, "l": 0, "r": 0, "b": 0},
-        "font": {"size": 11},
-        "activebgcolor": GRID,
-        "ticklen": 0,
-        "minorticklen": 0,
-        "transition": {"duration": 0},
-    }
+    return {"text": text, "x": x[0], "xref": x[1], "y": y[0], "yref": y[1], **look}

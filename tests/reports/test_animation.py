@@ -22,9 +22,11 @@ from reports.player.animation import (
     LAST_SECONDS,
     MP4,
     SLOTS_PER_SECOND,
+    Film,
     write_animation,
 )
-from reports.player.film import Film
+from reports.player.playback import Playback
+from reports.player.scene import moving
 
 
 @pytest.fixture(scope="module")
@@ -36,31 +38,24 @@ def mission() -> tuple[pd.DataFrame, Scenario]:
     return pd.DataFrame(record.events.columns()), sample_scenario(space, 1, 0)
 
 
-def test_every_slot_is_shown(mission: tuple[pd.DataFrame, Scenario]) -> None:
+def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenario]) -> None:
     log, scenario = mission
-    slots, residual = uav_slots(log), residual_data(log)
+    slots, residual, traces = uav_slots(log), residual_data(log), moving(Playback(log, scenario))
     with style.look():
         film = Film(log, scenario)
-    seen = set()
+    (nodes,) = (trace for trace in traces if trace.style["name"] == "nodes")
+    (uavs,) = (trace for trace in traces if trace.style["name"] == "UAVs")
     for slot in range(film.end + 1):
-        film.show(slot)
         now = slots[slots["slot"] == slot - 1]
-        places = _part(film, "UAVs").get_offsets()
-        assert np.array_equal(places[now["uav"]], now[["x", "y"]])
-        for state in ("charging", "waiting"):
-            of_state = now.loc[now[state], ["x", "y"]]
-            assert np.array_equal(_part(film, state).get_offsets(), of_state.to_numpy())
-            seen |= {state} if len(of_state) else set()
-        areas, data = _part(film, "nodes").get_sizes(), residual.iloc[slot].clip(lower=0)
-        assert np.allclose(areas / areas.max(), data / data.max())
-        text = _part(film, "status").get_text()
-        assert text.startswith(f"slot {slot} of {film.end} · {data.sum():.1f} data units left · ")
-    assert seen == {"charging", "waiting"}
-
-
-def _part(film: Film, name: str) -> Any:
-    (part,) = film.figure.findobj(lambda artist: artist.get_gid() == name)
-    return part
+        dots: Any
+        dots, *numbers = film.draw(uavs.at(slot))
+        assert np.array_equal(dots.get_offsets()[now["uav"]], now[["x", "y"]])
+        assert [number.get_text() for number in numbers] == ["1", "2", "3"]
+        areas, data = film.draw(nodes.at(slot))[0].get_sizes(), residual.iloc[slot].clip(lower=0)
+        assert np.allclose(areas / areas.max(), data / data.max(), atol=1e-3)
+    pictures = [film.frame(slot) for slot in (0, film.end, 0)]
+    assert np.array_equal(pictures[0], pictures[2])
+    assert not np.array_equal(pictures[0], pictures[1])
 
 
 def test_a_gif_has_a_frame_per_slot_and_holds_the_last(

@@ -26,7 +26,7 @@ from analysis.results.event_log import (
 from dess import InputError
 from dess.state import sample_scenario
 from reports.player import AGE_READING, library, player, reading
-from reports.player.mission_map import TRAIL
+from reports.player.scene import TRAIL
 from tests.reports.browser import Visit
 
 # One UAV; three in a queue for one pad, of which one has its battery depleted long before the
@@ -257,20 +257,10 @@ def test_the_same_log_gives_the_same_bytes(mission: Logged) -> None:
     assert library().data == library().data
 
 
-def test_a_long_mission_is_light() -> None:
-    log, scenario = simulated(uavs=3, quota=10_000, flight_cost=0, max_slots=150)
-    assert duration(log) == 150 and len(scenario.nodes) == 25
-    assert len(player(log, scenario, "long").data.encode()) < 0.5e6
-
-
-def test_a_player_refers_to_nothing_outside(queue: Logged) -> None:
-    html = player(*queue, "one", "A title", "A caption").data
-    assert not re.search(r"https?:|//\w|\b(src|href)=|url\(|@import|\bimport\b", html)
-
-
-def test_words_are_shown_as_they_are(queue: Logged) -> None:
+def test_words_are_shown_as_they_are_and_nothing_outside_is_asked_for(queue: Logged) -> None:
     html = player(*queue, "one", "<b>I & U</b>", "1 < 2").data
     assert "&lt;b&gt;I &amp; U&lt;/b&gt;" in html and "1 &lt; 2" in html
+    assert not re.search(r"https?:|//\w|\b(src|href)=|url\(|@import|\bimport\b", html)
 
 
 def test_a_log_of_another_scenario_is_refused(queue: Logged) -> None:
@@ -278,9 +268,6 @@ def test_a_log_of_another_scenario_is_refused(queue: Logged) -> None:
         other = queue.scenario.model_copy(update=fields)
         with pytest.raises(InputError, match=f"mission_start has .* rows of a {what}; allowed"):
             player(queue.log, other, "one")
-
-
-def test_a_log_without_an_end_is_refused(queue: Logged) -> None:
     log = queue.log[queue.log["event"] != "mission_end"]
     with pytest.raises(InputError, match="events: mission_end has 0 rows of a uav; allowed: one"):
         player(log, queue.scenario, "one")
@@ -312,11 +299,10 @@ def slot(name: str) -> str:
     return f"Number(document.querySelector('#{name} .slider-label').textContent.split(' ')[1])"
 
 
-@pytest.mark.parametrize("width", [pytest.param(1200, marks=pytest.mark.slow), 390])
 def test_a_mission_is_played_and_paused(
-    visit: Callable[[Path, int], Visit], document: Path, queue: Logged, width: int
+    visit: Callable[[Path, int], Visit], document: Path, queue: Logged
 ) -> None:
-    opened, end = visit(document, width), duration(queue.log)
+    opened, end = visit(document, 390), duration(queue.log)
     page, status = opened.page, opened.page.locator("#first .x5y5 .textpoint")
     button(page, "second", "Play").wait_for()
     page.wait_for_function("document.getElementById('second').style.height.endsWith('px')")
@@ -344,7 +330,7 @@ def test_a_mission_is_played_and_paused(
 
     assert opened.complaints == []
     assert opened.requests == [document.as_uri()]
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
 
 
 def test_the_curves_stand_beside_the_map_where_there_is_room(
