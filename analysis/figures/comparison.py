@@ -1,41 +1,29 @@
-"""Figures that compare two policies in the same missions, and figures of decision times."""
+"""Figures that compare two policies, or two settings, in the same missions.
 
-from collections.abc import Sequence
+Each returns a figure of its own; nothing touches pyplot's state. In all figures, blue means better,
+orange worse, and a hollow mark inconclusive.
+"""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 import seaborn as sns
+from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import PercentFormatter
 
 from analysis import numbers
-from analysis.figures import style
-from analysis.figures.missions import mission_figure
-from analysis.names import parameter
+from analysis.figures import drawings, style
+from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
-from analysis.questions.missions import LoggedMission
+from analysis.questions.optimality.gap import ALL, fleet
+from analysis.questions.what_if.question import SIDES
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE
 
-# In all figures, blue means better, orange worse, and a hollow mark inconclusive.
-COLOURS = {AHEAD: "#0173b2", BEHIND: "#c05000", INCONCLUSIVE: style.MUTED}
+COLOURS = {AHEAD: style.BETTER, BEHIND: style.WORSE, INCONCLUSIVE: style.MUTED}
 EDGE = 0.005  # share of the missions that is beyond each end of the distribution's axis
-
-
-def maps(missions: Sequence[LoggedMission]) -> list[list[tuple[Figure, str, str]]]:
-    """Maps of missions, those of one replication together, with alternative texts and captions."""
-    replications = dict.fromkeys(mission.row["replication"] for mission in missions)
-    return [
-        [_map(mission) for mission in missions if mission.row["replication"] == replication]
-        for replication in replications
-    ]
-
-
-def _map(mission: LoggedMission) -> tuple[Figure, str, str]:
-    name, number = mission.row["policy"], mission.row["replication"]
-    alt = f"Map of mission {number} by {name}; battery, residual data and charging"
-    return mission_figure(mission.log, mission.scenario), alt, mission.caption
+TAIL = 0.05  # the same of the second panel of ``spread``
 
 
 def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
@@ -46,23 +34,18 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         field: The parameter.
         overall: The mean difference over all missions, drawn as a dashed line.
     """
-    rows = table[table["field"] == field].sort_values("position")
+    rows = table[table["field"] == field]
     with style.panels(3.5, values="y") as (figure, ax):
-        ax.axhline(0, color=style.INK, linewidth=1.2, zorder=1)
-        ax.axhline(
-            overall, color=style.MUTED, linewidth=1.1, linestyle="--", zorder=1, gid="overall"
-        )
-        for row in rows.itertuples():
-            colour = COLOURS[row.verdict]
-            ax.errorbar(row.position, row.mean, yerr=[[row.mean - row.low], [row.high - row.mean]],
-                        markerfacecolor="white" if row.verdict == INCONCLUSIVE else colour,
-                        fmt="o", markersize=6, color=colour, capsize=4, elinewidth=1.8,
-                        gid=row.verdict)  # fmt: skip
+        ax.axhline(0, **style.ZERO)
+        ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
+        for verdict, part in rows.groupby("verdict"):
+            fill = "none" if verdict == INCONCLUSIVE else "full"
+            ax.errorbar(part["position"], part["mean"], yerr=style.arms(part), linestyle="",
+                        **style.dot((COLOURS[verdict], "o")), fillstyle=fill)  # fmt: skip
         ax.set_title(parameter(field).label, parse_math=True)
-        ax.set(ylabel="mean difference [points]")
-        ax.set(xlim=(-0.6, len(rows) - 0.4), ylim=style.ends(table, zero=True))
+        ax.set(ylabel="mean difference [points]", ylim=style.ends(table, zero=True))
         ax.set_xticks(rows["position"], rows["value"])
-        style.points_axis(ax.yaxis, 6)
+        style.in_units(ax.yaxis, "points")
     return figure
 
 
@@ -74,30 +57,18 @@ def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
         first: The parameter of the rows.
         second: The parameter of the columns.
     """
-    names = table.drop_duplicates("position").sort_values("position")["value"].tolist()
-    names_2 = table.drop_duplicates("position_2").sort_values("position_2")["value_2"].tolist()
-    grid = np.full((len(names), len(names_2)), np.nan)
-    grid[table["position"], table["position_2"]] = table["mean"]
-    widest = max(float(np.nanmax(np.abs(grid))), 0.01)
-    with style.panels(1.5 + 0.55 * len(names)) as (figure, ax):
-        ax.grid(False)
-        colours = sns.blend_palette([COLOURS[BEHIND], "white", COLOURS[AHEAD]], as_cmap=True)
-        ax.pcolormesh(grid, cmap=colours, vmin=-1.4 * widest, vmax=1.4 * widest,
-                      edgecolors="white", linewidth=2)  # fmt: skip
-        for row in table.itertuples():
-            text = numbers.difference(row.mean, 0)
-            ax.annotate(f"({text})" if row.verdict == INCONCLUSIVE else text,
-                        (row.position_2 + 0.5, row.position + 0.5), ha="center", va="center",
-                        fontsize=10, gid=row.verdict,
-                        path_effects=[withStroke(linewidth=2.5, foreground="white")])  # fmt: skip
-        ax.set_xticks(np.arange(len(names_2)) + 0.5, names_2)
-        ax.set_yticks(np.arange(len(names)) + 0.5, names)
+    names = [[*table.groupby(f"position{end}")[f"value{end}"].first()] for end in ("", "_2")]
+    widest = 1.4 * max(float(table["mean"].abs().max()), 0.01)
+    rows = table.rename(columns={"position": "row", "position_2": "column"})
+    texts = [numbers.difference(mean, 0) for mean in table["mean"]]
+    unsure = table["verdict"] == INCONCLUSIVE
+    rows["text"] = [f"({t})" if u else t for t, u in zip(texts, unsure, strict=True)]
+    with style.panels(1.5 + 0.55 * len(names[0])) as (figure, ax):
+        drawings.cells(rows, names, ax, cmap=diverging(), vmin=-widest, vmax=widest)
         ax.invert_yaxis()
-        ax.tick_params(length=0)
         ax.set_xlabel(parameter(second).label, parse_math=True)
         ax.set_ylabel(parameter(first).label, parse_math=True)
         ax.set_title("Mean difference [points]")
-        sns.despine(ax=ax, left=True, bottom=True)
     return figure
 
 
@@ -112,28 +83,128 @@ def distribution(missions: pd.DataFrame, pair: Pair) -> Figure:
         pair: The policies.
     """
     values = np.sort(missions["difference"].to_numpy(float))
-    shares = np.arange(1, len(values) + 1) / len(values)
     half = float(np.sqrt(np.log(2 / (1 - LEVEL)) / (2 * len(values))))
-    low, high = np.quantile(values, [EDGE, 1 - EDGE])
-    low, high = min(low, -0.01), max(high, 0.01)
-    room = 0.04 * (high - low)
-    x = np.concatenate([[min(values[0], low) - 1], values, [max(values[-1], high) + 1]])
-    y = np.concatenate([[0], shares, [1]])
+    low, high = _middle([missions["difference"]], EDGE)
+    x = np.array([min(values[0], low) - 1, *values, max(values[-1], high) + 1])
+    y = np.array([0, *np.arange(1, len(values) + 1) / len(values), 1])
     with style.panels(3.9) as (figure, ax):
-        ax.axvspan(x[0], 0, color=COLOURS[BEHIND], alpha=0.12, linewidth=0, zorder=0)
-        ax.axvspan(0, x[-1], color=COLOURS[AHEAD], alpha=0.10, linewidth=0, zorder=0)
+        for start, end, outcome in ((x[0], 0, BEHIND), (0, x[-1], AHEAD)):
+            ax.axvspan(start, end, color=COLOURS[outcome], alpha=0.11, linewidth=0, zorder=0)
         band = np.clip([y - half, y + half], 0, 1)
-        ax.fill_between(
-            x, band[0], band[1], step="post", color=style.INK, alpha=0.2, linewidth=0, gid="band"
-        )
+        ax.fill_between(x, *band, step="post", color=style.INK, alpha=0.2, linewidth=0, gid="band")
         ax.step(x, y, where="post", color=style.INK, linewidth=1.8, gid="shares")
-        for x_text, side, outcome in ((0, "left", BEHIND), (1, "right", AHEAD)):
-            share = (values < 0 if outcome == BEHIND else values > 0).mean()
-            ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (x_text, 1.03), ha=side,
-                        xycoords="axes fraction", color=COLOURS[outcome], gid=outcome)  # fmt: skip
+        shares = {BEHIND: (values < 0).mean(), AHEAD: (values > 0).mean()}
+        for place, (outcome, share) in enumerate(shares.items()):
+            ax.annotate(f"{pair.policy} {outcome}: {share:.1%}", (place, 1.03),
+                        ha=("left", "right")[place], xycoords="axes fraction",
+                        color=COLOURS[outcome], gid=outcome)  # fmt: skip
         ax.set_title("Difference in every mission", pad=22)
-        ax.set(xlim=(low - room, high + room), ylim=(0, 1), ylabel="share of the missions")
+        ax.set(xlim=(low, high), ylim=(0, 1), ylabel="share of the missions")
         ax.set_xlabel(f"{pair.policy} − {pair.baseline}, at most [points]")
-        style.points_axis(ax.xaxis, 7)
-        ax.yaxis.set_major_formatter(PercentFormatter(1))
+        style.in_units(ax.xaxis, "points", 7)
+        style.in_units(ax.yaxis, "%")
     return figure
+
+
+def means(table: pd.DataFrame, metric: str, settings: Sequence[Sequence[str]]) -> Figure:
+    """A metric of every policy in the baseline and in the variation, with intervals.
+
+    Args:
+        table: Rows of ``questions.what_if.answer.means``.
+        metric: One of their metrics.
+        settings: What the baseline and the variation set, in words.
+    """
+    rows = table[table["metric"] == metric].dropna(subset="mean")
+    ticks = ["\n".join((side, *words)) for side, words in zip(SIDES, settings, strict=True)]
+    rows = rows.assign(position=rows["point"], value=rows["point"].map(dict(enumerate(ticks))))
+    with style.panels(4.1, values="y") as (figure, ax):
+        drawings.along(rows, style.policy_colours(rows["policy"]), style.unit_of(metric), ax)
+        ax.set(title=metric_label(metric), xlim=(-0.45, 1.45))
+        ax.set_xticks((0, 1), ticks)
+        if metric in METRICS:
+            ax.set_ylim(style.ends(rows, 0.05))
+    return figure
+
+
+def gains(answers: pd.DataFrame) -> Figure:
+    """The paired differences of the metrics of every policy, with intervals.
+
+    Args:
+        answers: Rows of ``questions.what_if.answer.answers``.
+    """
+    names = {metric: name.replace(" and ", "\nand ") for metric, name in METRICS.items()}
+    rows = answers[answers["metric"].isin([*names])]
+    return _differences(rows, rows["metric"].map(names), "Variation − baseline")
+
+
+def differences(table: pd.DataFrame) -> Figure:
+    """Paired differences from a baseline, by number of UAVs.
+
+    Args:
+        table: Rows of ``optimality.planner.differences``.
+    """
+    names = table["uavs"].map(lambda uavs: uavs if uavs == ALL else fleet(uavs))
+    return _differences(table, names, f"Difference from {table['baseline'].iloc[0]}")
+
+
+def spread(differences: Mapping[str, pd.Series]) -> Figure:
+    """The distribution of the paired differences of every policy: all, and the central part.
+
+    Args:
+        differences: For each policy the result of ``questions.what_if.answer.differences``.
+    """
+    with style.panels(5.6, 2, sharey=True) as (figure, axes):
+        titles = ("Share of missions with that difference or less", "The central part of it")
+        for ax, title in zip(axes, titles, strict=True):
+            drawings.distributions(differences, ax)
+            ax.axvline(0, **style.ZERO)
+            ax.axhline(0.5, color=style.MUTED, linewidth=0.9, linestyle=":", zorder=1)
+            ax.set_title(title)
+            style.in_units(ax.xaxis, "points", 7)
+        axes[1].set(xlim=_middle([*differences.values()], TAIL), xlabel="percentage points")
+    return figure
+
+
+def gaps(table: pd.DataFrame) -> Figure:
+    """The product of every policy and the upper bound, in a panel per number of UAVs.
+
+    Args:
+        table: Rows of ``optimality.gap.by_fleet``.
+    """
+    fleets = [*table[table["uavs"] != ALL].groupby("uavs", sort=False)]
+    height = (0.75 + 0.22 * table["policy"].nunique()) * len(fleets) + 0.6
+    with style.panels(height, len(fleets), "x", sharex=True, squeeze=False) as (figure, axes):
+        for ax, (uavs, rows) in zip(axes.flat, fleets, strict=True):
+            bound, low, high = rows[[BOUND, f"{BOUND}_low", f"{BOUND}_high"]].iloc[0]
+            ax.axvspan(low, high, color=style.MUTED, alpha=0.3, linewidth=0)
+            ax.axvline(bound, color=style.INK, linewidth=1.3, label="upper bound")
+            drawings.in_rows(rows, ax, PRODUCT, f"{PRODUCT}_low", f"{PRODUCT}_high")
+            ax.set(title=f"{fleet(uavs)}: bound {bound:.1%}", xlim=(-0.02, 1.02))
+            style.in_units(ax.xaxis, "%")
+        ax.set_xlabel(METRICS[PRODUCT])
+    return figure
+
+
+def diverging() -> Colormap:
+    """Colours from worse over white to better."""
+    return sns.blend_palette([style.WORSE, "white", style.BETTER], as_cmap=True)
+
+
+def _differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:
+    """Paired differences of every policy by what has these names, in their order."""
+    rows = drawings.placed(rows.assign(mean=rows["difference"], name=names), "name")
+    with style.panels(3.6, values="y") as (figure, ax):
+        ax.axhline(0, **style.ZERO)
+        looks = style.policy_colours(rows["policy"])
+        drawings.along(rows, looks, "points", ax, linestyle="")
+        ax.set(title=f"{title} (paired)", ylabel="percentage points")
+        ax.margins(x=0.2)
+    return figure
+
+
+def _middle(values: Sequence[pd.Series], tail: float) -> tuple[float, float]:
+    """The ends of an axis with 0 that leaves out a share of the values at each side."""
+    low = min(0.0, *(of.quantile(tail) for of in values))
+    high = max(0.0, *(of.quantile(1 - tail) for of in values))
+    room = max(0.04 * (high - low), 0.01)
+    return low - room, high + room

@@ -1,21 +1,24 @@
-"""Figures of one mission: its map, batteries, residual data, age and charging zone.
+"""Figures of one mission: its map, batteries, residual data, age and charging zone; maps of nodes.
 
-Each function takes the event log of the mission (a data frame, or the columns, of
+Each function of a panel takes the event log of the mission (a data frame, or the columns, of
 ``dess.record.EventLog``), its ``dess.Scenario`` and the axes to draw on; ``mission_figure`` puts
 them together. Nothing touches pyplot's state.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
 import pandas as pd
+import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
+from analysis import numbers
 from analysis.figures import style
 from analysis.results.event_log import (
     Events,
@@ -27,8 +30,15 @@ from analysis.results.event_log import (
 )
 from dess.scenario import Scenario, ScenarioSpace
 
+if TYPE_CHECKING:
+    from policies.planner import Course
+
 # Width [cells] over which UAVs on the same path are drawn side by side.
 SPREAD = 0.4
+_ARROW: dict = {
+    **{"angles": "xy", "scale_units": "xy", "units": "xy", "scale": 1, "width": 0.15},
+    **{"headwidth": 3.8, "headlength": 3.4, "headaxislength": 3.2},
+}
 
 
 def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
@@ -39,43 +49,46 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
     a slot in which the UAV charges. UAVs are numbered at their start (diamond) and end (dot), and
     drawn side by side where they share a path.
     """
-    slots = uav_slots(events)
     # The last is that of node -1, which is none.
     colours = np.array([*style.node_colours(len(scenario.nodes)), style.MUTED])
     offsets = style.shifts(scenario.uavs, SPREAD / 2)
     _grid(scenario, ax)
-    for uav, of_uav in slots.groupby("uav"):
-        shifted = of_uav.assign(
-            **{column: of_uav[column] + offsets[uav] for column in ("from_x", "from_y", "x", "y")}
-        )
+    for uav, slots in uav_slots(events).groupby("uav"):
         colour = style.uav_colours(scenario.uavs)[uav]
-        _trail(shifted, colour, ax)
-        _moves(shifted[shifted["moved"]], colours, f"moves-{uav}", ax)
-        hovers = shifted[~shifted["moved"] & ~shifted["charging"]]
-        ax.scatter(hovers["x"], hovers["y"], c=colours[hovers["node"]], marker="x", s=34,
-                   linewidths=1.7, zorder=5, gid=f"hovers-{uav}")  # fmt: skip
-        charges = shifted[shifted["charging"]]
+        ways = slots[["from_x", "from_y", "x", "y"]] + offsets[uav]
+        start, end = ways.iloc[0, :2], ways.iloc[-1, 2:]
+        ax.plot([start["from_x"], *ways["x"]], [start["from_y"], *ways["y"]], color=colour,
+                alpha=0.16, linewidth=4.5, solid_joinstyle="round", zorder=2)  # fmt: skip
+        x, y, to_x, to_y = ways[slots["moved"]].to_numpy().T
+        steps = np.round([to_x - x, to_y - y])  # one cell, without the shift of paths
+        ax.quiver(x, y, *steps, color=colours[slots.loc[slots["moved"], "node"]], zorder=4,
+                  gid=f"moves-{uav}", **_ARROW)  # fmt: skip
+        hovers, charges = ~slots["moved"] & ~slots["charging"], ways[slots["charging"]]
+        ax.scatter(ways["x"][hovers], ways["y"][hovers], c=colours[slots["node"][hovers]],
+                   marker="x", s=34, linewidths=1.7, zorder=5, gid=f"hovers-{uav}")  # fmt: skip
         ax.scatter(charges["x"], charges["y"], color=style.INK, marker=(8, 2, 0), s=70,
                    linewidths=1.1, zorder=6, gid=f"charges-{uav}")  # fmt: skip
-        _ends(shifted, uav, colour, ax)
+        for spot, marker, face, text, name in (
+            (start, "D", "white", colour, "start"),
+            (end, "o", colour, "white", "end"),
+        ):
+            x, y = spot
+            ax.scatter(x, y, marker=marker, s=62, facecolor=face, edgecolor=colour, linewidth=1.6,
+                        zorder=8, gid=f"{name}-{uav}")  # fmt: skip
+            ax.annotate(str(uav + 1), (x, y), ha="center", va="center", fontsize=6.5,
+                        color=text, fontweight="bold", zorder=9)  # fmt: skip
 
 
 def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
     """The grid and its zone, without nodes; y grows south."""
     x, y, width, height = scenario.zone
-    zone = Rectangle(
-        (x - 0.5, y - 0.5), width, height, facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, zorder=1
-    )
+    ends = (-0.5, scenario.grid - 0.5)
     ax.set_facecolor(style.SEA)
     ax.grid(False)
-    ax.add_patch(zone)
-    ax.set(
-        aspect="equal",
-        xlim=(-0.5, scenario.grid - 0.5),
-        ylim=(scenario.grid - 0.5, -0.5),
-        xlabel=f"x, east [cells of {scenario.cell_size:g} m]",
-        ylabel="y, south [cells]",
-    )
+    ax.add_patch(Rectangle((x - 0.5, y - 0.5), width, height, facecolor=style.ZONE,
+                           edgecolor=style.ZONE_EDGE, zorder=1))  # fmt: skip
+    ax.set(aspect="equal", xlim=ends, ylim=ends[::-1], ylabel="y, south [cells]")
+    ax.set_xlabel(f"x, east [cells of {scenario.cell_size:g} m]")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))
 
@@ -121,27 +134,21 @@ def age(events: Events, scenario: Scenario, ax: Axes) -> None:
 def occupancy(events: Events, scenario: Scenario, ax: Axes) -> None:
     """The UAVs that charge (stacked, in their colours) and that wait for a pad, over time."""
     slots, edges = uav_slots(events), np.arange(duration(events) + 1)
-    base = np.zeros(len(edges))
-    for state in ("charging", "waiting"):
+    base, colours = np.zeros(len(edges)), style.uav_colours(scenario.uavs)
+    for state, hatch in (("charging", None), ("waiting", "/////")):
         for uav, busy in slots[slots[state]].groupby("uav"):
             top = base + np.isin(edges, busy["slot"])
-            colour = style.uav_colours(scenario.uavs)[uav]
-            face, hatch = (colour, None) if state == "charging" else ("none", "/////")
-            ax.fill_between(
-                edges, base, top, step="post", facecolor=face, edgecolor=colour, hatch=hatch,
-                linewidth=0, alpha=0.85,
-            )  # fmt: skip
+            ax.fill_between(edges, base, top, step="post", edgecolor=colours[uav], hatch=hatch,
+                            facecolor="none" if hatch else colours[uav], linewidth=0,
+                            alpha=0.85)  # fmt: skip
             base = top
     ax.step(edges, base, where="post", color=style.INK, linewidth=1, gid="occupancy")
     pads = scenario.charging_pads
     if pads <= scenario.uavs:
         ax.axhline(pads, color=style.MUTED, linewidth=0.9)
     hatched = "; hatched: waiting" if slots["waiting"].any() else ""
-    ax.set(
-        title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}",
-        ylabel="UAVs",
-        ylim=(0, scenario.uavs + 0.3),
-    )
+    ax.set(title=f"Charging zone, {pads} pad{'s' if pads > 1 else ''}{hatched}", ylabel="UAVs")
+    ax.set_ylim(0, scenario.uavs + 0.3)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
     _time_axis(events, ax)
 
@@ -177,6 +184,59 @@ def sea_figure(space: ScenarioSpace) -> Figure:
     return figure
 
 
+def node_map(
+    space: ScenarioSpace,
+    title: str,
+    values: np.ndarray,
+    signed: bool = False,
+    write: Callable[[float], str] = "{:.0%}".format,
+) -> Figure:
+    """A map with the nodes of a scenario in the colours of values, which are written at them.
+
+    Args:
+        space: The scenario.
+        title: The title.
+        values: (K,) values, from 0 to 1; or, if ``signed``, differences of any size.
+        signed: Whether blue means above 0 and orange below 0, in percentage points.
+        write: How other values are written.
+    """
+    colours = ["white", style.BETTER] if not signed else [style.WORSE, "white", style.BETTER]
+    most = max(float(np.abs(values).max()), 0.01) if signed else 1.0
+    with style.panels(5.4) as (figure, ax):
+        chart(space, ax)
+        ax.scatter(*np.transpose(space.nodes), c=values, s=420, zorder=3, edgecolors=style.MUTED,
+                   cmap=sns.blend_palette(colours, as_cmap=True), linewidths=0.8,
+                   vmin=-most if signed else 0.0, vmax=most)  # fmt: skip
+        for cell, value in zip(space.nodes, values, strict=True):
+            text = numbers.difference(value, 0) if signed else write(value)
+            ax.annotate(text, cell, ha="center", va="center", fontsize=8.5, zorder=4,
+                        **style.OUTLINED)  # fmt: skip
+        ax.set_title(title)
+    return figure
+
+
+def plan(events: Events, scenario: Scenario, courses: "Sequence[Course]") -> Figure:
+    """The plan of the first slot, as dashed lines over the mission as simulated.
+
+    Args:
+        events: The event log of the mission.
+        scenario: Its scenario.
+        courses: What the plan has each UAV do.
+    """
+    with style.panels(6.0) as (figure, ax):
+        trajectories(events, scenario, ax)
+        for uav, course in enumerate(courses):
+            colour = style.uav_colours(len(courses))[uav]
+            ax.plot(*course.path.T, color=colour, linestyle=(0, (3, 1.5)), linewidth=1.6, zorder=7,
+                    gid=f"plan-{uav}", label=f"plan of UAV {uav + 1}")  # fmt: skip
+            for number, cell in enumerate(course.waypoints, 1):
+                ax.annotate(str(number), cell, xytext=(6, 6), textcoords="offset points",
+                            color=colour, fontsize=8, fontweight="bold", zorder=10,
+                            **style.OUTLINED)  # fmt: skip
+        ax.set_title("The first plan (dashed), and the mission as simulated")
+    return figure
+
+
 def _outcome(events: Events, scenario: Scenario) -> str:
     log = pd.DataFrame(events)
     data = log[log["node"] >= 0].groupby("event")["value"].sum()
@@ -194,68 +254,25 @@ def _grid(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
                edgecolors="white", linewidths=1.2, zorder=3, gid="nodes")  # fmt: skip
 
 
-def _trail(slots: pd.DataFrame, colour: str, ax: Axes) -> None:
-    """The path of a UAV as a pale band below its arrows."""
-    x, y = ([slots[f"from_{axis}"].iloc[0], *slots[axis]] for axis in ("x", "y"))
-    ax.plot(x, y, color=colour, alpha=0.16, linewidth=4.5, solid_joinstyle="round", zorder=2)
-
-
-def _moves(moves: pd.DataFrame, colours: np.ndarray, name: str, ax: Axes) -> None:
-    """An arrow per move, in the colour of the node served."""
-    ax.quiver(
-        moves["from_x"],
-        moves["from_y"],
-        (moves["x"] - moves["from_x"]).round(),  # one cell, without the shift of paths
-        (moves["y"] - moves["from_y"]).round(),
-        color=colours[moves["node"]],
-        angles="xy",
-        scale_units="xy",
-        scale=1,
-        width=0.15,
-        units="xy",
-        headwidth=3.8,
-        headlength=3.4,
-        headaxislength=3.2,
-        zorder=4,
-        gid=name,
-    )
-
-
-def _ends(slots: pd.DataFrame, uav: int, colour: str, ax: Axes) -> None:
-    """A numbered diamond where a UAV starts, a numbered dot where its mission ends."""
-    first, last = slots.iloc[0], slots.iloc[-1]
-    marks = (
-        (first["from_x"], first["from_y"], "D", "white", colour, "start"),
-        (last["x"], last["y"], "o", colour, "white", "end"),
-    )
-    for x, y, marker, face, text, name in marks:
-        ax.scatter(x, y, marker=marker, s=62, facecolor=face, edgecolor=colour, linewidth=1.6,
-                   zorder=8, gid=f"{name}-{uav}")  # fmt: skip
-        ax.annotate(str(uav + 1), (x, y), ha="center", va="center", fontsize=6.5, color=text,
-                    fontweight="bold", zorder=9)  # fmt: skip
-
-
 @mpl.rc_context({"text.parse_math": True})  # an arrow is a symbol in TeX
 def _map_legend(ax: Axes) -> None:
     """The symbols of the map (Table I)."""
 
-    def mark(marker, label, face=style.INK, size=7.0):
-        return Line2D([], [], linestyle="", marker=marker, label=label, color=style.INK,
-                      markerfacecolor=face, markersize=size)  # fmt: skip
-
-    served = style.node_colours(2)[1]
+    served, arrow = style.node_colours(2)[1], r"$\rightarrow$"
+    marks = (
+        ("s", "start and charging zone", style.ZONE_EDGE, style.ZONE, 9),
+        ("o", "sensor node", style.INK, served, 8),
+        ("D", "start of UAV", style.INK, "white", 7),
+        ("o", "end of UAV", style.INK, style.INK, 7),
+        (arrow, "move, serving that node", served, served, 13),
+        ("x", "hover, serving that node", served, served, 7),
+        ((8, 2, 0), "hover, charging", style.INK, style.INK, 8),
+        (arrow, "no node served", style.MUTED, style.MUTED, 13),
+    )
     handles = [
-        Patch(facecolor=style.ZONE, edgecolor=style.ZONE_EDGE, label="start and charging zone"),
-        mark("o", "sensor node", face=served, size=8),
-        mark("D", "start of UAV", face="white"),
-        mark("o", "end of UAV"),
-        Line2D([], [], linestyle="", marker=r"$\rightarrow$", markersize=13, color=served,
-               label="move, serving that node"),
-        Line2D([], [], linestyle="", marker="x", markeredgewidth=1.7, color=served,
-               label="hover, serving that node"),
-        mark((8, 2, 0), "hover, charging", size=8),
-        Line2D([], [], linestyle="", marker=r"$\rightarrow$", markersize=13, color=style.MUTED,
-               label="no node served"),
+        Line2D([], [], linestyle="", marker=marker, label=label, color=edge, markerfacecolor=face,
+               markersize=size)
+        for marker, label, edge, face, size in marks
     ]  # fmt: skip
     ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.48, -0.1), ncols=3,
               handletextpad=0.4, columnspacing=1.0, fontsize=8.5)  # fmt: skip

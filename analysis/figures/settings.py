@@ -1,24 +1,22 @@
-"""Figures of the settings of a study: curves, heat maps, main effects, single design points.
+"""Figures of the means of policies at the settings of a study, and of what fields change.
 
 Each returns a figure of its own; nothing touches pyplot's state. Shares are in percent.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import ceil
 from textwrap import fill
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter, PercentFormatter
-from pandas.api.types import is_numeric_dtype
 
-from analysis.figures import style
+from analysis.figures import drawings, style
+from analysis.figures.style import Look
 from analysis.names import (
     LESS_IS_BETTER,
     METRICS,
@@ -29,11 +27,50 @@ from analysis.names import (
 )
 from analysis.questions import settings
 from analysis.results.tables import Results
+from analysis.study.design import NOISE
 
-MOST_PANELS = 12  # largest number of values of a third field with their own panels
-MOST_TICKS = 12
+MOST_PANELS, COLUMNS = 12, 3  # of the values of a third field: panels, and columns of panels
 MARK = "#d55e00"  # colour that marks the best cell and cells that are not significantly worse
-COLUMNS = 3  # of panels
+_PRINTED: dict = {"color": style.INK, "linestyle": "--", "linewidth": 1.3}
+
+
+def performance(summary: pd.DataFrame, metric: str, printed: float | None = None) -> Figure:
+    """A metric of every policy: means with intervals, and the paper's number as a line.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy``.
+        metric: One of ``METRICS``.
+        printed: The paper's number.
+    """
+    rows = summary[summary["metric"] == metric]
+    with style.panels(1.3 + 0.42 * len(rows), values="x") as (figure, ax):
+        drawings.in_rows(rows, ax)
+        for y, mean in enumerate(rows["mean"]):
+            style.note_at_right(f"{mean:.1%}", y, ax)
+        if printed is not None:
+            ax.axvline(printed, **_PRINTED, label=f"paper {printed:.1%}", zorder=1)
+        ax.set(title=METRICS[metric], xlim=(-0.02, 1.02))
+        style.in_units(ax.xaxis, "%", 5)
+    return figure
+
+
+def by_fleet(
+    summary: pd.DataFrame, metric: str, printed: Mapping[int, float] | None = None
+) -> Figure:
+    """A metric of every policy against the number of UAVs, with intervals.
+
+    Args:
+        summary: Rows of ``analysis.summary`` by ``policy`` and ``uavs``.
+        metric: One of ``METRICS``.
+        printed: The paper's numbers by number of UAVs.
+    """
+    rows = drawings.placed(summary[summary["metric"] == metric], "uavs")
+    with style.panels(3.9, values="y", legend=5) as (figure, ax):
+        drawings.along(rows, style.policy_colours(rows["policy"]), "%", ax)
+        if printed:
+            ax.plot(*zip(*sorted(printed.items()), strict=True), "D", label="paper", **_PRINTED)
+        ax.set(title=METRICS[metric], xlabel="UAVs", ylim=(-0.03, 1.04))
+    return figure
 
 
 def plot(
@@ -56,49 +93,32 @@ def plot(
         InputError: If there is no such field, metric or policy.
     """
     rows = settings.averaged(results, [x, hue] if hue else [x], metric, policy)
-    values = settings.varied(results)
-    if hue:
-        return lines(rows, x, values[x], metric, graded(values[hue]), hue, "policy")
-    colours = style.policy_colours(results.policies)
-    looks = {name: colours[name] for name in rows["policy"].unique()}
-    return lines(rows, x, values[x], metric, looks, "policy")
+    return lines(rows, x, hue or "policy", metric, "policy" if hue else None)
 
 
-def lines(
-    rows: pd.DataFrame,
-    x: str,
-    values: Sequence[Any],
-    metric: str,
-    looks: dict[str, tuple[str, str]],
-    line: str,
-    panel: str | None = None,
-) -> Figure:
+def lines(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None = None) -> Figure:
     """A metric against a field: a curve for each value of a column, with 95 % intervals.
 
     Args:
         rows: The means of the metric, with ``mean``, ``low`` and ``high``.
         x: The field on the horizontal axis.
-        values: Its values.
-        metric: The metric.
-        looks: The looks of the curves, by name.
         line: The column with a curve for each value: a field, or ``policy``.
+        metric: The metric.
         panel: A column with a panel for each value; by default there is one panel.
     """
-    panels = [*rows.groupby(panel, sort=False)] if panel else [("", rows)]
-    height, count = 2.9 * len(panels) + 0.9, len(panels)
-    with style.panels(height, count, "y", sharex=True, sharey=True, squeeze=False) as (
-        figure,
-        axes,
-    ):
-        for ax, (value, part) in zip(axes.flat, panels, strict=True):
-            curves(part.assign(policy=part[line].map(value_text)), x, looks, values, ax)
+    parts = [*drawings.placed(rows, x).groupby(panel or (lambda _: ""), sort=False)]
+    of_policies, shared = line == "policy", {"sharex": True, "sharey": True, "squeeze": False}
+    values = drawings.ordered(rows[line])
+    looks = style.policy_colours(values) if of_policies else style.graded(values)
+    heading = None if of_policies else parameter(line).label
+    height = 2.9 * len(parts) + 0.9
+    with style.panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
+        for ax, (value, part) in zip(axes.flat, parts, strict=True):
+            drawings.along(part, looks, style.unit_of(metric), ax, line)
             name = "" if panel in (None, "policy") else parameter(str(panel)).name
             ax.set_title(f"{name} {value_text(value)}".strip(), fontsize=10, fontweight="normal")
-            of_metric(ax.yaxis, metric)
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
-        title = None if line == "policy" else parameter(line).label
-        style.legend_below(figure, axes.flat[0], 4, title)
     return figure
 
 
@@ -126,36 +146,39 @@ def heat_map(
         InputError: If there is no such field, metric or policy.
     """
     policy = policy or str(settings.ranked(results, metric)["policy"].iloc[0])
-    fields = [y, x, facet] if facet else [y, x]
-    rows = settings.averaged(results, fields, metric, policy)
+    rows = settings.averaged(results, [y, x, *filter(None, [facet])], metric, policy)
     values = settings.varied(results)
+    panels = shown(values[facet]) if facet else [None]
+    columns = min(COLUMNS, len(panels))
+    has_room = len(values[x]) * columns <= 9 and len(values[y]) * columns <= 12
+    rows = rows.dropna(subset="mean")
+    rows = rows.assign(
+        row=rows[y].map(values[y].index),
+        column=rows[x].map(values[x].index),
+        text=[_short(mean, metric) if has_room else "" for mean in rows["mean"]],
+    )
     best = rows["mean"].idxmin() if metric in LESS_IS_BETTER else rows["mean"].idxmax()
-    rows = rows.assign(best=rows.index == best, row=_places(rows[y], values[y]),
-                       column=_places(rows[x], values[x]))  # fmt: skip
-    facets = shown(values[facet]) if facet else [None]
-    columns = min(COLUMNS, len(facets))
-    lines = ceil(len(facets) / columns)
-    height = min(1.6 + 0.5 * len(values[y]), 5.5) if not facet else 0.9 + 1.75 * lines
-    with style.panels(
-        height, lines, "xy", ncols=columns, sharex=True, sharey=True, squeeze=False
-    ) as (figure, axes):
-        for ax, value in zip(axes.flat, facets, strict=False):
+    scale = {"vmin": rows["mean"].min(), "vmax": rows["mean"].max(), "cmap": "YlGnBu"}
+    scale |= {"cmap": "YlGnBu_r"} if metric in LESS_IS_BETTER else {}
+    height = 1.2 + (1.75 if facet else 0.5 * len(values[y])) * ceil(len(panels) / columns)
+    with _grid(min(height, 9), len(panels), columns, sharex=True) as (figure, axes):
+        for ax, value in zip(axes, panels, strict=True):
             part = rows if value is None else rows[rows[facet] == value]
-            ends = rows["mean"].min(), rows["mean"].max()
-            mesh = _cells(part, (len(values[y]), len(values[x])), ends, metric, columns, ax)
-            if value is not None:
-                title = f"{parameter(str(facet)).tick} {value_text(value)}"
-                ax.set_title(title, fontsize=9, parse_math=True)
-            _name_ticks(ax.xaxis, values[x], MOST_TICKS if columns == 1 else 4, 0.5)
-            _name_ticks(ax.yaxis, values[y], MOST_TICKS if columns == 1 else 5, 0.5)
-        for ax in axes.flat[len(facets) :]:
-            ax.set_visible(False)
+            mesh = drawings.cells(part, (values[y], values[x]), ax, **scale)
+            for row in part[part["tied"]].itertuples():
+                corner = row.column + 0.06, row.row + 0.06
+                ax.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK))
+            if best in part.index:
+                place = rows.loc[best, "column"] + 0.5, rows.loc[best, "row"] + 0.8
+                ax.plot(*place, "*", color=MARK, markersize=9, markeredgecolor="white")
+            title = "" if value is None else f"{parameter(str(facet)).tick} {value_text(value)}"
+            ax.set_title(title, fontsize=9, parse_math=True)
         bar = figure.colorbar(mesh, ax=axes, shrink=0.9, aspect=30)
-        of_metric(bar.ax.yaxis, metric)
+        style.in_units(bar.ax.yaxis, style.unit_of(metric))
         figure.supxlabel(parameter(x).label, fontsize=10, parse_math=True)
         figure.supylabel(parameter(y).tick, fontsize=10, parse_math=True)
-        figure.suptitle(f"{metric_label(metric)}: {policy}", fontsize=11, fontweight="bold", x=0.02,
-                        ha="left")  # fmt: skip
+        title = f"{metric_label(metric)}: {policy}"
+        figure.suptitle(title, fontsize=11, fontweight="bold", x=0.02, ha="left")
     return figure
 
 
@@ -168,18 +191,13 @@ def main_effects(results: Results, metric: str = PRODUCT, policy: str | None = N
         policy: The policy; by default all policies.
     """
     effects = settings.main_effects(results, metric, policy)
-    fields = settings.by_influence(effects)
-    colours = style.policy_colours(results.policies)
-    looks = {name: colours[name] for name in effects["policy"].unique()}
+    looks = _looks(results, effects)
 
     def draw(field: str, ax: Axes) -> None:
-        part = effects[effects["field"] == field]
-        ticks = part.drop_duplicates("position").sort_values("position")["value"].tolist()
-        style.policy_means(part, "position", looks, 0.02 * len(ticks), ax)
-        _name_ticks(ax.xaxis, ticks, 6)
-        ax.set_xlim(-0.5, len(ticks) - 0.5)
+        rows = effects[effects["field"] == field]
+        drawings.along(rows, looks, style.unit_of(metric), ax)
 
-    return _panel_per_field(fields, metric, draw)
+    return _panel_per_field(settings.by_influence(effects), metric, draw)
 
 
 def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) -> Figure:
@@ -191,22 +209,20 @@ def scatter(results: Results, metric: str = PRODUCT, policy: str | None = None) 
         policy: The policy; by default all policies.
     """
     table = settings.ranked(results, metric, policy)
-    values = settings.varied(results)
-    colours = style.policy_colours(results.policies)
+    looks = _looks(results, table)
 
     def draw(field: str, ax: Axes) -> None:
-        places, names = _axis(values[field])
-        for name, part in table.groupby("policy", sort=False):
-            spots = part[field].map(dict(zip(values[field], places, strict=True)))
-            ax.scatter(spots, part[metric], s=18, alpha=0.7, color=colours[str(name)][0],
-                       marker=colours[str(name)][1], linewidths=0, label=name,
-                       rasterized=len(table) > 2000)  # fmt: skip
-        if names:
-            _name_ticks(ax.xaxis, names, 6)
-        elif len(places) <= 6:
-            ax.set_xticks(places)
+        rows = drawings.placed(table, field)
+        for name, part in rows.groupby("policy", sort=False):
+            colour, marker = looks[str(name)]
+            ax.scatter(part["position"], part[metric], s=18, alpha=0.7, color=colour, label=name,
+                       marker=marker, linewidths=0, rasterized=len(table) > 2000)  # fmt: skip
+        ticks = rows.drop_duplicates("position").sort_values("position")
+        if len(ticks) <= drawings.MOST_TICKS:
+            drawings.name_ticks(ax.xaxis, [*ticks["value"]], [*ticks["position"]])
+        style.in_units(ax.yaxis, style.unit_of(metric))
 
-    return _panel_per_field([*values], metric, draw)
+    return _panel_per_field([*settings.varied(results)], metric, draw)
 
 
 def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
@@ -217,11 +233,72 @@ def distribution(missions: pd.DataFrame, metric: str = PRODUCT) -> Figure:
         metric: The metric.
     """
     values = {str(name): part[metric] for name, part in missions.groupby("policy", sort=False)}
-    with style.panels(3.9) as (figure, ax):
-        style.distributions(values, ax)
-        ax.set(xlabel=metric_label(metric), ylabel="share of the missions")
-        of_metric(ax.xaxis, metric)
-        style.legend_below(figure, ax, 4)
+    with style.panels(3.9, legend=4) as (figure, ax):
+        drawings.distributions(values, ax)
+        ax.set_xlabel(metric_label(metric))
+        style.in_units(ax.xaxis, style.unit_of(metric))
+    return figure
+
+
+def effect(
+    table: pd.DataFrame, field: str, changes: Mapping[str, pd.DataFrame], policies: list[str]
+) -> Figure:
+    """The metrics against a parameter: a part of Fig. 5.
+
+    There is a panel per metric, with the same axis for every parameter of the table, and a panel
+    with the differences from the first value, which has its own axis.
+
+    Args:
+        table: Rows of ``questions.main_effects.effects``, of the policies to draw.
+        field: The parameter.
+        changes: For each policy to draw, its ``main_effects.changes`` in the last of ``METRICS``.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
+    """
+    rows, colours = table[table["field"] == field], style.policy_colours(policies)
+    looks, first = {policy: colours[policy] for policy in changes}, rows[rows["position"] == 0]
+    steps = pd.concat(
+        [pairs[pairs["first"] == 0].assign(policy=name) for name, pairs in changes.items()]
+    ).rename(columns={"difference": "mean", "second": "position"})
+    steps = pd.concat([first.assign(mean=0.0, low=0.0, high=0.0).drop_duplicates("policy"), steps])
+    steps["value"] = steps["position"].map(rows.set_index("position")["value"].to_dict())
+    ratios: dict = {"sharex": True, "height_ratios": (1, 1.6, 1.6, 1.2)}
+    with style.panels(7.6, 4, "y", **ratios) as (figure, axes):
+        for ax, (metric, name) in zip(axes, METRICS.items(), strict=False):
+            drawings.along(rows[rows["metric"] == metric], looks, "%", ax)
+            ax.set(title=name, ylim=style.ends(table[table["metric"] == metric], 0.1))
+        drawings.along(steps, looks, "points", axes[-1])
+        axes[-1].axhline(0, **style.ZERO)
+        title = f"Paired difference from the value at {first['value'].iloc[0]}"
+        axes[-1].set(title=title, ylabel="points")
+        axes[-1].set_xlabel(parameter(field).label, parse_math=True)
+    return figure
+
+
+def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
+    """Sobol indices of every parameter as dots with intervals; the noise has its own row.
+
+    Args:
+        rows: Rows of ``analysis.questions.summary.sensitivities`` of a policy and a metric.
+        title: The title of the figure.
+    """
+    rows, look = rows.reset_index(drop=True), style.dot((style.palette()[0], "o"))
+    with style.panels(1.5 + 0.45 * len(rows), values="x", legend=2) as (figure, ax):
+        for index, label, fill_style in (
+            ("first", "alone (first order)", "none"),
+            ("total", "with all interactions (total)", "full"),
+        ):
+            spots = np.arange(len(rows)) + (0.12 if index == "total" else -0.12)
+            bars = style.arms(rows, index, f"{index}_low", f"{index}_high")
+            ax.errorbar(rows[index], spots, xerr=bars, linestyle="", label=label,
+                        fillstyle=fill_style, **look)  # fmt: skip
+        ax.axvline(0, **style.ZERO)
+        for y in rows.index[rows["parameter"] == NOISE]:
+            ax.axhline(y - 0.5, color=style.MUTED, linewidth=0.9, linestyle=":")
+        noise = "noise of the\nreplication"
+        names = [noise if name == NOISE else parameter(name).tick for name in rows["parameter"]]
+        ax.set_yticks(range(len(rows)), names, parse_math=True)
+        ax.set(title=title, ylim=(len(rows) - 0.5, -0.5), xlabel="share of the variance")
+        style.in_units(ax.xaxis, "%")
     return figure
 
 
@@ -231,52 +308,16 @@ def shown(values: Sequence[Any]) -> list[Any]:
     return [values[round(place)] for place in places]
 
 
-def curves(
-    rows: pd.DataFrame, x: str, looks: dict[str, tuple[str, str]], values: Sequence[Any], ax: Axes
-) -> None:
-    """Means with intervals along a field; values that are not numbers are evenly spaced."""
-    places, names = _axis(values)
-    spots = rows[x].map(dict(zip(values, places, strict=True))).astype(float)
-    gap = float(np.diff(places).min()) if len(places) > 1 else 1.0
-    half_width = min(0.12 * gap, 0.02 * float(np.ptp(places)))
-    style.policy_means(rows.assign(spot=spots), "spot", looks, half_width, ax)
-    if names or len(values) <= MOST_TICKS:
-        names = names or [*map(value_text, values)]
-        ax.set_xticks(places, names)
-        if max(map(len, names)) * np.ptp(places) / gap > _room(ax):
-            ax.xaxis.set_tick_params(rotation=30)
-
-
-def _cells(
-    rows: pd.DataFrame,
-    shape: tuple[int, int],
-    ends: tuple[float, float],
-    metric: str,
-    columns: int,
-    ax: Axes,
-) -> Any:
-    """The coloured cells of a panel: a star on the best, a frame on those that may be as good."""
-    means = np.full(shape, np.nan)
-    means[rows["row"], rows["column"]] = rows["mean"]
-    shades = "YlGnBu_r" if metric in LESS_IS_BETTER else "YlGnBu"
-    mesh = ax.pcolormesh(means, cmap=shades, vmin=ends[0], vmax=ends[1], edgecolors="white",
-                         linewidth=0.6, rasterized=means.size > 400)  # fmt: skip
-    roomy = shape[1] * columns <= 9 and shape[0] * columns <= 12
-    dark = 0.55 * (ends[1] - ends[0])
-    for row in rows.itertuples():
-        if row.tied:
-            corner, width = (row.column + 0.06, row.row + 0.06), 1.6 if columns == 1 else 1
-            ax.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, edgecolor=MARK, linewidth=width))
-        if row.best:
-            ax.plot(row.column + 0.5, row.row + (0.76 if roomy else 0.5), marker="*", color=MARK,
-                    markersize=11 if columns == 1 else 8, markeredgecolor="white",
-                    markeredgewidth=0.7, linestyle="")  # fmt: skip
-        if roomy and not np.isnan(row.mean):
-            is_dark = (row.mean - ends[0] > dark) != (metric in LESS_IS_BETTER)
-            ax.text(row.column + 0.5, row.row + 0.42, _short(row.mean, metric), ha="center",
-                    va="center", fontsize=8.5, color="white" if is_dark else style.INK)  # fmt: skip
-    ax.grid(visible=False)
-    return mesh
+@contextmanager
+def _grid(
+    height: float, count: int, columns: int, **options: Any
+) -> Iterator[tuple[Figure, list[Axes]]]:
+    """A figure with panels in rows of several columns, and with a common axis of values."""
+    layout = {"ncols": columns, "sharey": True, "squeeze": False, **options}
+    with style.panels(height, ceil(count / columns), "y", 4, **layout) as (figure, axes):
+        for ax in axes.flat[count:]:
+            ax.set_visible(False)
+        yield figure, [*axes.flat[:count]]
 
 
 def _panel_per_field(
@@ -284,60 +325,19 @@ def _panel_per_field(
 ) -> Figure:
     """A panel per field, two in a row, with the same axis of values."""
     columns = min(2, len(fields))
-    rows = ceil(len(fields) / columns)
-    layout = {"ncols": columns, "sharey": True, "squeeze": False}
-    with style.panels(0.9 + 2.3 * rows, rows, "y", **layout) as (figure, axes):
-        for ax, field in zip(axes.flat, fields, strict=False):
+    height = 0.9 + 2.3 * ceil(len(fields) / columns)
+    with _grid(height, len(fields), columns) as (figure, axes):
+        for ax, field in zip(axes, fields, strict=True):
             draw(field, ax)
             ax.set_xlabel(fill(parameter(field).label, 28), parse_math=True)
-            of_metric(ax.yaxis, metric)
-        for ax in axes.flat[len(fields) :]:
-            ax.set_visible(False)
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
-        style.legend_below(figure, axes.flat[0], 4)
     return figure
 
 
-def _axis(values: Sequence[Any]) -> tuple[list[float], list[str]]:
-    """The positions of values on an axis, and the names of those that are not numbers."""
-    if is_numeric_dtype(pd.Series(values)):
-        return [*map(float, values)], []
-    return [*map(float, range(len(values)))], [*map(value_text, values)]
-
-
-def _name_ticks(axis: XAxis | YAxis, values: Sequence[Any], most: int, first: float = 0.0) -> None:
-    """Ticks with the names of values; only every second or third one if there are many."""
-    places = range(0, len(values), ceil(len(values) / most))
-    names = [value_text(values[place]) for place in places]
-    axis.set_ticks([place + first for place in places], names)
-    if isinstance(axis, XAxis) and sum(map(len, names)) > _room(axis.axes):
-        axis.set_tick_params(rotation=30)
-
-
-def _room(ax: Axes) -> float:
-    """The characters that fit below an axis."""
-    spec = ax.get_subplotspec()
-    return 44 / (spec.get_gridspec().ncols if spec else 1)
-
-
-def _places(column: pd.Series, values: Sequence[Any]) -> pd.Series:
-    """The number of every value."""
-    return column.map({value: place for place, value in enumerate(values)}).astype(int)
-
-
-def graded(values: Sequence[Any]) -> dict[str, tuple[str, str]]:
-    """Colours from light to dark, and markers, for values in their order."""
-    shades = sns.color_palette("flare", len(values)).as_hex()
-    return {value_text(v): (shades[k], "os^vPX*"[k % 7]) for k, v in enumerate(values)}
-
-
-def of_metric(axis: Axis, metric: str) -> None:
-    """Ticks of a metric: in percent, or as numbers."""
-    style.round_ticks(axis, 6)
-    if metric in METRICS:
-        axis.set_major_formatter(PercentFormatter(1, decimals=None))
-    else:
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.6g}"))
+def _looks(results: Results, rows: pd.DataFrame) -> dict[str, Look]:
+    """The looks of the policies of some rows, which are the same whatever policies are drawn."""
+    looks = style.policy_colours(results.policies)
+    return {name: looks[name] for name in rows["policy"].unique()}
 
 
 def _short(value: float, metric: str) -> str:

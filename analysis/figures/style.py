@@ -3,13 +3,12 @@
 A figure is made inside ``look`` and touches no state of pyplot::
 
     with style.panels(height=3.5, values="x") as (figure, ax):
-        ax.errorbar(row["mean"], 0, xerr=style.arms(row), **style.dot("greedy", colours))
-        style.legend_below(figure, ax)
+        ax.errorbar(row["mean"], 0, xerr=style.arms(row), **style.dot(looks["greedy"]))
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import matplotlib as mpl
 import numpy as np
@@ -19,9 +18,14 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
+from analysis.names import METRICS, value_text
 from analysis.numbers import minus
+
+Look: TypeAlias = tuple[str, str]  # a colour and a marker
+Values: TypeAlias = Literal["x", "y", "xy"]
 
 INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
 SEA, ZONE, ZONE_EDGE = "#f3f8fb", "#ffe08a", "#d9a400"  # of maps
@@ -31,8 +35,12 @@ KNOWN_POLICIES = (
     *("random", "nearest", "greedy", "tour", "ddqn", "ddqn-paper"),
     *("planner-long", "age", "random-unguarded", "planner"),
 )
-LINES = ("-", "--", ":", "-.")
+LINES, MARKERS = ("-", "--", ":", "-."), "os^vPX*"
 WIDTH, DPI = 5.2, 150  # inches, dots per inch
+OUTLINED: dict = {"path_effects": [withStroke(linewidth=2.5, foreground="white")]}  # of texts
+# In all figures, blue means better, orange worse, and grey inconclusive.
+BETTER, WORSE = "#0173b2", "#c05000"
+ZERO: dict = {"color": INK, "linewidth": 1, "zorder": 1}  # the line of no difference
 
 _LOOK = {
     "font.size": 10,
@@ -63,14 +71,23 @@ def look() -> Iterator[None]:
 
 @contextmanager
 def panels(
-    height: float, rows: int = 1, values: Literal["x", "y", "xy"] = "xy", **options: Any
+    height: float,
+    rows: int = 1,
+    values: Values = "xy",
+    legend: int = 3,
+    heading: str | None = None,
+    **options: Any,
 ) -> Iterator[tuple[Figure, Any]]:
     """A new figure with its axes, one below the other, and inside the look of all figures.
+
+    At the end, a legend of all that has a label is put below the axes.
 
     Args:
         height: The height of the figure [inches].
         rows: The number of axes.
         values: The axes that have grid lines.
+        legend: The number of columns of the legend.
+        heading: The title of the legend.
         options: Further arguments of ``Figure.subplots``.
     """
     with look():
@@ -79,9 +96,14 @@ def panels(
         for ax in np.ravel(axes):
             grid_of(values, ax)
         yield figure, axes
+        entries = [zip(*ax.get_legend_handles_labels(), strict=True) for ax in figure.axes]
+        if handles := {label: handle for pairs in entries for handle, label in pairs}:
+            place = {"loc": "outside lower center", "ncols": legend, "title": heading}
+            below = figure.legend(handles.values(), handles, **place)
+            below.get_title().set_parse_math(True)
 
 
-def grid_of(values: Literal["x", "y", "xy"], ax: Axes) -> None:
+def grid_of(values: Values, ax: Axes) -> None:
     """Draw grid lines only for axes of values, and neither a frame nor a line for axes of names."""
     ax.xaxis.grid("x" in values)
     ax.yaxis.grid("y" in values)
@@ -108,18 +130,24 @@ def palette() -> list[str]:
     return sns.color_palette("colorblind").as_hex()
 
 
-def policy_colours(policies: Iterable[str]) -> dict[str, tuple[str, str]]:
+def policy_colours(policies: Iterable[str]) -> dict[str, Look]:
     """Colour and marker of every policy; those of ``KNOWN_POLICIES`` always have the same."""
     names = list(dict.fromkeys(policies))
     numbers = {name: KNOWN_POLICIES.index(name) for name in names if name in KNOWN_POLICIES}
     free = [n for n in range(len(names)) if n not in numbers.values()]
     numbers |= dict(zip((name for name in names if name not in numbers), free, strict=False))
-    return {name: (palette()[numbers[name] % 10], "os^vPX*"[numbers[name] % 7]) for name in names}
+    return {name: (palette()[numbers[name] % 10], MARKERS[numbers[name] % 7]) for name in names}
 
 
-def dot(policy: str, colours: Mapping[str, tuple[str, str]]) -> dict:
-    """The style of the means of a policy, as arguments of ``Axes.errorbar``."""
-    colour, marker = colours[policy]
+def graded(values: Sequence[Any]) -> dict[str, Look]:
+    """Colours from light to dark, and markers, for values in their order."""
+    shades = sns.color_palette("flare", len(values)).as_hex()
+    return {value_text(v): (shades[k], MARKERS[k % 7]) for k, v in enumerate(values)}
+
+
+def dot(look: Look) -> dict:
+    """The style of means with that colour and marker, as arguments of ``Axes.errorbar``."""
+    colour, marker = look
     return {"color": colour, "marker": marker, "markersize": 4.5, "capsize": 4, "elinewidth": 1.8}
 
 
@@ -130,56 +158,9 @@ def arms(
     return np.array([rows[mean] - rows[low], rows[high] - rows[mean]]).reshape(2, -1)
 
 
-def policy_means(
-    rows: pd.DataFrame,
-    x: str,
-    looks: Mapping[str, tuple[str, str]],
-    half_width: float,
-    ax: Axes,
-    **options: Any,
-) -> None:
-    """The means of every policy against a column, with intervals, side by side at each value.
-
-    Args:
-        rows: A row per ``policy`` and value of ``x``, with ``mean``, ``low`` and ``high``.
-        x: The column.
-        looks: The policies to draw, as ``policy_colours`` returns them.
-        half_width: Half the distance between the outer policies at a value.
-        ax: The axes to draw on.
-        options: Further arguments of ``Axes.errorbar``.
-    """
-    for policy, shift in zip(looks, shifts(len(looks), half_width), strict=True):
-        means = rows[rows["policy"] == policy].sort_values(x)
-        ax.errorbar(means[x] + shift, means["mean"], yerr=arms(means), linewidth=1, label=policy,
-                    **dot(policy, looks), **options)  # fmt: skip
-
-
-def policy_rows(
-    rows: pd.DataFrame, looks: Mapping[str, tuple[str, str]], ax: Axes, *columns: str
-) -> None:
-    """A row per policy, the first on top: its mean as a dot with its interval.
-
-    Args:
-        rows: The rows, with ``policy``.
-        looks: The looks of the policies.
-        ax: The axes to draw on.
-        columns: The mean and the ends of its interval; by default ``mean``, ``low`` and ``high``.
-    """
-    for y, (_, row) in enumerate(rows.iterrows()):
-        mean = row[columns[0] if columns else "mean"]
-        ax.errorbar(mean, y, xerr=arms(row, *columns), **dot(row["policy"], looks))
-    ax.set_yticks(range(len(rows)), rows["policy"])
-    ax.set_ylim(len(rows) - 0.4, -0.6)
-
-
-def distributions(values: Mapping[str, pd.Series], ax: Axes) -> None:
-    """The share of the missions with at most a value: a curve per policy."""
-    colours = policy_colours(values)
-    for number, (policy, of_policy) in enumerate(values.items()):
-        ax.ecdf(of_policy, label=policy, color=colours[policy][0], linewidth=1.7,
-                linestyle=LINES[number % 4])  # fmt: skip
-    ax.set_ylim(-0.02, 1.02)
-    ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=0))
+def shifts(count: int, half_width: float) -> np.ndarray:
+    """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
+    return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
 
 
 def ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[float, float]:
@@ -191,35 +172,24 @@ def ends(rows: pd.DataFrame, length: float = 0.0, zero: bool = False) -> tuple[f
     return min(low - room, high - length), high + room
 
 
-def shifts(count: int, half_width: float) -> np.ndarray:
-    """The (count,) offsets from ``-half_width`` to ``half_width`` that keep marks apart."""
-    return np.linspace(-half_width, half_width, count) if count > 1 else np.zeros(count)
-
-
 def signed_points(share: float, _: float = 0) -> str:
     """A difference of shares in percentage points, as ``+2.5`` for ``0.025``: a tick label."""
     return minus(f"{100 * share:+.3g}") if round(share, 9) else "0"
 
 
-def points_axis(axis: Axis, nbins: int) -> None:
-    """Ticks in percentage points at round values."""
-    round_ticks(axis, nbins)
-    axis.set_major_formatter(FuncFormatter(signed_points))
-
-
-def round_ticks(axis: Axis, nbins: int) -> None:
-    """At most ``nbins`` intervals between ticks, at round values."""
+def in_units(axis: Axis, unit: str, nbins: int = 6) -> None:
+    """Ticks at round values: in percent ("%"), in signed percentage points, or as numbers ("")."""
     axis.set_major_locator(MaxNLocator(nbins=nbins, steps=[1, 2, 5, 10]))
+    numbers = {"points": signed_points, "": lambda value, _: f"{value:,.6g}"}
+    axis.set_major_formatter(PercentFormatter(1) if unit == "%" else numbers[unit])
+
+
+def unit_of(metric: str) -> str:
+    """The unit in which ``in_units`` writes a metric."""
+    return "%" if metric in METRICS else ""
 
 
 def note_at_right(text: str, level: float, ax: Axes, size: float = 9) -> Any:
     """A note in the right margin, at a level of the y axis."""
     return ax.annotate(text, (1, level), xycoords=("axes fraction", "data"), xytext=(4, 0),
                        textcoords="offset points", va="center", fontsize=size)  # fmt: skip
-
-
-def legend_below(figure: Figure, ax: Axes, columns: int = 3, title: str | None = None) -> None:
-    """A legend of what is drawn on the axes, below the figure."""
-    entries = ax.get_legend_handles_labels()
-    legend = figure.legend(*entries, loc="outside lower center", ncols=columns, title=title)
-    legend.get_title().set_parse_math(True)

@@ -3,15 +3,11 @@
 Each returns a figure of its own; nothing touches pyplot's state.
 """
 
-from contextlib import AbstractContextManager
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
-from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
+from matplotlib.ticker import MaxNLocator
 from scipy import stats
 
 from analysis.figures import style
@@ -22,6 +18,7 @@ from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
 SHOWN = 60  # number of blocks in a caterpillar plot
+_ABOVE: dict = {"rows": 2, "values": "y", "sharex": True, "height_ratios": (2, 1), "legend": 2}
 
 
 def fit(observed: Fit, title: str, label: str) -> Figure:
@@ -35,25 +32,23 @@ def fit(observed: Fit, title: str, label: str) -> Figure:
         label: The label of the classes.
     """
     table, spots = observed.table, np.arange(len(observed.table))
-    n = table["expected"].sum()
-    error = np.sqrt(table["expected"] * (1 - table["expected"] / n).clip(lower=1e-12))
-    with _with_deviations() as (figure, (ax, below)):
-        ax.bar(spots, table["expected"], 0.8, color=KNOWN, label="expected")
+    expected = table["expected"]
+    error = np.sqrt(expected * (1 - expected / expected.sum()).clip(lower=1e-12))
+    with style.panels(4.6, **_ABOVE) as (figure, (ax, below)):
+        ax.bar(spots, expected, 0.8, color=KNOWN, label="expected")
         ax.scatter(spots, table["observed"], s=26, color=SEEN, zorder=3, label="observed")
         ax.set_title(title, parse_math=True)
         ax.set(ylabel="observations")
-        if table["expected"].max() > 100 * table["expected"].min():
-            ax.set_yscale("log")
-            ax.set_ylim(bottom=max(table[["expected", "observed"]].min().min(), 1) / 3)
-            ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.0f}"))
-        else:
-            ax.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
-        _deviations(below, spots, (table["observed"] - table["expected"]) / error)
+        if expected.max() > 100 * expected.min():
+            ax.set(
+                yscale="log", ylim=(max(table[["expected", "observed"]].min().min(), 1) / 3, None)
+            )
+        ax.yaxis.set_major_formatter("{x:,.0f}")
+        _deviations(below, spots, (table["observed"] - expected) / error)
         step = -(-len(table) // 12)  # as many labels as there is room for
         labels = [name.replace(" or ", "\nor ") for name in table["label"]]
         below.set_xticks(spots[::step], labels[::step])
         below.set_xlabel(label)
-        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -66,18 +61,16 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
     """
     away = np.geomspace(table["distance"].min(), table["distance"].max(), 60)
     known = [closed_forms.rate_moments(space, d).mean for d in away]
-    with _with_deviations() as (figure, (ax, below)):
+    with style.panels(4.6, **_ABOVE) as (figure, (ax, below)):
         ax.plot(away, known, color=style.INK, linewidth=1.3, zorder=1, label="by integration")
         ax.scatter(table["distance"], table["mean"], s=30, color=SEEN, zorder=3, label="simulated")
         ax.set(title="Mean rate of a lone UAV", ylabel="data units per\ncommunication slot")
         ax.set(xscale="log", yscale="log")
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-        below.set_xscale("log")
+        ax.yaxis.set_major_formatter("{x:g}")
         error = table["error"].where(table["error"] > 0)
         _deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
-        below.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
+        below.xaxis.set_major_formatter("{x:,.0f}")
         below.set_xlabel("distance [m]")
-        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -89,16 +82,14 @@ def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
         space: The scenario, with a range of initial data.
     """
     law = closed_forms.initial_total(space)
-    with style.panels(3.4) as (figure, ax):
+    reach = law.mean() + 3 * law.std() * np.array([-1, 1])
+    spots = np.linspace(min(values.min(), reach[0]), max(values.max(), reach[1]), 120)
+    with style.panels(3.4, legend=2) as (figure, ax):
         bins = int(np.clip(np.sqrt(len(values)), 8, 50))
         ax.hist(values, bins, density=True, color=KNOWN, label="observed")
-        reach = law.mean() + 3 * law.std() * np.array([-1, 1])
-        spots = np.linspace(min(values.min(), reach[0]), max(values.max(), reach[1]), 120)
         ax.plot(spots, law.pdf(spots), color=SEEN, linewidth=1.8, label="known density")
         ax.set(title="Initial data of a mission", ylabel="density")
         ax.set_xlabel("data units, all nodes together")
-        ax.yaxis.set_major_locator(MaxNLocator(nbins=5))
-        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -110,23 +101,20 @@ def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
         title: The title of the figure.
     """
     shown = blocks.head(SHOWN)
-    with style.panels(3.6, values="y") as (figure, ax):
-        looks = (
-            (True, SEEN, "o", "contains the mean of all"),
-            (False, MISS, "X", "does not contain it"),
-        )
+    looks = (
+        (True, SEEN, "o", "contains the mean of all"),
+        (False, MISS, "X", "does not contain it"),
+    )
+    with style.panels(3.6, values="y", legend=2) as (figure, ax):
         for holds, colour, marker, name in looks:
             rows = shown[shown["holds"] == holds]
-            ax.vlines(rows.index + 1, rows["low"], rows["high"], color=colour,
-                      linewidth=1.2 if holds else 2.2)  # fmt: skip
+            ax.vlines(rows.index + 1, rows["low"], rows["high"], color=colour)
             ax.scatter(rows.index + 1, rows["mean"], s=10 if holds else 34, color=colour,
                        marker=marker, zorder=3, label=name)  # fmt: skip
         ax.axhline(blocks["reference"].iloc[0], color=style.INK, linewidth=1.1, zorder=1)
         ax.set(title=title, xlabel="block of missions", xlim=(0, len(shown) + 1))
-        ax.yaxis.set_major_formatter(PercentFormatter(1, decimals=None))
-        style.round_ticks(ax.yaxis, 6)
+        style.in_units(ax.yaxis, "%")
         ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
-        style.legend_below(figure, ax, 2)
     return figure
 
 
@@ -139,52 +127,30 @@ def slot(steps: list[tuple[str, str]], repeated: str, end: str) -> Figure:
         repeated: The condition for another slot.
         end: What follows after the last slot.
     """
-    height, gap = 1.0, 0.35
-    tops = [-(height + gap) * number for number in range(len(steps) + 1)]
-    with style.panels(0.8 * len(tops)) as (figure, ax):
-        for number, (name, text) in enumerate(steps):
-            _box(ax, tops[number], height, name, text, style.ZONE if number == 0 else style.SEA)
-        _box(ax, tops[-1], height, end, "", style.ZONE)
-        for top in tops[1:]:
-            _arrow(ax, (5, top + gap), (5, top))
-        first, last = tops[1] - height / 2, tops[-2] - height / 2
-        ax.plot([10, 10.7, 10.7], [last, last, first], color=style.INK, linewidth=1.2)
-        _arrow(ax, (10.7, first), (10, first))
-        ax.text(
-            11, (first + last) / 2, repeated, rotation=-90, va="center", ha="left", fontsize=9.5
-        )
-        ax.set(xlim=(-0.1, 11.9), ylim=(tops[-1] - height - 0.1, 0.1))
+    last, arrow = len(steps), {"arrowstyle": "-|>", "color": style.INK}
+    box = {"boxstyle": "round", "edgecolor": style.MUTED}
+    with style.panels(0.8 * (last + 1)) as (figure, ax):
+        for number, (name, text) in enumerate([*steps, (end, "")]):
+            fill = style.ZONE if number in (0, last) else style.SEA
+            ax.text(0, -number, f"{name}\n{text}".strip(), va="center", fontsize=9.5,
+                    bbox={**box, "facecolor": fill})  # fmt: skip
+            if number:
+                ax.annotate("", (0.4, 0.3 - number), (0.4, 0.7 - number), arrowprops=arrow)
+        ax.annotate("", (9.6, -1), (9.6, 1 - last), arrowprops=arrow)
+        ax.text(9.8, -last / 2, repeated, rotation=-90, va="center", fontsize=9.5)
+        ax.set(xlim=(-0.2, 10.4), ylim=(-0.5 - last, 0.5))
         ax.axis("off")
     return figure
 
 
-def _with_deviations() -> AbstractContextManager[tuple[Figure, Any]]:
-    """A panel and a lower one for the deviations, over the same axis."""
-    return style.panels(4.6, 2, "y", sharex=True, height_ratios=(2, 1))
-
-
-def _deviations(ax: Axes, spots: Any, deviations: pd.Series) -> None:
+def _deviations(ax: Axes, spots: "np.ndarray | pd.Series", deviations: pd.Series) -> None:
     """Deviations in standard errors, and a band that contains all in 95 % of such figures."""
     band = stats.norm.ppf(1 - (1 - LEVEL) / 2 / max(len(deviations), 1))
     ax.axhspan(-band, band, color=KNOWN, alpha=0.45, linewidth=0)
-    ax.axhline(0, color=style.INK, linewidth=0.9)
+    ax.axhline(0, **style.ZERO)
     out = deviations.abs() > band
     for which, colour, marker in ((~out, SEEN, "o"), (out, MISS, "X")):
         ax.scatter(np.asarray(spots)[which], deviations[which], s=26, color=colour, marker=marker,
                    zorder=3)  # fmt: skip
     reach = max(1.15 * float(deviations.abs().max()), 1.25 * band)
     ax.set(ylabel="standard\nerrors", ylim=(-reach, reach))
-
-
-def _box(ax: Axes, top: float, height: float, name: str, text: str, colour: str) -> None:
-    box = FancyBboxPatch((0, top - height), 10, height, boxstyle="round,pad=0,rounding_size=0.2",
-                         facecolor=colour, edgecolor=style.MUTED, linewidth=0.9)  # fmt: skip
-    ax.add_patch(box)
-    middle = top - height / 2
-    ax.text(0.3, middle + 0.2 * bool(text), name, va="center", weight="bold", fontsize=10.5)
-    ax.text(0.3, middle - 0.24, text, va="center", fontsize=9.2)
-
-
-def _arrow(ax: Axes, tail: tuple[float, float], head: tuple[float, float]) -> None:
-    ax.add_patch(FancyArrowPatch(tail, head, arrowstyle="-|>", mutation_scale=11, color=style.INK,
-                                 linewidth=1.2, shrinkA=0, shrinkB=0))  # fmt: skip

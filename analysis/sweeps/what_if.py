@@ -90,7 +90,7 @@ class WhatIf:
 
     def plot(self) -> "Figure":
         """The paired differences of the metrics, with intervals."""
-        from analysis.figures import what_if as figures
+        from analysis.figures import comparison as figures
 
         return figures.gains(self.table())
 
@@ -100,14 +100,14 @@ class WhatIf:
         Args:
             metric: One of the paper's metrics, or of what the missions measured.
         """
-        from analysis.figures import what_if as figures
+        from analysis.figures import comparison as figures
 
         sides = question.settings_of(self.results)
         return figures.means(answer.means(self.results), metric, sides)
 
     def plot_spread(self) -> "Figure":
         """The distribution of the paired differences in collection ratio and communication."""
-        from analysis.figures import what_if as figures
+        from analysis.figures import comparison as figures
 
         return figures.spread(answer.all_differences(self.results))
 

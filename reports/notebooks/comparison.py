@@ -26,6 +26,7 @@ from IPython.display import display
 
 from analysis import load_results, numbers
 from analysis.figures import comparison as figures
+from analysis.figures.missions import mission_figure
 from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import kept_missions
 from reports.pages import html
@@ -167,8 +168,16 @@ display(
 
 # %%
 lines = head_to_head.commands(study, policy, [*worst["replication"], *lost["replication"]])
-maps = figures.maps(kept_missions(study, head_to_head.drawn(missions, pair), results))
-display(html.say("{commands}", commands=html.commands(lines)), *map(html.gallery, maps))
+kept = kept_missions(study, head_to_head.drawn(missions, pair), results)
+maps = [
+    (
+        mission_figure(mission.log, mission.scenario),
+        f"Map of mission {mission.row['replication']} by {mission.row['policy']}",
+        mission.caption,
+    )
+    for mission in kept
+]
+display(html.say("{commands}", commands=html.commands(lines)), html.gallery(maps))
 
 # %% [markdown]
 # ## The time of a decision

@@ -22,7 +22,7 @@ results = "../../results"  # folder with the results folder of explorer
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.figures.policies import performance
+from analysis.figures.settings import performance
 from analysis.questions.settings import in_words
 from analysis.stats.intervals import LEVEL
 from reports.explorer import Grid, explorer
@@ -38,14 +38,17 @@ explorer(study)
 
 # %%
 html.say(
-    "A dot is a mean, and the bar is its {level} confidence interval. The thin lines are at 0, 50 "
-    "and 100 %. At every setting, each policy is simulated in the same {missions} replications, "
-    "with the same random initial data, arrivals and shadowing. Therefore two settings, or two "
-    "policies, may differ significantly although their intervals overlap. A "
-    "[what-if question](what-if.html) compares two settings mission by mission.",
+    "A dot is a mean, and the bar is its {level} confidence interval. At every setting, each "
+    "policy is simulated in the same {missions} replications.",
     level=numbers.level(LEVEL),
     missions=numbers.span(start["n"]),
 )
+
+# %% [markdown]
+# The thin lines are at 0, 50 and 100 %. All replications have the same random initial data,
+# arrivals and shadowing. Therefore two settings, or two policies, may differ significantly although
+# their intervals overlap. A [what-if question](what-if.html) compares two settings mission by
+# mission.
 
 # %%
 html.say(

@@ -50,12 +50,14 @@ baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
 
 # %%
 html.say(
-    "Each training makes {updates} updates and simulates {slots} million UAV-slots; trainings of a "
-    "variant differ only in their seed. The curves show the policy without exploration on "
-    "evaluation missions. Left of the vertical line, in phase I, these have no battery decrease.",
+    "Each training makes {updates} updates and simulates {slots} million UAV-slots.",
     updates=numbers.span(last["updates"]),
     slots=numbers.span(last["uav_slots"] / 1e6, "{:.1f}"),
 )
+
+# %% [markdown]
+# Trainings of a variant differ only in their seed. The curves show the policy without exploration
+# on evaluation missions. Left of the vertical line, in phase I, these have no battery decrease.
 
 
 # %%

@@ -52,13 +52,15 @@ best = best_policy(fig1.missions)
 example = missions.logged_mission(fig1, best, 0, replication)
 mean = missions.estimate(fig1, best)
 html.say(
-    "The map has {grid} x {grid} cells and {nodes} nodes. The paper draws this example without "
-    "numbers, so nothing can be compared. The policy of this mission is **{best}**, the best of "
-    "{policies} by collection ratio and communication: {mean}, n = {n:,} missions. A learned "
-    "policy works only on the map of its training, so none can be used here.",
+    "The map has {grid} x {grid} cells and {nodes} nodes. The policy of this mission is "
+    "**{best}**, the best of {policies} by collection ratio and communication: {mean}, n = {n:,}.",
     grid=example.scenario.grid, nodes=len(example.scenario.nodes), best=best,
     policies=numbers.words(fig1.policies), mean=numbers.estimate(mean), n=mean["n"],
 )  # fmt: skip
+
+# %% [markdown]
+# The paper draws this example without numbers, so nothing can be compared. A learned policy works
+# only on the map of its training, so none can be used here.
 
 # %%
 caption = (
@@ -88,12 +90,14 @@ mean = missions.estimate(fig4, shown_policy)
 html.say(
     "The policy is **{policy}**: the mean of its collection ratio and communication over the three "
     "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all). The best "
-    "policy of the study is {best}. Each column is a single mission, replication {replication} of "
-    "seed {seed}: an example, not an average. All three have the same random initial data, "
-    "arrivals and shadowing; only the number of UAVs differs.",
+    "policy of the study is {best}. Each column is replication {replication} of seed {seed}.",
     policy=shown_policy, mean=numbers.estimate(mean), n=mean["n"],
     best=best_policy(fig4.missions), replication=replication, seed=seed,
 )  # fmt: skip
+
+# %% [markdown]
+# Each is a single mission: an example, not an average. All three have the same random initial data,
+# arrivals and shadowing; only the number of UAVs differs.
 
 
 # %%
@@ -118,14 +122,11 @@ html.gallery([captioned(point) for point in points])
 
 # %% [markdown]
 # ## Slot by slot
+#
+# The players show the same missions: press *Play*, or move the slider.
 
 # %%
-display(
-    html.say(
-        "The players show the same missions: press *Play*, or move the slider. {reading}",
-        reading=READING,
-    )
-)
+display(html.say("{reading}", reading=READING))
 library()
 
 # %%

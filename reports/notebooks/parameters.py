@@ -24,8 +24,7 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.figures import parameters as figures
-from analysis.figures.policies import performance
+from analysis.figures import settings as figures
 from analysis.questions import main_effects, sensitivity, summary
 from analysis.replication import paper, scorecard, sweet_spot
 from analysis.replication.claims import SECTIONS
@@ -53,13 +52,15 @@ html.say(
     "The policies are the best learned one of the study, if there is one, and the best heuristic: "
     "{policies}. Every value of a parameter was simulated in {n:,} missions per policy, with all "
     "other parameters drawn from Table II. All values and policies have the same other random "
-    "draws (common random numbers), so the paired difference from the first value, in the lowest "
-    "panel, shows most. This panel has its own axis. Nearly all missions succeed, since both "
-    "policies act under the return guard, which allows only actions after which a UAV can still "
-    "reach the charging zone in time.",
+    "draws (common random numbers).",
     policies=html.composed(numbers.words([f"**{policy}**" for policy in policies])),
     n=effects["n"].min(),
 )
+
+# %% [markdown]
+# Therefore the paired difference from the first value, in the lowest panel, shows most. This panel
+# has its own axis. Nearly all missions succeed, since both policies act under the return guard,
+# which allows only actions after which a UAV can still reach the charging zone in time.
 
 # %%
 html.gallery(
@@ -98,12 +99,14 @@ studies = {"fig5": fig5, "sweet-spot": sweet}
 rows = scorecard.of_policy(studies, leading, SECTIONS["fig-5"])
 rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
 html.say(
-    "These are the claims of the paper about its Fig. 5, and the verdicts for {leading} by the "
-    "rules of the replication scorecard. A claim is inconclusive if the missions are too few for "
-    "either answer. The claims overlap, so the number of verdicts is not a score.\n\n{claims}",
+    "The paper's claims about its Fig. 5, and the verdicts for {leading}:\n\n{claims}",
     leading=leading,
     claims=html.composed(scorecard.listed(rows)),
 )
+
+# %% [markdown]
+# Verdicts follow from the rules of the scorecard: *inconclusive* means too few missions. Claims
+# overlap, so the number of verdicts is not a score.
 
 # %% [markdown]
 # ## <a id="sweet-spot"></a>All together: the sweet spot
@@ -127,7 +130,7 @@ caption = "The check: n = {:,} missions per policy, bars are {} intervals. Dashe
 html.gallery(
     [
         (
-            performance(checks, metric, paper.SWEET_SPOT[metric]),
+            figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
             caption.format(checks["n"].min(), level),
         )
@@ -156,15 +159,14 @@ html.say(
 # ## Sensitivity: which parameters matter
 
 # %%
-html.say(
-    "Here all parameters are drawn together: {ranges}. A Sobol index is the share of a metric's "
-    "variance that a parameter explains, *alone* or *with all interactions* that it takes part in. "
-    "The replication, which determines all random draws, counts as a parameter: its share is noise "
-    "that no setting removes.",
-    ranges=sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"]),
-)
+ranges = sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
+html.say("Here all parameters are drawn together: {ranges}.", ranges=ranges)
 
 # %% [markdown]
+# A Sobol index is the share of a metric's variance that a parameter explains, *alone* or *with all
+# interactions* that it takes part in. The replication, which determines all random draws, counts as
+# a parameter: its share is noise that no setting removes.
+#
 # The figures show the collection ratio. The product differs from it only in failed missions, which
 # are too few here. The intervals come from a bootstrap over the blocks of the design; they are too
 # wide where the parameters dominate. Estimates are not limited to 0 to 100 %; that of a small share
@@ -186,8 +188,7 @@ html.gallery(
 html.table(
     sensitivity.index_table(indices),
     f"Sobol indices as shares of the variance, with {level} intervals (bootstrap over blocks). A "
-    "metric without variance has no row. Rows of success and of the product depend on only "
-    f"{failed}",
+    f"metric without variance has no row. Rows of success and the product depend on only {failed}",
 )
 
 # %% [markdown]

@@ -24,8 +24,8 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers, summary
-from analysis.figures import optimality
-from analysis.figures import policies as figures
+from analysis.figures import comparison
+from analysis.figures import settings as figures
 from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import printed
 from analysis.questions.optimality import gap
@@ -43,12 +43,11 @@ bounded = gap.results_in(Path(results) / "gap")
 # ## <a id="table-4"></a>Random missions: the paper's Table IV
 
 # %%
-html.say(
-    "{n:,} missions per policy, each with a number of UAVs, a flying time, charging thresholds and "
-    "initial data of its own (Table II). Every policy has the same missions: the same initial "
-    "data, arrivals and shadowing.",
-    n=overall["n"].min(),
-)
+html.say("There are {n:,} missions per policy.", n=overall["n"].min())
+
+# %% [markdown]
+# Each mission has a number of UAVs, a flying time, charging thresholds and initial data of its own
+# (Table II). Every policy has the same missions: the same initial data, arrivals and shadowing.
 
 # %%
 caption = f"n = {overall['n'].min():,} missions per policy, bars are 95 % intervals."
@@ -87,14 +86,15 @@ html.say(
 # %%
 html.say(
     "The paper prints no intervals, although its numbers are means over {n:,} missions. For its "
-    "success, for example, the 95 % interval is {interval}. The paper does not give all constants, "
-    "such as the place of the charging zone or the transmit power; for these, the scenario here "
-    "has its own values.",
+    "success, for example, the 95 % interval is {interval}.",
     n=paper.TABLE_IV_MISSIONS,
     interval=numbers.interval(*paper.spread(paper.TABLE_IV[SUCCESS], paper.TABLE_IV_MISSIONS)),
 )
 
 # %% [markdown]
+# The paper does not give all constants, such as the place of the charging zone or the transmit
+# power; for these, the scenario here has its own values.
+#
 # ## By number of UAVs
 #
 # These are the same missions, grouped by the number of UAVs that each mission drew.
@@ -154,7 +154,7 @@ if bounded:
     caption = f"n = {numbers.span(gaps['n'])} missions of the study gap, with 95 % intervals."
     display(
         html.table(gap.at_most(gaps), "Scorecard: at most so many points from the best possible"),
-        html.figure(optimality.gaps(gaps), "The product of every policy, and the bound", caption),
+        html.figure(comparison.gaps(gaps), "The product of every policy, and the bound", caption),
         html.table(gap.listed(gaps), "Means, the upper bound, and the gap", data=gaps),
     )
 

@@ -21,7 +21,7 @@ results = "../../results"  # folder with the results folder of the study age
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.figures import operations as figures
+from analysis.figures.settings import lines
 from analysis.questions.operations import answers, effects
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
@@ -55,7 +55,7 @@ html.say("{answer}", answer=html.composed(answers.age(study)))
 html.gallery(
     [
         (
-            figures.against(means, "uavs", rates, metric, "policy"),
+            lines(means[means["metric"] == metric], "uavs", rates, metric, "policy"),
             f"{names.metric_name(metric)} against the number of UAVs, by arrival rate",
             f"n = {missions} missions per point; bars are {level} intervals.",
         )

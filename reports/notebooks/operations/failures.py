@@ -23,7 +23,7 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, names, numbers
-from analysis.figures import operations as figures
+from analysis.figures.settings import lines
 from analysis.questions.operations import answers, effects
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
@@ -57,7 +57,7 @@ html.say("{answer}", answer=html.composed(answers.failures(study)))
 html.gallery(
     [
         (
-            figures.against(means, rate, "uavs", metric, repair),
+            lines(means[means["metric"] == metric], rate, "uavs", metric, repair),
             f"{names.metric_name(metric)} against the failure rate, by number of UAVs",
             f"n = {missions} missions per point; bars are {level} intervals. A mean time of a "
             "repair of 0 means that a failed UAV is lost.",

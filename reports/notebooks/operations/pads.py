@@ -24,7 +24,8 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, names, numbers
-from analysis.figures import operations as figures
+from analysis.figures.learning import courses
+from analysis.figures.settings import lines
 from analysis.questions.operations import answers, effects, queue
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
@@ -56,7 +57,7 @@ html.say("{answer}", answer=html.composed(answers.pads(study, margin)))
 # %%
 drawn = [
     (
-        figures.against(means, "pads", "uavs", metric, "policy"),
+        lines(means[means["metric"] == metric], "pads", "uavs", metric, "policy"),
         f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
         f"n = {missions} missions per point; bars are {level} intervals.",
     )
@@ -93,8 +94,9 @@ html.gallery(drawn[2:])
 # %%
 waves = queue.over_time(study, study.policies[0], answers.short_of_pads(study, margin))
 low, high = map(numbers.level, queue.BAND)
+titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in waves["uavs"].unique()}
 html.figure(
-    figures.queue(waves),
+    courses(waves.assign(panel=waves["uavs"]), "pads", "", titles, "Number of charging pads"),
     "The number of UAVs that wait for a pad over the slots of the mission",
     f"The line is the mean of n = {waves['n'].min()} missions, the band has the missions between "
     f"the {low} and the {high} quantile. A mission that is over has no queue.",

@@ -26,8 +26,9 @@ from pathlib import Path
 from IPython.display import display
 
 from analysis import load_results, numbers
-from analysis.figures import comparison
-from analysis.figures import optimality as figures
+from analysis.figures import comparison as figures
+from analysis.figures import fronts, learning
+from analysis.figures import missions as maps
 from analysis.questions import decision_times, head_to_head, regions
 from analysis.questions.optimality import gap
 from analysis.questions.optimality import planner as questions
@@ -52,8 +53,7 @@ html.say("{gap}", gap=html.composed(gap.in_words(study, planners[-1])))
 # %% [markdown]
 # ## Differences by number of UAVs
 #
-# All policies meet the same missions: the same parameters, initial data, arrivals and shadowing. So
-# they are compared mission by mission.
+# All policies meet the same missions, so they are compared mission by mission.
 
 # %%
 by_product = differences[differences["metric"] == "collection_ratio_and_communication"]
@@ -100,7 +100,7 @@ lead = regions.along(missions, pair.candidates)
 html.gallery(
     [
         (
-            comparison.lead(lead, field, missions["difference"].mean()),
+            figures.lead(lead, field, missions["difference"].mean()),
             f"Mean difference {planner} − {learner} against {field}",
             f"{planner} − {learner}, n = {numbers.span(bins['n'])} missions per dot.",
         )
@@ -112,11 +112,15 @@ html.gallery(
 # ### Which nodes they serve
 
 # %%
-shares = {policy: questions.coverage(study, policy) for policy in (planner, learner)}
+first, second = (questions.coverage(study, policy) for policy in (planner, learner))
+collected = {f"Collected by {planner}": first, f"Collected by {learner}": second}
+shown = collected | {f"{planner} − {learner}": first - second}
+counted = f"means over n = {logged} missions, in percent of the node's data."
+nodes = study.scenario()
 html.gallery(
     [
-        (drawn, title, f"{title}: means over n = {logged} missions, in percent of the node's data.")
-        for title, drawn in figures.coverage(study.scenario(), shares).items()
+        (maps.node_map(nodes, title, values, title not in collected), title, f"{title}: {counted}")
+        for title, values in shown.items()
     ]
 )
 
@@ -125,8 +129,9 @@ html.gallery(
 
 # %%
 home = questions.at_home(study, [planner, learner])
+rows = home.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), home["share"]))
 html.figure(
-    figures.at_home(home),
+    learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
     "The share of the UAVs in the charging zone over the slots of the mission",
     f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
     home,
@@ -143,14 +148,13 @@ html.table(
 # %% [markdown]
 # ## Decision time against quality
 #
-# The time is the median time in which a policy decides for the UAVs of one mission, on one core.
-# Policies on the line are not dominated: none is at least as fast and as good. A planner takes much
-# longer than the median in the first slot, in which it makes a new plan; the table has slow calls.
+# Times are medians of deciding for the UAVs of one mission, on one core. Policies on the line are
+# not dominated. A planner is much slower in the first slot, in which it makes a new plan.
 
 # %%
 points = questions.front(study, times)
 html.figure(
-    figures.front(points, questions.mean_bound(study)),
+    fronts.decision_times(points, questions.mean_bound(study)),
     "Decision time against the product of all policies, and their Pareto front",
     f"n = {len(missions):,} missions per policy; bars are 95 % intervals of the product.",
     points,
@@ -171,8 +175,10 @@ display(
 # %%
 mission = questions.example(study, planner)
 replication = int(mission.row["replication"])
-plan = figures.plan(mission, questions.plan(study, planner, replication))
-prices = figures.prices(study.scenario(), questions.node_prices(study, replication))
+courses = questions.plan(study, planner, replication)
+plan = maps.plan(mission.log, mission.scenario, courses)
+values, title = questions.node_prices(study, replication), "Price of a node's data"
+prices = maps.node_map(nodes, title, values, write="{:.2f}".format)
 
 # %%
 caption = f"n = 1, mission {replication}: data units that one more data unit would add to the bound"

@@ -10,7 +10,7 @@ import pandas as pd
 from IPython.display import HTML
 
 from analysis import numbers
-from analysis.figures import costs as figures
+from analysis.figures import fronts as figures
 from analysis.names import COST, METRICS, PRODUCT, SUCCESS, metric_name
 from analysis.questions import costs as questions
 from analysis.results.tables import Results
@@ -48,7 +48,7 @@ def drawn(results: Results, fronts: Fronts) -> list[Drawing]:
     for metric, front in fronts.items():
         for condition, rows in [*front.groupby("condition", sort=False)][:MOST_CONDITIONS]:
             least = required(results).get(metric)
-            drawing = figures.front(rows, metric, _currency(results), least)
+            drawing = figures.costs(rows, metric, _currency(results), least)
             title = f"Cost against {metric_name(metric).lower()}{', ' * bool(condition)}{condition}"
             counted = f"{_LEVEL} intervals; n = {numbers.span(rows['n'])} missions per setting."
             drawings.append((drawing, title, f"{title}. {MARKS} Bars are {counted}", rows))

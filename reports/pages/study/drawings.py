@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 import pandas as pd
 
 from analysis import numbers
-from analysis.figures import parameters, policies
 from analysis.figures import settings as figures
 from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import main_effects as one_by_one
@@ -28,7 +27,7 @@ def means(results: Results, metrics: Iterable[str]) -> list[Drawing]:
     table = summary.means(results)
     return [
         (
-            policies.performance(table, metric),
+            figures.performance(table, metric),
             f"{metric_name(metric)} of every policy",
             f"n = {numbers.span(_of(table, metric)['n'])} missions per policy; bars are "
             f"{_LEVEL} intervals.",
@@ -126,7 +125,7 @@ def one_at_a_time(results: Results) -> list[Drawing]:
     changes = one_by_one.changes_by_field(results, table)
     return [
         (
-            parameters.effect(table, field, pairs, results.policies),
+            figures.effect(table, field, pairs, results.policies),
             f"The metrics against the {parameter(field).within}",
             f"n = {_counted(table[table['field'] == field])} missions per point; bars are {_LEVEL} "
             "intervals. The lowest panel shows the paired difference from the first value, with an "
@@ -143,7 +142,7 @@ def sensitivity(results: Results, metric: str = PRODUCT) -> list[Drawing]:
     rows = table[table["metric"] == metric].dropna()
     return [
         (
-            parameters.sensitivity(part, str(policy)),
+            figures.sensitivity(part, str(policy)),
             f"Sobol indices of {metric_name(metric).lower()} for {policy}",
             f"{policy}: n = {part['n'].min():,} missions; lines are {_LEVEL} intervals by "
             "bootstrap. Below the dotted line is the noise, which no setting removes.",

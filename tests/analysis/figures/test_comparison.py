@@ -1,17 +1,25 @@
 """What figures of a comparison show is in their tables."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from analysis.figures import comparison as drawings
 from analysis.figures.comparison import COLOURS
-from analysis.names import PARAMETERS
+from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
 from analysis.questions import regions
 from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
+from analysis.questions.what_if import answer as what_if_answer
 from analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.questions.test_regions import missions_of
+from tests.analysis.small import asked
 
-PAIR = Pair("ours", "theirs", 1)
+PAIR, POLICIES = Pair("ours", "theirs", 1), ["random", "greedy"]
+
+
+def drawn_interval(bar, axis):
+    """(N, 2) the ends of error bars."""
+    return np.array([segment[:, axis] for segment in bar.lines[2][0].get_segments()])
 
 
 @pytest.fixture(scope="module")
@@ -28,14 +36,13 @@ def table(missions):
 def test_a_dot_per_bin_with_its_interval_and_its_verdict(table):
     (ax,) = drawings.lead(table, "uavs", 0.012).axes
     rows = table[table["field"] == "uavs"]
-    for bar, row in zip(ax.containers, rows.itertuples(), strict=True):
-        (dot, _, (arm,)) = bar.lines
-        assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (row.position, pytest.approx(row.mean))
-        assert arm.get_segments()[0][:, 1] == pytest.approx([row.low, row.high])
-        assert dot.get_color() == COLOURS[row.verdict]
-        assert (dot.get_markerfacecolor() == "white") == (row.verdict == INCONCLUSIVE)
-    assert [COLOURS[v] for v in (AHEAD, INCONCLUSIVE, BEHIND)] == [b.lines[0].get_color()
-                                                          for b in ax.containers]  # fmt: skip
+    for bar, (verdict, own) in zip(ax.containers, rows.groupby("verdict"), strict=True):
+        dot = bar.lines[0]
+        assert dot.get_xdata().tolist() == own["position"].tolist()
+        assert dot.get_ydata() == pytest.approx(own["mean"])
+        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+        assert dot.get_color() == COLOURS[verdict]
+        assert (dot.get_fillstyle() == "none") == (verdict == INCONCLUSIVE)
     assert [label.get_text() for label in ax.get_xticklabels()] == ["1", "2", "3"]
     levels = {tuple(line.get_ydata()) for line in ax.lines}
     assert {(0, 0), (0.012, 0.012)} <= levels
@@ -45,13 +52,9 @@ def test_all_parameters_have_the_same_axis_and_all_intervals_on_it(table):
     axes = [drawings.lead(table, field, 0.0).axes[0] for field in PARAMETERS]
     ((low, high),) = {ax.get_ylim() for ax in axes}
     assert low < table["low"].min() < table["high"].max() < high
-    assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
-
-
-def test_the_axis_holds_0_however_far_ahead(missions):
     ahead = regions.along(missions_of(lambda t: 0.3))
-    low, high = drawings.lead(ahead, "uavs", 0.3).axes[0].get_ylim()
-    assert low < 0 < high
+    assert drawings.lead(ahead, "uavs", 0.3).axes[0].get_ylim()[0] < 0
+    assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
 
 
 def test_a_cell_says_its_mean_and_shows_its_sign(missions):
@@ -71,14 +74,6 @@ def test_a_cell_says_its_mean_and_shows_its_sign(missions):
     assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
     assert ax.get_ylabel() == "Number of UAVs"
     assert ax.get_xlabel() == "Charging start capacity $C_S$ [%]"
-
-
-def test_a_cell_without_missions_is_left_empty(missions):
-    some = missions[(missions["uavs"] < 3) | (missions["flying_time"] < 75)]
-    cells = regions.across(some, "uavs", "flying_time")
-    assert len(cells) < 3 * regions.BINS
-    (ax,) = drawings.heat(cells, "uavs", "flying_time").axes
-    assert np.ma.getmaskarray(ax.collections[0].get_array()).sum() == 3 * regions.BINS - len(cells)
 
 
 def test_the_curve_is_the_share_of_missions_up_to_a_difference(missions):
@@ -113,7 +108,78 @@ def test_the_band_holds_the_whole_curve(missions):
     assert outside <= 6
 
 
-def test_no_difference_at_all_can_be_drawn(missions):
-    (ax,) = drawings.distribution(missions.assign(difference=0.0), PAIR).axes
-    low, high = ax.get_xlim()
-    assert low < 0 < high
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return asked(tmp_path_factory.mktemp("what-if"), 5)
+
+
+def test_figures_show_the_means_and_the_gains(results):
+    table, answers = what_if_answer.means(results), what_if_answer.answers(results)
+    settings = (["uavs 2", "pads 6"], ["uavs 6", "pads 1"])
+    for metric in METRICS:
+        (ax,) = drawings.means(table, metric, settings).axes
+        ticks = [tick.get_text() for tick in ax.get_xticklabels()]
+        assert ticks == ["baseline\nuavs 2\npads 6", "variation\nuavs 6\npads 1"]
+        for bar, policy in zip(ax.containers, POLICIES, strict=True):
+            own = table[(table["metric"] == metric) & (table["policy"] == policy)]
+            assert bar.lines[0].get_ydata() == pytest.approx(own["mean"])
+            assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+    (ax,) = drawings.gains(answers).axes
+    for bar, policy in zip(ax.containers, POLICIES, strict=True):
+        own = answers[answers["policy"] == policy].set_index("metric").loc[[*METRICS]]
+        assert bar.lines[0].get_ydata() == pytest.approx(own["difference"])
+        assert drawn_interval(bar, 1) == pytest.approx(own[["low", "high"]].to_numpy())
+
+
+def test_the_spread_is_the_share_of_missions_up_to_a_difference():
+    gaps = {
+        "ours": pd.Series([0.0, 0.1, -0.5, 0.1]),
+        "theirs": pd.Series(np.linspace(-0.02, 0.04, 100)),
+    }
+    above, below = drawings.spread(gaps).axes
+    for ax in (above, below):
+        for line, own in zip(ax.lines, gaps.values(), strict=False):
+            for x, share in list(zip(line.get_xdata(), line.get_ydata(), strict=True))[1:]:
+                assert share <= (own <= x).mean()
+            assert line.get_ydata()[0] == 0 and line.get_ydata()[-1] == 1
+    assert below.get_xlim()[0] > above.get_xlim()[0]
+
+    drawings.spread({"ours": pd.Series([0.0, 0.0])}).canvas.draw()
+
+
+def gap_rows() -> pd.DataFrame:
+    """Rows as of ``gap.by_fleet``: two policies, one and two UAVs, and all."""
+    rows = pd.DataFrame(
+        [(uavs, policy) for uavs in (1, 2, "all") for policy in ("one", "two")],
+        columns=["uavs", "policy"],
+    )
+    for number, metric in enumerate((PRODUCT, BOUND, GAP)):
+        rows[metric] = 0.3 * number + np.linspace(0.1, 0.2, len(rows))
+        rows[f"{metric}_low"], rows[f"{metric}_high"] = rows[metric] - 0.02, rows[metric] + 0.01
+    return rows.assign(n=100)
+
+
+def test_a_panel_per_fleet_shows_products_and_the_bound() -> None:
+    table = gap_rows()
+    figure = drawings.gaps(table)
+    assert len(figure.axes) == 2
+    for ax, uavs in zip(figure.axes, (1, 2), strict=True):
+        rows = table[table["uavs"] == uavs]
+        bars = [bar.lines[0].get_xdata()[0] for bar in ax.containers]
+        assert bars == pytest.approx(rows[PRODUCT])
+        (bound,) = (line for line in ax.lines if line.get_label() == "upper bound")
+        assert bound.get_xdata()[0] == rows[BOUND].iloc[0]
+        assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two"]
+    assert figure.axes[1].get_title(loc="left").startswith("2 UAVs: bound")
+
+
+def test_differences_are_beside_each_other_by_fleet() -> None:
+    table = pd.DataFrame(
+        {"policy": ["a", "a", "b", "b"], "uavs": [1, "all"] * 2, "baseline": "c"}
+        | {"difference": [0.1, 0.2, 0.3, 0.4], "low": 0.0, "high": 0.5}
+    )
+    (ax,) = drawings.differences(table).axes
+    drawn = [bar.lines[0].get_ydata().tolist() for bar in ax.containers]
+    assert drawn == [[0.1, 0.2], [0.3, 0.4]]
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["1 UAV", "all"]
+    assert ax.get_title(loc="left") == "Difference from c (paired)"

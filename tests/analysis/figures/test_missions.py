@@ -3,22 +3,21 @@
 from collections import Counter
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 import dess
 import policies
+from analysis import numbers
 from analysis.figures import missions
 from analysis.figures.style import MUTED, node_colours
 from analysis.results.event_log import uav_slots
 from dess.state import sample_scenario
+from policies.planner import Course
 
 
 @pytest.fixture(scope="module")
@@ -96,15 +95,6 @@ def test_nodes_zone_and_ends_lie_where_they_are(mission: Any, parts: Any) -> Non
     assert top < bottom  # y grows south
 
 
-def test_the_title_says_how_the_mission_ended(mission: Any, parts: Any) -> None:
-    record, _, scenario = mission
-    filled = [row["end"] for row in record.uav_rows()].count("quota")
-    assert 0 < filled < scenario.uavs
-    assert parts[0].get_title(loc="left") == (
-        f"I = 3: {record.collection_ratio:.1%} collected, {filled} of 3 quotas filled"
-    )
-
-
 def test_battery_ends_as_recorded(mission: Any, parts: Any) -> None:
     record, _, scenario = mission
     lines = {line.get_label(): line for line in parts[1].lines}
@@ -134,9 +124,25 @@ def test_occupancy_counts_charging_and_waiting_uavs(mission: Any, parts: Any) ->
     assert max(busy.values()) <= scenario.pads
 
 
-def test_figures_leave_no_state_behind(mission: Any) -> None:
-    before = dict(mpl.rcParams)
-    _, log, scenario = mission
-    assert isinstance(missions.mission_figure(log, scenario), Figure)
-    assert dict(mpl.rcParams) == before
-    assert plt.get_fignums() == []
+def test_the_plan_is_drawn_over_the_mission() -> None:
+    space = dess.load_scenario("paper", uavs=1)
+    record = dess.simulate(space, policies.load("greedy"), 3, 1, events=True)
+    log = pd.DataFrame(record.events.columns())
+    scenario = sample_scenario(space, 3, 1)
+    course = Course(np.array([[8, 10]]), np.array([2]), np.array([[26, 5], [25, 5], [24, 5]]))
+    figure = missions.plan(log, scenario, [course])
+    (line,) = (line for line in figure.axes[0].lines if line.get_gid() == "plan-0")
+    assert np.array_equal(line.get_xydata(), course.path)
+    assert "1" in [text.get_text() for text in figure.axes[0].texts if tuple(text.xy) == (8, 10)]
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_values_are_written_at_the_nodes_in_the_colour_of_their_sign(signed: bool) -> None:
+    space, values = dess.load_scenario("paper"), np.linspace(-1.0 * signed, 0.96, 25)
+    (ax,) = missions.node_map(space, "Values", values, signed, "{:.2f}".format).axes
+    shown = [numbers.difference(v, 0) if signed else f"{v:.2f}" for v in values]
+    assert [text.get_text() for text in ax.texts] == shown
+    assert [text.xy for text in ax.texts] == [*space.nodes]
+    (nodes,) = ax.collections
+    red, _, blue, _ = np.transpose(nodes.to_rgba(nodes.get_array()))
+    assert np.array_equal(blue > red, values > 0) or not signed

@@ -8,11 +8,13 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from analysis import run_study
+from analysis.figures import drawings, style
 from analysis.figures import settings as figures
-from analysis.figures import style
 from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import settings
+from analysis.study.design import NOISE
 from dess import InputError
+from tests.analysis.questions.test_main_effects import pairs_of
 from tests.analysis.small import grid, small_study
 
 
@@ -51,21 +53,18 @@ def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
             own = table[(table["policy"] == policy) & (table["uavs"] == uavs)]
             assert y == pytest.approx(own["mean"])
     assert [t.get_text() for t in drawing.axes[-1].get_xticklabels()] == ["5–7", "10"]
-    assert len(figures.plot(results, "uavs", hue="quota", policy="random").axes) == 1
+    with pytest.raises(InputError, match="pads: has not several values in the study; allowed: qu"):
+        figures.plot(results, "pads")
 
 
 def test_names_of_near_values_are_turned_so_that_they_do_not_touch():
     rates = [0, 0.001, 0.002, 0.005, 0.01]
     for values, angle in ((rates, 30), ([1, 2, 3, 10], 0)):
         rows = pd.DataFrame({"rate": values, "policy": "greedy", "mean": 0.5, "low": 0.4})
-        looks = figures.graded(["greedy"])
         with style.panels(3) as (figure, ax):
-            figures.curves(rows.assign(high=0.6), "rate", looks, values, ax)
+            looks = style.policy_colours(["greedy"])
+            drawings.along(drawings.placed(rows.assign(high=0.6), "rate"), looks, "%", ax)
         assert [t.get_rotation() for t in ax.get_xticklabels()] == [angle] * len(values)
-        figure.draw_without_rendering()
-        boxes = [t.get_tightbbox() for t in ax.get_xticklabels()]
-        if not angle:
-            assert all(a.x1 < b.x0 for a, b in zip(boxes, boxes[1:], strict=False))
 
 
 @pytest.mark.parametrize("facet", [None, "uavs"])
@@ -102,19 +101,13 @@ def test_a_cell_without_missions_stays_empty(tmp_path):
     assert len(ax.texts) == 2
 
 
-def test_main_effects_have_a_panel_per_field_the_widest_first(results):
-    drawing = figures.main_effects(results)
+def test_fields_have_panels_the_widest_effect_first_and_every_design_point_is_a_dot(results):
     effects = settings.main_effects(results)
-    order = settings.by_influence(effects)
-    panels = [ax for ax in drawing.axes if ax.get_visible()]
-    assert len(panels) == 3
-    for ax, field in zip(panels, order, strict=True):
+    panels = [ax for ax in figures.main_effects(results).axes if ax.get_visible()]
+    for ax, field in zip(panels, settings.by_influence(effects), strict=True):
         for policy, (_, y, _) in zip(results.policies, curves(ax), strict=True):
             own = effects[(effects["field"] == field) & (effects["policy"] == policy)]
             assert y == pytest.approx(own["mean"])
-
-
-def test_every_design_point_is_a_dot(results):
     table = settings.ranked(results)
     for ax in [ax for ax in figures.scatter(results).axes if ax.get_visible()]:
         for dots, policy in zip(ax.collections, table["policy"].unique(), strict=True):
@@ -136,11 +129,114 @@ def test_many_values_have_panels_that_are_spread_evenly():
     assert (len(some), some[0], some[-1]) == (figures.MOST_PANELS, 0, 99)
 
 
-def test_an_unknown_field_is_refused(results):
-    with pytest.raises(InputError, match="pads: has not several values in the study; allowed: qu"):
-        figures.plot(results, "pads")
+def summary(by: dict[str, list]) -> pd.DataFrame:
+    """Rows as of ``analysis.summary``, with different numbers."""
+    rows = pd.DataFrame(by).merge(pd.DataFrame({"metric": list(METRICS)}), how="cross")
+    mean = np.linspace(0.2, 0.8, len(rows))
+    return rows.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
 
 
-@pytest.mark.parametrize("metric", [*METRICS, "reward"])
-def test_all_metrics_can_be_drawn(results, metric):
-    figures.heat_map(results, "quota", "uavs", metric).canvas.draw()
+def test_performance_shows_means_intervals_and_the_printed_figure(metric: str = SUCCESS) -> None:
+    table = summary({"policy": ["one", "two", "three"]})
+    (ax,) = figures.performance(table, metric, 0.55).axes
+    rows = table[table["metric"] == metric]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two", "three"]
+    for bar, (_, row) in zip(ax.containers, rows.iterrows(), strict=True):
+        assert bar.lines[0].get_xdata() == pytest.approx([row["mean"]])
+        (arm,) = bar.lines[2]
+        assert arm.get_segments()[0][:, 0] == pytest.approx([row["low"], row["high"]])
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper 55.0%")
+    assert list(printed.get_xdata()) == [0.55, 0.55]
+    assert ax.get_title(loc="left") == METRICS[metric]
+    assert [note.get_text() for note in ax.texts] == [f"{mean:.1%}" for mean in rows["mean"]]
+    assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
+
+
+def test_by_fleet_shows_a_curve_per_policy_and_the_printed_ones() -> None:
+    table = summary({"policy": ["one"] * 3 + ["two"] * 3, "uavs": [1, 2, 3] * 2})
+    (ax,) = figures.by_fleet(table, "success", {3: 0.9, 1: 0.5}).axes
+    rows = table[table["metric"] == "success"]
+    assert len(ax.containers) == 2
+    for bar, (_, means) in zip(ax.containers, rows.groupby("policy", sort=False), strict=True):
+        assert bar.lines[0].get_ydata() == pytest.approx(means["mean"])
+        assert [round(x) for x in bar.lines[0].get_xdata()] == [1, 2, 3]
+    (printed,) = (line for line in ax.lines if line.get_label() == "paper")
+    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([1, 3], [0.5, 0.9])
+
+
+VALUES = {"initial_data": ["5–7.5", "7.5–10", "10–12.5"], "uavs": ["1", "2"]}
+CHANGES = {"mine": pairs_of([0.1, -0.2]), "other": pairs_of([0.05, 0.01])}
+POLICIES = ["third", "mine", "other"]
+
+
+@pytest.fixture(scope="module")
+def table():
+    """Means with numbers of their own in every row."""
+    rows = [
+        (field, value, position, policy, metric)
+        for field, values in VALUES.items()
+        for position, value in enumerate(values)
+        for policy in CHANGES
+        for metric in METRICS
+    ]
+    frame = pd.DataFrame(rows, columns=["field", "value", "position", "policy", "metric"])
+    mean = np.linspace(0.3, 0.9, len(frame))
+    return frame.assign(mean=mean, low=mean - 0.03, high=mean + 0.01, n=100)
+
+
+@pytest.fixture(scope="module")
+def panels(table):
+    changes = CHANGES
+    return figures.effect(table, "initial_data", changes, POLICIES).axes
+
+
+def test_a_panel_per_metric_shows_means_and_intervals(table, panels):
+    rows = table[table["field"] == "initial_data"]
+    for ax, (metric, name) in zip(panels, METRICS.items(), strict=False):
+        assert ax.get_title(loc="left") == name
+        for policy, (x, y, ends) in zip(CHANGES, curves(ax), strict=True):
+            means = rows[(rows["metric"] == metric) & (rows["policy"] == policy)]
+            assert y == pytest.approx(means["mean"])
+            assert [round(place) for place in x] == means["position"].tolist()
+            assert ends == pytest.approx(means[["low", "high"]].to_numpy())
+
+
+def test_the_last_panel_shows_the_changes_from_the_first_value(panels):
+    for (_, y, ends), pairs in zip(curves(panels[-1]), CHANGES.values(), strict=True):
+        steps = pairs[pairs["first"] == 0]
+        assert y == pytest.approx([0, *steps["difference"]])
+        assert ends == pytest.approx(np.array([[0, 0], *steps[["low", "high"]].to_numpy()]))
+    assert "5–7.5" in panels[-1].get_title(loc="left")
+    ticks = [label.get_text() for label in panels[-1].get_xticklabels()]
+    assert ticks == VALUES["initial_data"]
+    assert panels[-1].get_xlabel() == "Initial data per node [data units]"
+
+
+def test_a_policy_keeps_its_colour_whoever_else_is_drawn(table, panels):
+    alone = table[table["policy"] == "other"]
+    changes = {"other": CHANGES["other"]}
+    other = figures.effect(alone, "initial_data", changes, POLICIES).axes[0]
+    (mine,) = other.containers
+    assert mine.lines[0].get_color() == panels[0].containers[1].lines[0].get_color()
+
+
+@pytest.fixture
+def indices():
+    first = np.array([0.6, -0.02, 0.1])
+    total = np.array([0.8, 0.03, 0.2])
+    ends = {f"{n}_{e}": v + s for n, v in (("first", first), ("total", total))
+            for e, s in (("low", -0.05), ("high", 0.07))}  # fmt: skip
+    names = ["uavs", "charge_start", NOISE]
+    return pd.DataFrame({"parameter": names, "first": first, "total": total, **ends})
+
+
+def test_sensitivities_are_bars_with_intervals(indices):
+    (ax,) = figures.sensitivity(indices, "mine").axes
+    for bar, index in zip(ax.containers, ("first", "total"), strict=True):
+        assert bar.lines[0].get_xdata() == pytest.approx(indices[index])
+    drawn = np.concatenate([np.array(a.get_segments())[:, :, 0] for a in ax.collections])
+    expected = [indices[[f"{i}_low", f"{i}_high"]].to_numpy() for i in ("first", "total")]
+    assert drawn == pytest.approx(np.concatenate(expected))
+    names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
+    assert names == ["UAVs", "$C_S$", "noise of the replication"]
+    assert ax.get_ylim() == (2.5, -0.5)  # the first on top

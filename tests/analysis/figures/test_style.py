@@ -9,7 +9,6 @@ import pytest
 
 from analysis.figures import style
 from analysis.figures.style import KNOWN_POLICIES, node_colours, policy_colours, signed_points
-from policies.registry import SHIPPED
 
 
 @pytest.mark.parametrize("count", [1, 9, 25, 40])
@@ -29,10 +28,6 @@ def test_policies_look_the_same_wherever_they_are_and_none_like_another() -> Non
         assert [*looks] == [*dict.fromkeys(names)]
         assert len({*looks.values()}) == len(looks)
         assert all(looks[name] == everywhere[name] for name in looks if name in everywhere)
-
-
-def test_shipped_policies_have_a_look_of_their_own() -> None:
-    assert set(SHIPPED) <= set(KNOWN_POLICIES)
 
 
 def test_differences_on_an_axis_are_signed_points() -> None:

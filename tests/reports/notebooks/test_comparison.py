@@ -75,14 +75,6 @@ def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
     assert f"ddqn is {regions.tally(lead)} bins." in text
 
 
-def test_the_worst_missions_can_be_simulated_again(text: str, results: Path) -> None:
-    study = load_results(results / NAME)
-    missions = head_to_head.duels(study, head_to_head.pair_of(study))
-    for number in head_to_head.worst(missions, 5)["replication"]:
-        command = study.command("ddqn", 0, number, "results/comparison")
-        assert f"{command} --figure mission-{number}.png" in text
-
-
 def test_the_worst_missions_are_drawn_by_both_policies(results: Path, tmp_path: Path) -> None:
     """Captions have the numbers of the files; pages have the maps of missions that are kept."""
     assert "a single one (n = 1)" not in said(results)
@@ -123,13 +115,6 @@ def test_policies_can_be_chosen(results: Path) -> None:
         said(results, learned="none")
 
 
-def test_few_missions_and_no_learned_policy_make_a_page(results: Path, tmp_path: Path) -> None:
-    folder = with_studies_of(tmp_path / "results", policies=["random", "greedy"], missions=3)
-    text = said(folder)
-    assert "greedy minus random" in text
-    assert not re.search(r"Traceback|Warning|\bnan\b|NaN|None|\binf\b", text)
-
-
 def test_several_trainings_are_one_learner_and_the_first_is_shown(
     results: Path, tmp_path: Path
 ) -> None:
@@ -142,9 +127,3 @@ def test_several_trainings_are_one_learner_and_the_first_is_shown(
     for team in load_results(folder / NAME).store.manifest.policies:
         for member in team.members:
             assert not member.weights or f"{team.policy} {member.weights[:12]}" in text
-
-
-def test_a_single_policy_is_refused_in_a_line(results: Path, tmp_path: Path) -> None:
-    folder = with_studies_of(tmp_path / "results", policies=["greedy"], missions=3)
-    with pytest.raises(InputError, match="no two policies to compare among greedy; allowed: two"):
-        said(folder)

@@ -35,24 +35,8 @@ def test_missions_and_their_means(results: Path, text: str) -> None:
         assert f"I = {point + 1}: {100 * mission.collection_ratio:.1f} % collected" in text
 
 
-def test_every_uav_has_a_row(results: Path, text: str) -> None:
-    uavs = load_results(results / "fig4").uavs
-    uavs = uavs.query("policy == 'greedy' and replication == 0")
-    assert len(uavs) == 6
-    for row in uavs.itertuples():
-        cells = f"{row.point + 1} {row.uav + 1} {row.quota} of "
-        assert cells in text
-        slots = f"{row.slots_flying} {row.slots_charging} {row.slots_waiting} {row.battery} %"
-        assert f"{row.collected:.1f} {slots}" in text
-
-
 def test_the_policy_of_the_example_is_the_best_one(results: Path, text: str) -> None:
     missions = pd.read_parquet(results / "fig1" / "missions")
     means = missions.groupby("policy")[PRODUCT].mean()
     assert f"The policy of this mission is {means.idxmax()}, the best of " in text
     assert f"collection ratio and communication: {100 * means.max():.1f} % [" in text
-
-
-def test_commands_simulate_the_missions_again(text: str) -> None:
-    for uavs in (1, 2, 3):
-        assert f"dess simulate --scenario fig4 --set uavs={uavs} --policy greedy --seed " in text

@@ -7,7 +7,6 @@ import pytest
 
 from analysis import load_results
 from analysis.questions.operations import answers, queue
-from reports.pages.notebook import read
 from tests.by_hand import bounded
 from tests.reports.small import run_small_studies, said_by, words
 
@@ -55,9 +54,3 @@ def test_the_queue_of_the_logs_is_that_of_the_records(results: Path) -> None:
     assert table["mean"].sum() == pytest.approx(waited)
     assert waited > 0
     assert np.all(table["low"] <= table["high"])
-
-
-@pytest.mark.parametrize("name", ["pads", "age", "failures"])
-def test_the_answer_is_the_first_cell_that_says_something(name: str) -> None:
-    shown = [cell.source for cell in read(name).cells if cell.source.startswith("html.")]
-    assert shown[0].startswith('html.say("{answer}"')

@@ -1,16 +1,12 @@
 """The page of an own sea names the cheapest fleet, and its notebook runs with another sea."""
 
 import re
-from html import unescape
 from pathlib import Path
 from typing import Any
 
-import pytest
 import tomli_w
 
-from analysis import sweep
 from tests.analysis.small import SCENARIO
-from tests.reports.notebooks.test_sweep import run_changed
 from tests.reports.small import said_by
 
 NAME = "own-sea"
@@ -37,23 +33,3 @@ def test_the_page_names_the_cheapest_fleet(tmp_path: Path) -> None:
     assert re.search(r"All conditions together, greedy: the cheapest fleet .*is 1 UAV\b", text)
     assert "with probability at least 0.95" in text
     assert "--require success=0.5 --require collection_ratio=0.1" in text
-
-
-@pytest.mark.slow
-def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
-    """In Jupyter, from top to bottom; with another requirement."""
-    values = {**ASKED, "scenario": str(_sea(tmp_path))}
-    shown = run_changed(NAME, tmp_path, "'success': 0.5", "'success': 0.6", values)
-    (text,) = (unescape(text) for text in shown if "All conditions together" in text)
-    prices = {"uav": 20_000, "pad": 3_000, "charge": 2, "hour": 100, "slot_seconds": 60}
-    again = sweep(
-        tmp_path / "sea.toml",
-        missions=5,
-        folder=tmp_path,
-        prices={**prices, "currency": "EUR", "missions": 500},
-        requirements={"success": 0.6, "collection_ratio": 0.1},
-        progress=False,
-        **ASKED["fields"],
-    )
-    assert all(line in text for line in again.answers())
-    assert len([*(tmp_path / "sweeps").glob("*.toml")]) == 1  # that of the notebook

@@ -60,10 +60,3 @@ def test_the_table_by_number_of_uavs(results: Path, text: str) -> None:
         intervals = [by_hand(part[m].to_numpy(float), m == "success") for m in PRINTED]
         cells = " ".join(in_percent(*interval) for interval in intervals)
         assert f"{policy} {uavs} {len(part)} {cells}" in text
-
-
-def test_the_best_policy_is_that_of_the_highest_mean(results: Path, text: str) -> None:
-    missions = pd.read_parquet(results / "table4" / "missions")
-    products = missions.groupby("policy", observed=True)["collection_ratio_and_communication"]
-    best = products.mean().idxmax()
-    assert f"by collection ratio and communication is {best}: " in text

@@ -75,13 +75,6 @@ def test_the_page_says_what_the_missions_say(text: str, results: Any) -> None:
     assert what_if.command(results) in text
 
 
-def test_the_missions_shown_can_be_simulated_again(text: str, results: Any) -> None:
-    policy = what_if_answer.best_policy(results, what_if.VARIATION)
-    for choose in (what_if_answer.typical, what_if_answer.worst):
-        for point in (what_if.BASELINE, what_if.VARIATION):
-            assert results.command(policy, point, choose(results, policy)) in text
-
-
 def test_the_notebook_asks_what_its_edited_cell_says(tmp_path: Path) -> None:
     """In Jupyter, from top to bottom."""
     values = {"scenario": str(write_scenario(tmp_path)), **ASKED}

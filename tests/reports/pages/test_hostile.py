@@ -123,7 +123,6 @@ def test_a_name_is_no_formula_in_a_figure(name: str) -> None:
     with style.panels(3) as (drawing, axes):
         axes.plot([1, 2], label=name)
         axes.set_title(name)
-        style.legend_below(drawing, axes)
     assert html.svg(drawing)
     assert mpl.rcParams["text.parse_math"]
 
