@@ -109,10 +109,11 @@ PARSED = {
     "reports.pages.verify": {"validate_json"},
     # A template of this project.
     "reports.player.layout": {"loads"},
-    # Keys of a dictionary, which are texts of JSON.
+    # Keys of dictionaries and of a cache, which are texts of JSON.
     "analysis.study.candidates": {"loads"},
-    # Lines between a process and the one that it has started.
-    "reports.pages.kernels": {"loads"},
+    "analysis.results.provenance": {"loads"},
+    # Lines from the process that has started this one.
+    "reports.pages.cells": {"loads"},
 }
 
 

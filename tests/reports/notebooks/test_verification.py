@@ -90,7 +90,9 @@ def run_with(folder: Path, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> P
 
     def other(space: Any) -> Any:
         return (
-            [*map(other, space)] if isinstance(space, list) else ScenarioSpace.of(space, **changes)
+            [*map(other, space)]
+            if isinstance(space, (list, tuple))
+            else ScenarioSpace.of(space, **changes)
         )
 
     with monkeypatch.context() as patch:
