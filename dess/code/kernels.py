@@ -24,11 +24,22 @@ from dess.code.sources import code_of, combined
 from dess.errors import InputError
 
 
+class _Code(JITCodeLibrary):
+    """The code of a compiled function, optimized as a whole and not function by function."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+
 class _Compiler(Compiler):
     """Numba's compiler without garbage collections, which would free little and take a tenth."""
 
+    library: type[JITCodeLibrary] = _Code
+
     def _compile_core(self) -> Any:
-        was_enabled = gc.isenabled()
+        state, was_enabled = self.state, gc.isenabled()
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
         gc.disable()
         try:
             return super()._compile_core()
@@ -99,7 +110,7 @@ def inlined(function: Callable, choose: Callable | None = None) -> Any:
     return function
 
 
-class _Linked(JITCodeLibrary):
+class _Linked(_Code):
     """The code of an inlined function: optimized and emitted with the functions that call it.
 
     On its own nothing would run it, and both would take half of the time of a first run.
@@ -115,9 +126,6 @@ class _Linked(JITCodeLibrary):
     def get_pointer_to_function(self, name: str) -> int:
         return 0
 
-    def _optimize_functions(self, ll_module: Any) -> None:
-        ll_module.data_layout = self._codegen._data_layout
-
     def _optimize_final_module(self) -> None:
         pass
 
@@ -129,10 +137,7 @@ class _Linked(JITCodeLibrary):
 class _InlinedOnly(_Compiler):
     """The compiler of inlined functions."""
 
-    def _compile_core(self) -> Any:
-        state = self.state
-        state.library = _Linked(state.targetctx.codegen(), state.func_id.func_qualname)
-        return super()._compile_core()
+    library = _Linked
 
 
 @lru_cache
