@@ -11,9 +11,8 @@ order of the missions nor on how they are divided into batches.
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from ctypes import c_ulong, py_object, pythonapi
 from itertools import groupby
-from threading import Lock, get_ident
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -67,10 +66,8 @@ def simulate_batch(
     numbers = _numbers(replications)
     for number in (numbers.min(), numbers.max()) if len(numbers) else ():
         check_seed(seed, int(number))
-    if workers < 1 or batch_size < 1:
-        raise ValueError(
-            f"workers and batch_size must be at least 1, not {workers} and {batch_size}"
-        )
+    if min(workers, batch_size) < 1:
+        raise ValueError("workers and batch_size must be at least 1")
     if isinstance(scenario, Scenario | ScenarioSpace):
         scenario = [scenario] * len(numbers)
     if len(scenario) != len(numbers):
@@ -84,20 +81,24 @@ def simulate_batch(
     fleet = max((space.uavs[1] for space in spaces), default=0)
     records = empty_records(len(numbers), fleet, any(space.is_extended for space in spaces))
 
-    def run(jobs: np.ndarray, group: list[ScenarioSpace], which: np.ndarray) -> None:
-        _Batch(group, team, seed, batch_size).run(jobs, which, numbers, records, progress)
-
-    tasks = []
+    tasks, stopped = [], Event()
     for members in _by_world(spaces):
         jobs = np.nonzero(np.isin(kinds, members))[0]
         which = np.searchsorted(members, kinds)  # valid only at the indices in ``jobs``
         group = [spaces[member] for member in members]
-        tasks += [(part, group, which) for part in np.array_split(jobs, workers) if len(part)]
+        for part in np.array_split(jobs, min(workers, len(jobs))):
+            source = (starts_of(group, seed), which, numbers, part)
+            tasks.append((group, team, source, batch_size, records, progress, stopped))
     if workers == 1:
         for task in tasks:
-            run(*task)
-    else:
-        _run_in_threads(workers, run, tasks)
+            _run(*task)
+        return records
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for future in as_completed([pool.submit(_run, *task) for task in tasks]):
+                future.result()
+        finally:  # after an error or Ctrl-C, no thread begins a further slot
+            stopped.set()
     return records
 
 
@@ -132,36 +133,6 @@ def _numbers(replications: Sequence[int] | int) -> np.ndarray:
     return numbers.astype(np.int64)
 
 
-class _Stopped(BaseException):
-    """Ends a thread."""
-
-
-def _run_in_threads(workers: int, run: Callable[..., None], tasks: Iterable[tuple]) -> None:
-    """Run tasks in threads; after an error or Ctrl-C, none of them goes on."""
-    running: set[int] = set()
-    lock = Lock()
-
-    def watched(task: tuple) -> None:
-        with lock:
-            running.add(get_ident())
-        try:
-            run(*task)
-        finally:
-            with lock:
-                running.discard(get_ident())
-
-    with ThreadPoolExecutor(workers) as pool:
-        try:
-            for future in as_completed([pool.submit(watched, task) for task in tasks]):
-                future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            with lock:
-                for thread in running:
-                    pythonapi.PyThreadState_SetAsyncExc(c_ulong(thread), py_object(_Stopped))
-            raise
-
-
 def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
     """The indices of the scenarios, grouped by the constants that a batch must share."""
 
@@ -176,32 +147,24 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
 
 
-class _Batch:
-    """Missions that advance together and share one grid with its nodes and channel."""
-
-    def __init__(self, spaces: list[ScenarioSpace], team: list, seed: int, batch_size: int):
-        self.world, self.team, self.batch_size = world_of(spaces[0]), team, batch_size
-        self.spaces, self.starts = spaces, starts_of(spaces, seed)
-        self.work = max(map(work_of, spaces))
-
-    def run(self, jobs, which, numbers, records, progress) -> None:
-        """Simulate the missions ``jobs`` and write their records."""
-        size = min(self.batch_size, len(jobs), max(MOST_WORK // self.work, 1))
-        state = state_of(self.spaces, size)
-        scratch = empty_scratch(state.uavs.shape[1], len(self.world.nodes))
-        job_of = np.full(size, -1)
-        queue = np.array([0, 0])  # next job, jobs done
-        source = (self.starts, which, numbers, jobs)
-        for b in range(size):
-            _next_mission(b, job_of, queue, source, state)
-        # Reporting holds Python's global lock, so about a hundred reports are made in all.
-        reported, step = 0, max(1, len(jobs) // 100)
-        while queue[1] < len(jobs):
-            decide(self.team, state, self.world)
-            _advance(job_of, queue, source, state, self.world, scratch, records)
-            if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
-                progress(int(queue[1]) - reported)
-                reported = int(queue[1])
+def _run(spaces, team, source, batch_size, records, progress, stopped) -> None:
+    """Simulate missions that share one grid with its nodes and channel, and write their records."""
+    jobs, world = source[-1], world_of(spaces[0])
+    size = min(batch_size, len(jobs), max(MOST_WORK // max(map(work_of, spaces)), 1))
+    state = state_of(spaces, size)
+    scratch = empty_scratch(state.uavs.shape[1], len(world.nodes))
+    job_of = np.full(size, -1)
+    queue = np.array([0, 0])  # next job, jobs done
+    for b in range(size):
+        _next_mission(b, job_of, queue, source, state)
+    # Reporting holds Python's global lock, so about a hundred reports are made in all.
+    reported, step = 0, max(1, len(jobs) // 100)
+    while queue[1] < len(jobs) and not stopped.is_set():
+        decide(team, state, world)
+        _advance(job_of, queue, source, state, world, scratch, records)
+        if progress and (queue[1] >= reported + step or queue[1] == len(jobs)):
+            progress(int(queue[1]) - reported)
+            reported = int(queue[1])
 
 
 @kernel

@@ -1,5 +1,6 @@
 """The exception for all bad input, and the words of its messages."""
 
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from reprlib import Repr
@@ -10,8 +11,8 @@ if TYPE_CHECKING:  # the command line raises InputError long before anything nee
     from pydantic import BaseModel, ValidationError
     from pydantic.fields import FieldInfo
 
-# The longest list of allowed names, and of names that are close to an unknown one.
-_NAMES, _CLOSE = 180, 12
+# The longest list of allowed names [characters].
+_NAMES = 180
 
 # What is wrong with a value, by pydantic's name of the error, or its first word.
 _PROBLEMS = {
@@ -52,11 +53,7 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() else _escape(ord(c)) for c in text)
-
-
-def _escape(number: int) -> str:
-    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
 
 
 def cut(text: str, length: int) -> str:
@@ -85,7 +82,7 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
 
     Args:
         name: The unknown name.
-        names: The known names. Of many, only those that are close are printed, if there are some.
+        names: The known names.
         also: What else is allowed, such as ``a TOML file``.
     """
     known = list(dict.fromkeys(names))
@@ -93,11 +90,7 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
     close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
     meant = f" (did you mean {' or '.join(close)}?)" if close else ""
-    allowed = listed(known)
-    if close and len(known) > _CLOSE:
-        allowed = f"{', '.join(close)} and {len(known) - len(close)} others"
-    if also:
-        allowed += f", or {also}" if known else also
+    allowed = ", or ".join(part for part in (listed(known), also) if part)
     return f"{meant}; allowed: {allowed or 'none'}"
 
 
@@ -120,9 +113,8 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if kind == "extra_forbidden":
         return f"{place}: unknown key{one_of(loc[-1], fields)}"
     if kind == "literal_error":
-        known = choices_of(field) if field and is_whole else []
-        allowed = one_of(value, known) if known else f"; allowed: {first['ctx']['expected']}"
-        return f"{place}: {shown(value)} is unknown{allowed}"
+        known = [word.strip("'") for word in re.split(", | or ", first["ctx"]["expected"])]
+        return f"{place}: {shown(value)} is unknown{one_of(value, known)}"
     allowed = form_of(field) if field else f"a table of {listed(fields)}"
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"
@@ -136,9 +128,8 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
 
 def _problem(kind: str) -> str:
     """What is wrong with a value, by pydantic's name of the error."""
-    for end in ("too_short", "too_long"):
-        if kind.endswith(end):
-            return f"is {end.replace('_', ' ')}"
+    if "too_" in kind:
+        return f"is too {kind.rpartition('_')[2]}"
     return _PROBLEMS.get(kind) or _PROBLEMS.get(kind.partition("_")[0], "has the wrong form")
 
 
@@ -154,8 +145,8 @@ def form_of(field: "FieldInfo", described: bool = False) -> str:
     description = field.description or ""
     single = bool(kind_of(field) or choices_of(field))
     if (form := description.partition(": ")[2]) and not single:
-        length = _length(field.metadata).strip()
-        return f"{form} ({length})" if length else form
+        length = _length(field.metadata)
+        return f"{form} ({length.strip()})" if length else form
     text = _form(field.annotation, field.metadata)
     return f"{text} ({description})" if description and (described or not single) else text
 

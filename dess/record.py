@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
+from dess.constants import Constants
 from dess.rules import data_left
-from dess.scenario.constants import Constants
 from dess.sections.age import write_age
 from dess.sections.charging import write_use
 from dess.sections.failures import write_failures
@@ -39,21 +39,16 @@ UAV_RECORD = np.dtype(
 # it. Times are in mission slots, data in data units.
 OPERATIONS = np.dtype(
     [
-        ("age", np.float64),  # age of information, mean over time and nodes
-        ("peak_age", np.float64),  # mean of the ages just before newer data were collected
-        ("age_p99", np.float64),  # 99th percentile of the age over time and nodes
-        ("latency", np.float64),  # mean time from the generation to the delivery of a packet
-        ("latency_p99", np.float64),
-        ("generated", np.float64),  # packets
-        ("delivered", np.float64),  # packets
-        ("lost_packets", np.float64),
-        ("lost", np.float64),  # data lost by full buffers and failures
-        ("queue", np.float64),  # UAVs that wait for a pad, mean over time
-        ("waiting", np.float64),  # mean time from the request for a pad to its grant or withdrawal
-        ("pad_requests", np.float64),  # how often UAVs have asked for a pad
-        ("utilisation", np.float64),  # mean share of the pads in use
-        ("failures", np.float64),  # of UAVs
-        ("slots_grounded", np.float64),  # of UAVs under repair
+        # The age of information: its mean over time and nodes, the mean of the ages just before
+        # newer data were collected, and its 99th percentile over time and nodes.
+        *fields(np.float64, "age peak_age age_p99"),
+        # Packets: their mean time from generation to delivery, its 99th percentile, and their
+        # numbers; then the data lost by full buffers and failures.
+        *fields(np.float64, "latency latency_p99 generated delivered lost_packets lost"),
+        # UAVs that wait for a pad, mean over time; their mean time from the request to its grant or
+        # withdrawal; how often they have asked; the mean share of the pads in use.
+        *fields(np.float64, "queue waiting pad_requests utilisation"),
+        *fields(np.float64, "failures slots_grounded"),  # of UAVs
     ]
 )
 
@@ -93,14 +88,14 @@ class Event(NamedTuple):
 # Columns of the event log, and the types of their arrays.
 _TYPES = {float: np.float64, int: np.int64, str: object}
 EVENT_COLUMNS = {name: _TYPES[kind] for name, kind in Event.__annotations__.items()}
-FAILURE_EVENTS = tuple(
-    f"{thing}_{event}" for thing in ("uav", "pad", "node") for event in ("failure", "repair")
+FAILURE_EVENTS = (
+    *("uav_failure", "uav_repair", "pad_failure", "pad_repair"),
+    *("node_failure", "node_repair", "data_lost"),
 )
-FAILURE_EVENTS += ("data_lost",)
 # Parameters of the mission, a row each.
-PARAMETER_EVENTS = tuple(
-    f"mission_{name}"
-    for name in ("seed", "replication", "flying_time", "charge_start", "charge_complete")
+PARAMETER_EVENTS = (
+    *("mission_seed", "mission_replication", "mission_flying_time"),
+    *("mission_charge_start", "mission_charge_complete"),
 )
 # What becomes of packets in continuous time, besides ``arrival``.
 PACKET_EVENTS = ("delivery", "loss")
@@ -256,12 +251,6 @@ class MissionRecord:
 
     def uav_rows(self) -> list[dict[str, Any]]:
         """A row per UAV: communications, battery [%], charging slots and how its mission ended."""
-        return [
-            {
-                "quota": int(u["quota"]),
-                "battery": int(u["battery"]),
-                "slots_charging": int(u["slots_charging"]),
-                "end": END_NAMES[u["end"]],
-            }
-            for u in self.uavs
-        ]
+        names = ["quota", "battery", "slots_charging", "end"]
+        rows = (dict(zip(names, row, strict=True)) for row in self.uavs[names].tolist())
+        return [row | {"end": END_NAMES[row["end"]]} for row in rows]

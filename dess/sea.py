@@ -13,10 +13,11 @@ working manual, U.S. Geological Survey 1987).
 import csv
 import io
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, Field
 
 from dess.errors import InputError, shown
@@ -24,15 +25,17 @@ from dess.files.documents import Document
 from dess.files.reading import read_text
 
 Cell = tuple[int, int]
+# Where a node stands in the file, such as ``line 3``, and its longitude and latitude [degrees], or
+# the column and row of its cell.
+Place = tuple[str, float, float]
 
 MAX_NODES, MAX_GRID = 1024, 256  # as of a scenario
 EARTH_RADIUS = 6_371_008.8  # mean radius of WGS 84 [m]
 LIMIT = 2**20  # bytes of the largest file
 
-
-GEOGRAPHIC = ("lon", "lat")
 # The pairs of columns, and the largest number of each; cells off the grid are refused later.
-LIMITS = {("x", "y"): {"x": 99_999.0, "y": 99_999.0}, GEOGRAPHIC: {"lon": 180.0, "lat": 90.0}}
+GEOGRAPHIC = ("lon", "lat")
+LIMITS = {("x", "y"): (99_999, 99_999), GEOGRAPHIC: (180, 90)}
 
 _ALLOWED = "a GeoJSON FeatureCollection of points"
 
@@ -40,9 +43,9 @@ _ALLOWED = "a GeoJSON FeatureCollection of points"
 def _on_earth(position: list[float]) -> list[float]:
     if len(position) < 2:
         raise ValueError("has not two numbers; allowed: [lon, lat]")
-    for (name, most), value in zip(LIMITS[GEOGRAPHIC].items(), position, strict=False):
+    for name, most, value in zip(GEOGRAPHIC, LIMITS[GEOGRAPHIC], position, strict=False):
         if abs(value) > most:
-            raise ValueError(f"{name} is {value:g}; allowed: -{most:g}..{most:g}")
+            raise ValueError(f"{name} is {value:g}; allowed: -{most}..{most}")
     return position
 
 
@@ -57,21 +60,6 @@ class _Feature(Document, extra="ignore"):
 
 class _Collection(Document, extra="ignore"):
     features: tuple[_Feature, ...] = Field(description=_ALLOWED)
-
-
-class Place(NamedTuple):
-    """Where a node is.
-
-    Attributes:
-        name: Where the node stands in the file, such as ``line 3`` or ``features.2``; used in
-            messages.
-        x: Longitude [degrees], or column of the cell.
-        y: Latitude [degrees], or row of the cell.
-    """
-
-    name: str
-    x: float
-    y: float
 
 
 def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
@@ -92,15 +80,20 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
     is_geographic, places = readers[path.suffix.lower()](path)
     if not 0 < len(places) <= MAX_NODES:
         raise InputError(f"{path}: has {len(places):,} nodes; allowed: 1..{MAX_NODES}")
-    cells = _projected(places, grid, cell_size) if is_geographic else _integers(path, places)
-    _check_grid(path, places, cells, grid, is_geographic)
+    positions = np.array([place[1:] for place in places])
+    if is_geographic:
+        positions = _projected(positions, grid, cell_size)
+    cells = [(int(x), int(y)) for x, y in np.floor(positions)]
     known: dict[Cell, str] = {}
-    for place, cell in zip(places, cells, strict=True):
+    for (name, *_), cell in zip(places, cells, strict=True):
+        if min(cell) < 0 or max(cell) >= grid:
+            line = f"{name} is off the grid of {grid} x {grid} cells, at {[*cell]}"
+            raise InputError(f"{path}: {line}; allowed: {_enough(cells, grid, is_geographic)}")
         if cell in known:
             smaller = f"a cell_size below {cell_size:g} m" if is_geographic else "distinct cells"
-            shared = f"{known[cell]} and {place.name} lie in one cell, {list(cell)}"
+            shared = f"{known[cell]} and {name} lie in one cell, {[*cell]}"
             raise InputError(f"{path}: {shared}; allowed: {smaller}")
-        known[cell] = place.name
+        known[cell] = name
     return tuple(cells)
 
 
@@ -110,87 +103,58 @@ def _of_csv(path: Path) -> tuple[bool, list[Place]]:
         text = read_text(path, LIMIT, "utf-8-sig", "a CSV file")
         lines = csv.reader(io.StringIO(text), strict=True)
         columns = [name.strip() for name in next(lines, [])]
-        rows = [(f"line {lines.line_num}", [text.strip() for text in row]) for row in lines]
+        rows = [(f"line {lines.line_num}", row) for row in lines if any(map(str.strip, row))]
     except csv.Error as error:
         raise InputError(f"{path}: is not a CSV file: {error}; allowed: CSV with commas") from None
     found = [pair for pair in LIMITS if {*pair} <= {*columns}]
     if len(found) != 1:
         there = ", ".join(columns) or "none"
         raise InputError(f"{path}: has columns {there}; allowed: x and y, or lon and lat")
-    places = []
+    is_geographic, places = found == [GEOGRAPHIC], []
     for line, texts in rows:
-        cells = dict.fromkeys(columns, "") | dict(zip(columns, texts, strict=False))
-        if any(texts):
-            numbers = (
-                _number(cells[name], f"{path}: {line}: {name}", most)
-                for name, most in LIMITS[found[0]].items()
-            )
-            places.append(Place(line, *numbers))
-    return found[0] == GEOGRAPHIC, places
+        values = dict.fromkeys(columns, "") | dict(zip(columns, texts, strict=False))
+        x, y = (
+            _number(values[name].strip(), f"{path}: {line}: {name}", most, is_geographic)
+            for name, most in zip(found[0], LIMITS[found[0]], strict=True)
+        )
+        places.append((line, x, y))
+    return is_geographic, places
 
 
-def _number(text: str, place: str, most: float) -> float:
-    """A number of at most this size."""
+def _number(text: str, place: str, most: int, is_geographic: bool) -> float:
+    """A number of at most this size; a cell has integers."""
     try:
         number = float(text)
     except ValueError:
         raise InputError(f"{place} is {shown(text)}; allowed: a number") from None
     if not -most <= number <= most:
-        raise InputError(f"{place} is {number:g}; allowed: {-most:,g}..{most:,g}")
+        raise InputError(f"{place} is {number:g}; allowed: {-most:,}..{most:,}")
+    if not is_geographic and not number.is_integer():
+        raise InputError(f"{place} is {number:g}; allowed: an integer (a cell)")
     return number
 
 
 def _of_geojson(path: Path) -> tuple[bool, list[Place]]:
     """True, because the positions in GeoJSON are geographic, and where the nodes are."""
     features = _Collection.load(path, absent=_ALLOWED, limit=LIMIT).features
-    positions = [feature.geometry.coordinates[:2] for feature in features]
-    return True, [Place(f"features.{n}", *position) for n, position in enumerate(positions)]
+    positions = [feature.geometry.coordinates for feature in features]
+    return True, [(f"features.{n}", x, y) for n, (x, y, *_) in enumerate(positions)]
 
 
-def _integers(path: Path, places: Iterable[Place]) -> list[Cell]:
-    """The cells of places that are given as cells."""
-    cells = []
-    for place in places:
-        for column, value in (("x", place.x), ("y", place.y)):
-            if value != int(value):
-                line = f"{place.name}: {column} is {value:g}; allowed: an integer (a cell)"
-                raise InputError(f"{path}: {line}")
-        cells.append((int(place.x), int(place.y)))
-    return cells
+def _projected(degrees: np.ndarray, grid: int, cell_size: float) -> np.ndarray:
+    """The (K, 2) places on the grid [cells] of places on the Earth; y grows south."""
+    if np.ptp(degrees[:, 0]) > 180:  # on both sides of the 180th meridian
+        degrees = degrees + [360, 0] * (degrees < 0)
+    middle = (degrees.min(0) + degrees.max(0)) / 2
+    degree = math.radians(1) * EARTH_RADIUS  # of latitude [m]
+    east = degree * math.cos(math.radians(middle[1])) / cell_size
+    return grid / 2 + (degrees - middle) * [east, -degree / cell_size]
 
 
-def _projected(places: Sequence[Place], grid: int, cell_size: float) -> list[Cell]:
-    """The cells of places on the Earth; y grows south."""
-    longitudes = [place.x for place in places]
-    if max(longitudes) - min(longitudes) > 180:  # on both sides of the 180th meridian
-        longitudes = [x + 360 if x < 0 else x for x in longitudes]
-    latitudes = [place.y for place in places]
-    middle_x, middle_y = ((min(v) + max(v)) / 2 for v in (longitudes, latitudes))
-    east = math.radians(1) * EARTH_RADIUS * math.cos(math.radians(middle_y)) / cell_size
-    south = -math.radians(1) * EARTH_RADIUS / cell_size
-    return [
-        (
-            math.floor(grid / 2 + (x - middle_x) * east),
-            math.floor(grid / 2 + (y - middle_y) * south),
-        )
-        for x, y in zip(longitudes, latitudes, strict=True)
-    ]
-
-
-def _check_grid(
-    path: Path, places: Sequence[Place], cells: Sequence[Cell], grid: int, is_centred: bool
-) -> None:
-    """Refuse cells off the grid; the message names a grid that is large enough."""
-    for place, cell in zip(places, cells, strict=True):
-        if not all(0 <= coordinate < grid for coordinate in cell):
-            beyond = max(max(-c, c - grid + 1) for at in cells for c in at)
-            needed = grid + 2 * beyond if is_centred else grid + beyond
-            line = f"{place.name} is off the grid of {grid} x {grid} cells, at {list(cell)}"
-            if min(cell) < 0 and not is_centred:
-                allowed = "0 <= x, y"
-            elif needed <= MAX_GRID:
-                allowed = f"grid = {needed} or more"
-                allowed += ", or a larger cell_size" if is_centred else ""
-            else:
-                allowed = "a larger cell_size" if is_centred else f"0 <= x, y < {MAX_GRID}"
-            raise InputError(f"{path}: {line}; allowed: {allowed}")
+def _enough(cells: Sequence[Cell], grid: int, is_geographic: bool) -> str:
+    """What would be allowed, such as a grid that is large enough, where cells are off the grid."""
+    beyond = max(max(-c, c - grid + 1) for cell in cells for c in cell)
+    needed = grid + 2 * beyond if is_geographic else grid + beyond
+    if needed > MAX_GRID or (not is_geographic and min(map(min, cells)) < 0):
+        return "a larger cell_size" if is_geographic else f"0 <= x, y < {MAX_GRID}"
+    return f"grid = {needed} or more" + (", or a larger cell_size" if is_geographic else "")

@@ -186,9 +186,7 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
     low, high = scenario.initial_data
     slotted_age = scenario.age.measured and not scenario.needs_events
     values = {
-        **{
-            name: getattr(scenario, name) for name in MISSION.names or () if hasattr(scenario, name)
-        },
+        **dict(scenario),
         **{name: getattr(scenario, name)[0] for name in SAMPLED},
         **dict(zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True)),
         **{"nodes": len(scenario.nodes), "pads": scenario.charging_pads},
@@ -202,8 +200,8 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         **scenario.failures.constants(),
     }
     mission = np.zeros(1, MISSION)
-    for name, value in values.items():
-        mission[name] = value
+    for name in set(values).intersection(MISSION.names or ()):
+        mission[name] = values[name]
     return mission if scenario.is_extended else mission.view(PLAIN_MISSION)
 
 

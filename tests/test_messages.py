@@ -21,8 +21,7 @@ from analysis.verification.cross_check import CrossCheck
 from dess import InputError, sea
 from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD
-from dess.scenario import Scenario, ScenarioSpace
-from dess.scenario.space import validated
+from dess.scenario import Scenario, ScenarioSpace, validated
 from policies.ddqn.checkpoint import Header
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.description import Description

@@ -56,7 +56,7 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def kernel(function: Callable, **options: Any) -> Any:
+def kernel(function: Callable) -> Any:
     """Compile a function with numba to code that does not hold Python's global lock.
 
     The compiled function is cached on disk. If its module has no source file, or no folder for the
@@ -67,12 +67,11 @@ def kernel(function: Callable, **options: Any) -> Any:
     """
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         raise InputError("NUMBA_DISABLE_JIT: the simulator runs only compiled; allowed: unset it")
-    options = _OPTIONS | options
     stamp = _code_behind(function.__module__, inspect.getfile(function))
     try:
-        compiled = njit(cache=bool(stamp), **options)(function)
+        compiled = njit(cache=bool(stamp), **_OPTIONS)(function)
     except RuntimeError:  # numba has found no folder for its cache ("no locator available")
-        return njit(**options)(function)
+        return njit(**_OPTIONS)(function)
     if stamp:
         compiled._cache._cache_file = _cache_file(compiled._cache, stamp)
     return compiled

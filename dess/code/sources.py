@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from hashlib import sha256
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import NamedTuple
 
@@ -105,18 +105,11 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 def _path_of(module: str) -> Path | None:
     """The source file of a module, or None without one; its packages are not imported."""
-    top, *below = module.split(".")
-    try:
-        spec = find_spec(top)
-    except (ImportError, ValueError):
-        return None
-    if spec is None:
-        return None
-    if not below:
-        return Path(spec.origin) if spec.origin and spec.origin.endswith(".py") else None
-    for folder in spec.submodule_search_locations or ():
-        stem = Path(folder, *below)
-        for path in (stem.with_name(f"{stem.name}.py"), stem / "__init__.py"):
-            if path.exists():
-                return path
-    return None
+    found, places, names = None, None, module.split(".")
+    for end in range(len(names)):
+        found = PathFinder.find_spec(".".join(names[: end + 1]), places)
+        if found is None:
+            return None
+        places = found.submodule_search_locations or []
+    origin = found.origin if found else None
+    return Path(origin) if origin and origin.endswith(".py") else None

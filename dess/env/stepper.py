@@ -16,7 +16,7 @@ from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.record import Records, empty_records, write_records
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import ACTION_NAMES, TRUNCATED, check_seed, spaces_of, starts_of, state_of
+from dess.state import ACTION_NAMES, TRUNCATED, check_seed, fields, spaces_of, starts_of, state_of
 
 # The terms of a reward, in the order of ``rules.reward_terms``.
 REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "age")
@@ -25,15 +25,13 @@ REWARD_TERMS = ("data", "step", "overruled", "charging", "quota", "depleted", "a
 # What a mission slot does to one UAV.
 OUTCOME = np.dtype(
     [
-        ("acted", np.bool_),  # whether it was active in the slot
-        ("reward", np.float64),  # of the slot, 0 for an inactive UAV
-        ("reward_terms", np.float64, len(REWARD_TERMS)),
+        # Whether it was active in the slot, whether it has ended in it (quota filled or battery
+        # depleted; or because of ``max_slots``), and whether the safety controller overruled it.
+        *fields(np.bool_, "acted terminated truncated overruled"),
         ("end", np.int64),  # how its mission ended, an index of ``state.END_NAMES``
-        ("terminated", np.bool_),  # ended in this slot: quota filled or battery depleted
-        ("truncated", np.bool_),  # ended in this slot because of ``max_slots``
-        ("overruled", np.bool_),  # by the safety controller
-        ("collected", np.float64),  # by this UAV in the slot [data units]
-        ("team_collected", np.float64),  # by all UAVs of the mission [data units]
+        # The reward, 0 for an inactive UAV, and the data that it, and all UAVs, collected.
+        *fields(np.float64, "reward collected team_collected"),
+        ("reward_terms", np.float64, len(REWARD_TERMS)),
     ],
     align=True,
 )

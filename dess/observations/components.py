@@ -3,9 +3,10 @@
 import numpy as np
 
 from dess.code.kernels import kernel
-from dess.observations.extensions import encode_extensions, extension_names, extensions_of
+from dess.rules import on_grid
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import State, spaces_of
+from dess.sections.wind import move_surcharge
+from dess.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
 
 # The UAV's own state, the scenario's parameters and the time. The residual data of the nodes
 # follow, then the teammates in the order of their indices, then what is beyond the paper.
@@ -42,19 +43,30 @@ def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     space = spaces_of([scenario])[0]
     nodes = [f"residual_{k}" for k in range(len(space.nodes))]
     mates = [f"mate_{j}_{name}" for j in range(1, space.uavs[1]) for name in _MATE]
-    return [*_OWN, *nodes, *mates, *extension_names(space)]
+    return [*_OWN, *nodes, *mates, *sum(_beyond_the_paper(space), [])]
+
+
+def _beyond_the_paper(space: ScenarioSpace) -> list[list[str]]:
+    """The names of five groups of components; a group is empty if the scenario has it not."""
+    nodes, failures = range(len(space.nodes)), space.failures
+    mates = [f"mate_{j}_grounded" for j in range(1, space.uavs[1])]
+    return [
+        ["grounded", *mates] if failures.uav_rate > 0 else [],
+        ["pads_out"] if failures.pad_rate > 0 else [],
+        [f"silent_{k}" for k in nodes] if failures.node_rate > 0 else [],
+        [f"wind_{name}" for name in ACTION_NAMES[:HOVER]] if space.wind.is_on else [],
+        [f"age_{k}" for k in nodes] if space.age.is_on else [],
+    ]
 
 
 def component_bounds(scenario: Scenario | ScenarioSpace) -> tuple[np.ndarray, np.ndarray]:
     """The lowest and the highest values (F,) of an observation."""
     names = component_names(scenario)
-    low, high = np.zeros(len(names), np.float32), np.ones(len(names), np.float32)
-    for index, name in enumerate(names):
-        if name.endswith(("dx", "dy")):
-            low[index] = -1.0
-        elif name.startswith("residual"):  # arrivals are not bounded
-            high[index] = np.inf
-    return low, high
+    low = [-1.0 if name.endswith(("dx", "dy")) else 0.0 for name in names]
+    high = [
+        np.inf if name.startswith("residual") else 1.0 for name in names
+    ]  # arrivals are not bounded
+    return np.array(low, np.float32), np.array(high, np.float32)
 
 
 class Components:
@@ -67,11 +79,10 @@ class Components:
     """
 
     def __init__(self, space: ScenarioSpace):
+        groups = _beyond_the_paper(space)
         self.shapes = ((len(component_names(space)),),)
-        self._extensions, self._common = (
-            extensions_of(space),
-            self.shapes[0][0] - len(extension_names(space)),
-        )
+        self._has = tuple(len(group) > 0 for group in groups)
+        self._common = self.shapes[0][0] - sum(map(len, groups))
 
     def encode(
         self, state: State, missions: np.ndarray, uavs: np.ndarray
@@ -81,7 +92,7 @@ class Components:
         Where ``uavs[r]`` is -1, they are zeros.
         """
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
-        _encode(state, missions, uavs, self._extensions, self._common, out)
+        _encode(state, missions, uavs, self._has, self._common, out)
         return (out,)
 
 
@@ -92,7 +103,7 @@ def _encode(state, missions, uavs, has, common, out):
         if i >= 0:
             mission, team = state.missions[b], state.uavs[b]
             _encode_uav(mission, team, i, state.residual[b], out[row])
-            encode_extensions(has, mission, team, i, state.sensors[b], out[row, common:])
+            _encode_beyond(has, mission, team, i, state.sensors[b], out[row, common:])
 
 
 @kernel
@@ -142,3 +153,34 @@ def _quota_share(u):
 def _nearest(value, first, count):
     """The coordinate nearest to ``value`` among the ``count`` coordinates from ``first`` on."""
     return min(max(value, first), first + count - 1)
+
+
+@kernel
+def _encode_beyond(has, mission, uavs, i, sensors, out):
+    """Write the components of UAV ``i`` in the order of ``_beyond_the_paper``."""
+    can_be_grounded, pads_fail, nodes_fail, has_wind, has_age = has
+    u, at = uavs[i], 0
+    if can_be_grounded:
+        out[0] = u.grounded
+        at = 1
+        for j in range(len(uavs)):
+            if j != i:
+                out[at] = uavs[j].grounded
+                at += 1
+    if pads_fail:
+        out[at] = mission.pads_out[: mission.pads].sum() / mission.pads
+        at += 1
+    if nodes_fail:
+        for k in range(mission.nodes):
+            out[at + k] = sensors[k].silent
+        at += mission.nodes
+    if has_wind:
+        for action in range(HOVER):
+            x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
+            if on_grid(mission, x, y):
+                extra = move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+                out[at + action] = mission.flight_cost * extra / 100.0
+        at += HOVER
+    if has_age:
+        for k in range(mission.nodes):
+            out[at + k] = (mission.slot - sensors[k].newest) / mission.max_slots

@@ -7,7 +7,6 @@ from the zone, the nodes and the UAVs, without building the centred map of eq. 1
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.errors import InputError
 from dess.observations import states as column
 from dess.observations.states import CompactStates, Layout
 
@@ -25,40 +24,20 @@ class Maps:
     """Encodes states as the paper's local and global maps and the UAV's own flying time.
 
     The M x M map is moved into one of ``2 M - 1`` cells a side, with the UAV in the middle and
-    zeros outside. The local map is the ``crop`` x ``crop`` cells in the middle. A cell of the
-    global map is the mean of ``pool`` x ``pool`` cells; incomplete cells at the south and east
+    zeros outside. The local map is the ``CROP`` x ``CROP`` cells in the middle. A cell of the
+    global map is the mean of ``POOL`` x ``POOL`` cells; incomplete cells at the south and east
     edges are left out. Maps are indexed layer, y, x; the layers are ``ZONE`` to ``STATUS``.
 
     Attributes:
         layout: The grid, the zone and the nodes.
-        crop: Width of the local map [cells] (l).
-        pool: Cells a side that make one of the global map (g).
-        width: Width of the global map, ``(2 M - 1) // pool``.
+        shapes: The shapes of one row of each array that ``encode`` returns.
     """
 
     version = 1  # of the encoding; weights trained with another version cannot be used
 
-    def __init__(self, layout: Layout, crop: int = CROP, pool: int = POOL) -> None:
-        """Make an encoder for one layout.
-
-        Raises:
-            InputError: If ``crop`` is not an odd number of 1 to ``2 M - 1``, or ``pool`` is not a
-                number of 1 to ``2 M - 1``.
-        """
-        centred = 2 * layout.grid - 1
-        if not (1 <= crop <= centred and crop % 2):
-            raise InputError(f"crop: {crop} is no such number; allowed: an odd one 1..{centred}")
-        if not 1 <= pool <= centred:
-            raise InputError(f"pool: {pool} is out of range; allowed: 1..{centred}")
-        self.layout = layout
-        self.crop = crop
-        self.pool = pool
-        self.width = centred // pool
-
-    @property
-    def shapes(self) -> tuple[tuple[int, ...], ...]:
-        """The shapes of one row of each array that ``encode`` returns."""
-        return (LAYERS, self.crop, self.crop), (LAYERS, self.width, self.width), (1,)
+    def __init__(self, layout: Layout) -> None:
+        self.layout, width = layout, (2 * layout.grid - 1) // POOL
+        self.shapes = ((LAYERS, CROP, CROP), (LAYERS, width, width), (1,))
 
     def encode(
         self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
@@ -71,21 +50,20 @@ class Maps:
             uavs: (R,) indices of the UAVs; where it is -1, the observation is zeros.
 
         Returns:
-            The local maps (R, 4, crop, crop), the global maps (R, 4, width, width) and the own
-            batteries / 100 (R, 1), all float32.
+            The local maps (R, 4, l, l), the global maps (R, 4, w, w) and the own batteries
+            / 100 (R, 1), all float32.
         """
         local, far, own = (np.zeros((len(missions), *s), np.float32) for s in self.shapes)
         rows = np.asarray(missions, np.int64), np.asarray(uavs, np.int64)
-        _encode(states, self.layout, *rows, self.pool, local, far, own)
+        _encode(states, self.layout, *rows, local, far, own)
         return local, far, own
 
 
 @kernel
-def _encode(states, layout, missions, uavs, pool, local, far, own):
+def _encode(states, layout, missions, uavs, local, far, own):
     """Write the maps of all rows into zeroed arrays."""
     zone, nodes = layout.zone, layout.nodes
-    centre = layout.grid - 1
-    middle = local.shape[2] // 2
+    centre, middle = layout.grid - 1, CROP // 2
     for r in range(len(missions)):
         if uavs[r] < 0:
             continue
@@ -94,29 +72,27 @@ def _encode(states, layout, missions, uavs, pool, local, far, own):
         own[r, 0] = team[uavs[r], column.BATTERY] / np.float32(BATTERY_SCALE)
         # All positions below are relative to the UAV's cell.
         _mark_zone(local[r, ZONE], middle, 1, zone[0] - x, zone[1] - y, zone[2], zone[3])
-        _mark_zone(far[r, ZONE], centre, pool, zone[0] - x, zone[1] - y, zone[2], zone[3])
+        _mark_zone(far[r, ZONE], centre, POOL, zone[0] - x, zone[1] - y, zone[2], zone[3])
         for k in range(len(nodes)):
             data = residual[k] / np.float32(DATA_SCALE)
-            _add(local[r, DATA], middle, 1, nodes[k, 0] - x, nodes[k, 1] - y, data)
-            _add(far[r, DATA], centre, pool, nodes[k, 0] - x, nodes[k, 1] - y, data)
+            _add(local[r], far[r], centre, DATA, nodes[k, 0] - x, nodes[k, 1] - y, data)
         for i in range(len(team)):
-            if not team[i, column.ACTIVE]:
-                continue
-            dx, dy = team[i, column.X] - x, team[i, column.Y] - y
-            battery = team[i, column.BATTERY] / np.float32(BATTERY_SCALE)
-            _add(local[r, FLYING_TIME], middle, 1, dx, dy, battery)
-            _add(far[r, FLYING_TIME], centre, pool, dx, dy, battery)
-            _add(local[r, STATUS], middle, 1, dx, dy, np.float32(1))
-            _add(far[r, STATUS], centre, pool, dx, dy, np.float32(1))
+            if team[i, column.ACTIVE]:
+                dx, dy = team[i, column.X] - x, team[i, column.Y] - y
+                battery = team[i, column.BATTERY] / np.float32(BATTERY_SCALE)
+                _add(local[r], far[r], centre, FLYING_TIME, dx, dy, battery)
+                _add(local[r], far[r], centre, STATUS, dx, dy, np.float32(1))
 
 
 @inlined
-def _add(layer, centre, pool, dx, dy, value):
-    """Add a value at a cell to a pooled layer, if the cell lies in the layer."""
-    x, y = centre + dx, centre + dy
-    end = len(layer) * pool
-    if 0 <= x < end and 0 <= y < end:
-        layer[y // pool, x // pool] += value / np.float32(pool * pool)
+def _add(local, far, centre, layer, dx, dy, value):
+    """Add a value at a cell to a layer of both maps, if the cell lies in them."""
+    x, y = CROP // 2 + dx, CROP // 2 + dy
+    if 0 <= x < CROP and 0 <= y < CROP:
+        local[layer, y, x] += value
+    x, y = (centre + dx) // POOL, (centre + dy) // POOL
+    if x < far.shape[2] and y < far.shape[1]:
+        far[layer, y, x] += value / np.float32(POOL * POOL)
 
 
 @inlined

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from dess.code.kernels import kernel
 from dess.errors import InputError, one_of, shown
 from dess.observations.components import Components, component_bounds
 from dess.observations.maps import Maps
@@ -72,15 +71,14 @@ class Observer:
             The observations, arrays with R rows, and the (R, 5) masks of the allowed actions as
             booleans. Only Hover is allowed for a UAV that charges or is not active, and for -1.
         """
-        if self.kind == "state":
-            parts = self._encoder.encode(state, missions, uavs)
-        if self.kind != "state" or self.guarded:
+        seen: Any = state
+        if self.guarded or self.kind != "state":
             states = compact_states(state, self.guarded)
             allowed = masks(states, missions, uavs)
-            if self.kind != "state":
-                parts = self._encoder.encode(states, missions, uavs)
+            seen = state if self.kind == "state" else states
         else:
             allowed = legal_actions(state.missions, state.uavs, missions, uavs)
+        parts = self._encoder.encode(seen, missions, uavs)
         names = _PARTS.get(self.kind)
         return (dict(zip(names, parts, strict=True)) if names else parts[0]), allowed
 
@@ -94,18 +92,8 @@ class Observer:
         Returns:
             As ``observe``, with B x I rows.
         """
-        return self.observe(state, *_rows(shown))
-
-
-@kernel
-def _rows(shown):
-    """The missions and UAV indices of all UAVs; -1 for the UAVs that are not shown."""
-    missions, uavs = np.empty(shown.size, np.int64), np.empty(shown.size, np.int64)
-    fleet = shown.shape[1]
-    for row in range(shown.size):
-        b, i = row // fleet, row % fleet
-        missions[row], uavs[row] = b, i if shown[b, i] else -1
-    return missions, uavs
+        missions, uavs = np.indices(shown.shape)
+        return self.observe(state, missions.ravel(), np.where(shown, uavs, -1).ravel())
 
 
 def rows_of(observations: Observation) -> list[Any]:

@@ -125,15 +125,5 @@ def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.n
 
     Where ``uavs[r]`` is -1, only Hover is allowed.
     """
-    allowed = np.empty((len(missions), 5), np.bool_)
-    _unpack(states.uavs, missions, uavs, allowed)
-    return allowed
-
-
-@kernel
-def _unpack(uavs, rows_mission, rows_uav, allowed):
-    for row in range(len(allowed)):
-        i = rows_uav[row]
-        bits = uavs[rows_mission[row], i, MASK] if i >= 0 else 1 << HOVER
-        for action in range(5):
-            allowed[row, action] = bits >> action & 1
+    bits = np.where(uavs < 0, 1 << HOVER, states.uavs[missions, uavs, MASK])
+    return (bits[:, None] >> np.arange(5) & 1).astype(np.bool_)

@@ -140,20 +140,22 @@ def _own(mission, team, i, mean, line):
     active = 0
     for j in range(len(team)):
         active += team[j, column.ACTIVE]
-    slack = me[column.BATTERY] - 1 - me[column.HOME]
-    line[0] = me[column.BATTERY] / 100.0
-    line[1] = me[column.NEEDED] / 100.0
+    battery, needed, home = me[column.BATTERY], me[column.NEEDED], me[column.HOME]
+    start, complete = mission[column.CHARGE_START], mission[column.CHARGE_COMPLETE]
+    slack = battery - 1 - home
+    line[0] = battery / 100.0
+    line[1] = needed / 100.0
     line[2] = me[column.LATCH]
     line[3] = me[column.MUST_CHARGE]
-    line[4] = mission[column.CHARGE_START] / 100.0
-    line[5] = mission[column.CHARGE_COMPLETE] / 100.0
-    line[6] = me[column.HOME] / 30.0
+    line[4] = start / 100.0
+    line[5] = complete / 100.0
+    line[6] = home / 30.0
     line[7] = min(slack, 50) / 50.0
     line[8] = min(max(slack, 0), 8) / 8.0
-    line[9] = (me[column.BATTERY] - mission[column.CHARGE_START]) / 50.0
-    line[10] = min(max(me[column.BATTERY] - mission[column.CHARGE_START], -5), 10) / 10.0
-    line[11] = min(max(me[column.NEEDED] - mission[column.CHARGE_COMPLETE], -20), 60) / 40.0
-    line[12] = min(me[column.NEEDED], 10) / 10.0
+    line[9] = (battery - start) / 50.0
+    line[10] = min(max(battery - start, -5), 10) / 10.0
+    line[11] = min(max(needed - complete, -20), 60) / 40.0
+    line[12] = min(needed, 10) / 10.0
     line[13] = active - 1.0
     line[14] = active == 1
     line[15] = mean
@@ -203,13 +205,12 @@ def _actions(team, i, near, free, line, at):
 @inlined
 def _mates(team, i, line, at):
     """Write the nearest active teammates, relative to UAV ``i``."""
+    x, y = np.int64(team[i, column.X]), np.int64(team[i, column.Y])
     last_slots, last = -1, -1
     for _ in range(MATES):
         nearest, least = -1, 10_000
         for j in range(len(team)):
-            slots = abs(team[j, column.X] - team[i, column.X]) + abs(
-                team[j, column.Y] - team[i, column.Y]
-            )
+            slots = abs(team[j, column.X] - x) + abs(team[j, column.Y] - y)
             after = slots > last_slots or (slots == last_slots and j > last)
             if j != i and team[j, column.ACTIVE] and after and slots < least:
                 nearest, least = j, slots
@@ -217,11 +218,12 @@ def _mates(team, i, line, at):
             return
         last_slots, last = least, nearest
         mate = team[nearest]
+        dx, dy = mate[column.X] - x, mate[column.Y] - y
         line[at] = 1.0
-        line[at + 1] = (mate[column.X] - team[i, column.X]) / 30.0
-        line[at + 2] = (mate[column.Y] - team[i, column.Y]) / 30.0
-        line[at + 3] = min(max(mate[column.X] - team[i, column.X], -3), 3) / 3.0
-        line[at + 4] = min(max(mate[column.Y] - team[i, column.Y], -3), 3) / 3.0
+        line[at + 1] = dx / 30.0
+        line[at + 2] = dy / 30.0
+        line[at + 3] = min(max(dx, -3), 3) / 3.0
+        line[at + 4] = min(max(dy, -3), 3) / 3.0
         line[at + 5] = mate[column.BATTERY] / 100.0
         line[at + 6] = mate[column.NEEDED] / 100.0
         line[at + 7] = mate[column.CHARGING]

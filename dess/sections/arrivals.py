@@ -63,8 +63,7 @@ class Arrivals(Section):
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
-        is_set = self.rates or self.schedule or self.buffer or self.service != "oldest"
-        if self.process == "slotted" and is_set:
+        if self.process == "slotted" and self.is_on:
             raise ValueError(
                 "process: slotted arrivals have no rates, schedule, buffer or service; "
                 "allowed: continuous"

@@ -11,38 +11,34 @@ buffer, also where a newer packet is served before the rest. All times are in mi
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 
 from dess.sections.age import age_of_teeth
 
-WAITING, DELIVERED, LOST = range(3)
-
-# One packet as a record; the number of a packet is its index.
-PACKET = np.dtype(
-    [
-        ("node", np.int64),
-        ("status", np.int64),
-        ("uav", np.int64),  # that it was delivered to, otherwise -1
-        ("generated", np.float64),
-        ("left", np.float64),  # when it was delivered or lost, otherwise nan
-        ("remaining", np.float64),  # data units that have not been collected
-    ]
-)
-
 
 @dataclass(slots=True)
 class Packet:
-    """One packet, with the fields of ``PACKET``: Python reads it faster than a record."""
+    """One packet; its number is its index.
+
+    Attributes:
+        node: Its node.
+        generated: When it was generated.
+        remaining: Data units that have not been collected.
+        uav: The UAV that it was delivered to, otherwise -1.
+        left: When it was delivered or lost, otherwise nan.
+    """
 
     node: int
     generated: float
     remaining: float
-    status: int = WAITING
     uav: int = -1
     left: float = math.nan
 
+
+# The same as a record of an array.
+PACKET = np.dtype([(field.name, field.type) for field in fields(Packet)])
 
 # Sums of data units are rounded; a rest below this is no part of a packet.
 _ROUNDING = 1e-9
@@ -71,8 +67,7 @@ class Buffers:
     @property
     def packets(self) -> np.ndarray:
         """(P,) ``PACKET`` records of all packets, in the order of their generation."""
-        names = PACKET.names or ()
-        return np.array([tuple(getattr(p, name) for name in names) for p in self.all], PACKET)
+        return np.array([*map(astuple, self.all)], PACKET)
 
     def store(self, k: int, time: float, amount: float) -> int:
         """Put a new packet into the buffer of node ``k``.
@@ -98,8 +93,7 @@ class Buffers:
                 packet.remaining -= amount
                 return
             amount = max(amount - packet.remaining, 0.0)
-            packet.remaining, packet.uav = 0.0, uav
-            packet.status, packet.left = DELIVERED, time
+            packet.remaining, packet.uav, packet.left = 0.0, uav, time
             self.delivered.append(queue.pop() if self.newest_first else queue.popleft())
 
     def lose(self, k: int, time: float) -> list[int]:
@@ -111,7 +105,7 @@ class Buffers:
         return numbers
 
     def _lose(self, number: int, time: float) -> None:
-        self.all[number].status, self.all[number].left = LOST, time
+        self.all[number].left = time
         self.lost += 1
 
     def write(self, out: np.void, end: float, with_age: bool) -> None:

@@ -1,8 +1,8 @@
 """Failures at random times: UAVs that are lost or grounded, pads out of order, silent nodes."""
 
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
@@ -45,24 +45,13 @@ class Failures(Section):
         "kept", description="whether the data of a node are kept while it is silent"
     )
 
-    @model_validator(mode="after")
-    def _repairs_take_a_slot(self) -> Self:
-        for name in ("uav_repair", "pad_repair", "node_repair"):
-            if 0 < getattr(self, name) < 1:
-                raise ValueError(
-                    f"{name}: {getattr(self, name)} is less than a slot; allowed: 0, or 1 and more"
-                )
-        return self
-
     def constants(self) -> dict[str, Any]:
         """The fields of ``MISSION`` that the section sets; repairs as probabilities per slot."""
-        kinds = ("uav", "pad", "node")
-        rates = {f"{kind}_rate": getattr(self, f"{kind}_rate") for kind in kinds}
-        means = {f"{kind}_repair": getattr(self, f"{kind}_repair") for kind in kinds}
+        repairs = {name: mean for name, mean in self if name.endswith("_repair")}
         return {
+            **dict(self),
+            **{name: 1 / mean if mean else 0.0 for name, mean in repairs.items()},
             "has_failures": self.is_on,
-            **rates,
-            **{name: 1 / mean if mean else 0.0 for name, mean in means.items()},
             "uav_data_lost": self.uav_data == "lost",
             "node_data_lost": self.node_data == "lost",
         }

@@ -33,7 +33,6 @@ class Packets:
         self._log, self._nodes, self._missions = log, scenario.nodes, state.missions
         self._mission, self._uavs = state.missions[0], state.uavs[0]
         self._residual, self._sensors = state.residual[0], state.sensors[0]
-        self._served, self._amounts = self._uavs["served"], self._uavs["amount"]
         arrivals, nodes = scenario.arrivals, len(scenario.nodes)
         self._measures_age = scenario.age.measured
         self._sources = sources_of(arrivals, scenario.arrival_rate, nodes)
@@ -75,9 +74,9 @@ class Packets:
 
     def deliver(self, time: float) -> None:
         """Take what the UAVs collected at a time from the packets, in the order of the UAVs."""
-        b, amounts = self.buffers, self._amounts.tolist()
-        served = [(i, k, amounts[i]) for i, k in enumerate(self._served.tolist()) if k >= 0]
-        before = len(b.delivered)
+        b, before = self.buffers, len(self.buffers.delivered)
+        outcomes = enumerate(self._uavs[["served", "amount"]].tolist())
+        served = [(i, k, amount) for i, (k, amount) in outcomes if k >= 0]
         for i, k, amount in served:
             b.serve(k, time, amount, i)
         for i, k, _ in served:  # rounding: no packets means no data, and vice versa
@@ -86,11 +85,10 @@ class Packets:
             elif self._residual[k] == 0.0:
                 b.serve(k, time, math.inf, i)
         for number in b.delivered[before:]:
-            packet = b.all[number]
-            sensor = self._sensors[packet.node]
-            if packet.generated > sensor["newest"]:
-                self._mission["newest"] += packet.generated - sensor["newest"]
-                sensor["newest"] = packet.generated
+            sensor, generated = self._sensors[b.all[number].node], b.all[number].generated
+            if generated > sensor["newest"]:
+                self._mission["newest"] += generated - sensor["newest"]
+                sensor["newest"] = generated
         self._log_events("delivery", b.delivered[before:])
 
     def fall_silent(self, time: float) -> None:

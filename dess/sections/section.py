@@ -14,8 +14,16 @@ Integer = Annotated[int, Field(strict=True)]
 Number = Annotated[float, Field(allow_inf_nan=False), AfterValidator(lambda value: value + 0.0)]
 # A probability that something happens in a mission slot.
 Probability = Annotated[Number, Field(ge=0, le=1)]
+
+
+def _at_least_a_slot(mean: float) -> float:
+    if 0 < mean < 1:
+        raise ValueError(f"{mean} is less than a slot; allowed: 0, or 1 and more")
+    return mean
+
+
 # A mean duration; 0 has a meaning of its own, which the description tells.
-Slots = Annotated[Number, Field(ge=0, le=1_000_000)]
+Slots = Annotated[Number, Field(ge=0, le=1_000_000), AfterValidator(_at_least_a_slot)]
 
 
 def tuples(value: Any) -> Any:
@@ -25,8 +33,8 @@ def tuples(value: Any) -> Any:
     return tuple(tuples(item) for item in value) if isinstance(value, list | tuple) else value
 
 
-class Section(BaseModel):
-    """A section of a scenario, frozen and validated; off if all fields have their defaults."""
+class Strict(BaseModel):
+    """Frozen and validated data, whose numbers and words are not converted."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -35,10 +43,14 @@ class Section(BaseModel):
     def _lists_to_tuples(cls, values: Any) -> Any:
         return tuples(values)
 
+
+class Section(Strict):
+    """A section of a scenario; off if all fields have their defaults."""
+
     @property
     def is_on(self) -> bool:
         """Whether a field differs from its default."""
-        return self != self.off()
+        return any(value != type(self).model_fields[name].default for name, value in self)
 
     @classmethod
     def off(cls) -> Self:

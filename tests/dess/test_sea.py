@@ -89,7 +89,7 @@ TABLES = {
     "x,y\n1,1\n\n2\n": "line 4: y is ''; allowed: a number",
     "x,y\nnan,1\n": "line 2: x is nan; allowed: -99,999..99,999",
     "x,y\n1.5,1\n": "line 2: x is 1.5; allowed: an integer",
-    "x,y\n1,-1\n": r"line 2 is off the grid of 8 x 8 cells, at \[1, -1\]; allowed: 0 <= x, y$",
+    "x,y\n1,-1\n": r"line 2 is off the grid of 8 x 8 cells, at \[1, -1\]; allowed: 0 <= x, y < 256",
     "x,y\n1,1\n3,11\n": r"line 3 is off .* at \[3, 11\]; allowed: grid = 12 or more$",
     "x,y\n1,999\n": "allowed: 0 <= x, y < 256",
     "x,y\n1,1\n2,2\n1,1\n": r"line 2 and line 4 lie in one cell, \[1, 1\]; allowed: distinct",

@@ -1,4 +1,6 @@
-"""Observations lie in their space and have the values worked out by hand; masks follow the grid."""
+"""Named components lie in their space and have the values worked out by hand."""
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,25 +11,23 @@ from dess import ScenarioSpace
 from dess.observations.components import component_names
 from dess.state import HOVER, STEP_X, STEP_Y
 from tests.dess.env.episodes import play, small
-from tests.drawn import seeds, spaces
+from tests.drawn import extended_spaces, seeds, spaces
 
 
-@given(spaces(), seeds)
+@given(spaces() | extended_spaces(fleet=[]), seeds)
 def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
     space: ScenarioSpace, seed: int
 ) -> None:
     env = dess.parallel_env(space, seed, observation="state")
-    names = component_names(space)
-    edge = space.grid - 1
+    names, edge = component_names(space), space.grid - 1
     for step in play(env, 0):
+        assert env.state_space.shape == env.state().shape
         for agent, observation in step[0].items():
             assert env.observation_space(agent).contains(observation)
             values = dict(zip(names, observation["observation"].tolist(), strict=True))
-            x, y = round(values["x"] * edge), round(values["y"] * edge)
-            inside = (np.clip(x + STEP_X, 0, edge) == x + STEP_X) & (
-                np.clip(y + STEP_Y, 0, edge) == y + STEP_Y
-            )
-            held = values["charging"] or not values["active"]
+            x, y = round(values["x"] * edge) + STEP_X, round(values["y"] * edge) + STEP_Y
+            inside = (np.clip(x, 0, edge) == x) & (np.clip(y, 0, edge) == y)
+            held = values["charging"] or not values["active"] or values.get("grounded")
             expected = np.arange(5) == HOVER if held else inside
             assert observation["action_mask"].tolist() == expected.tolist()
 
@@ -43,27 +43,35 @@ def test_an_observation_worked_out_by_hand() -> None:
     observations, *_ = env.step({agent: 3 if agent == left else HOVER for agent in env.agents})
     values = dict(zip(names, observations[left]["observation"].tolist(), strict=True))
     residual = [values.pop("residual_0"), values.pop("residual_1")]
-    assert np.array(residual).sum() * 8 == pytest.approx(env.record().residual, rel=1e-6)
-    assert values == pytest.approx(
-        {
-            "active": 1,
-            "x": 2 / 4,
-            "y": 0,
-            "battery": 0.29,
-            "quota": 4 / 400,
-            "latch": 0,
-            "charging": 0,
-            "waiting": 0,
-            "zone_dx": 1 / 4,
-            "zone_dy": 0,
-            "charge_start": 0.2,
-            "charge_complete": 0.6,
-            "slot": 1 / 500,
-            "mate_1_active": 1,
-            "mate_1_dx": 2 / 4,
-            "mate_1_dy": 0,
-            "mate_1_battery": 0.29,
-            "mate_1_quota": 4 / 400,
-            "mate_1_charging": 0,
-        }
-    )
+    assert sum(residual) * 8 == pytest.approx(env.record().residual, rel=1e-6)
+    zeros = ("y", "latch", "charging", "waiting", "zone_dy", "mate_1_dy", "mate_1_charging")
+    expected = dict.fromkeys(zeros, 0) | {"active": 1, "x": 2 / 4, "battery": 0.29}
+    expected |= {"quota": 4 / 400, "zone_dx": 1 / 4, "slot": 1 / 500}
+    expected |= {"charge_start": 0.2, "charge_complete": 0.6, "mate_1_active": 1}
+    expected |= {"mate_1_dx": 2 / 4, "mate_1_battery": 0.29, "mate_1_quota": 4 / 400}
+    assert values == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("fields", "found"),
+    [
+        ({"failures.node_rate": 1.0}, {"silent_0": 1, "silent_1": 1}),
+        ({"failures.pad_rate": 1.0, "pads": 2}, {"pads_out": 1}),
+        ({"failures.uav_rate": 1.0, "failures.uav_repair": 9.0}, {"grounded": 1}),
+        ({"age.measured": True}, {"age_0": 1 / 500, "age_1": 1 / 500}),
+        # From the zone's northern row a move south is against the wind, one north leaves the grid.
+        (
+            {"wind.strength": 5.0, "wind.direction": 180.0, "zone": (2, 0, 1, 1)},
+            {"wind_north": 0, "wind_east": 0, "wind_south": 0.05, "wind_west": 0},
+        ),
+    ],
+)
+def test_what_is_beyond_the_paper_by_hand(fields: dict[str, Any], found: dict[str, float]) -> None:
+    scenario = ScenarioSpace.of(small(**fields))
+    env = dess.parallel_env(scenario, observation="state")
+    env.reset()
+    observations, *_ = env.step({"uav_0": HOVER})
+    names, values = component_names(scenario), observations["uav_0"]["observation"].tolist()
+    beyond = dict(zip(names, values, strict=True))
+    assert names[len(component_names(small())) :] == [*found]
+    assert {name: beyond[name] for name in found} == pytest.approx(found)

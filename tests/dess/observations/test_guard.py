@@ -10,9 +10,10 @@ from dess import streams
 from dess.mission import simulate
 from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace
-from dess.state import BATTERY, HOVER, constants_of, empty_state
+from dess.state import BATTERY, HOVER
 from dess.view import View
 from tests import compiled
+from tests.dess.env.episodes import placed
 from tests.drawn import EAST, NORTH, SOUTH, WEST, replications, seeds, spaces
 
 
@@ -44,48 +45,31 @@ def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
     event(f"charged {record.uavs['slots_charging'][0] > 0}")
 
 
-def _mask(uavs: list[dict[str, Any]], **scenario: Any) -> np.ndarray:
+def _mask(*uavs: dict[str, Any]) -> np.ndarray:
     """The guard's masks for UAVs in given states, 400 communications short of the quota."""
-    space = ScenarioSpace.of(**({"uavs": len(uavs), "charge_start": 30} | scenario))
-    masks: list[np.ndarray] = []
-
-    class Look:
-        name = "look"
-
-        def act(self, view: View) -> np.ndarray:
-            state = empty_state(1, len(uavs), len(space.nodes))
-            for name, array in zip(state._fields, state, strict=True):
-                array[:] = getattr(view.state, name)
-            state.missions["active"] = len(uavs)
-            for u, values in zip(state.uavs[0], uavs, strict=True):
-                for name, value in ({"battery": 60, "communications": 40} | values).items():
-                    u[name] = value
-            whole = View(state, view.world, np.zeros(len(uavs), int), np.arange(len(uavs)))
-            masks.append(guard(whole))
-            return np.full(len(view), HOVER)
-
-    simulate(ScenarioSpace.of(space, max_slots=1), Look(), 0)
-    return masks[0]
+    here: Any = None  # the guard takes nothing from the channel
+    rows = np.zeros(len(uavs), int), np.arange(len(uavs))
+    return guard(View(placed([*uavs]), here, *rows))
 
 
 def test_at_the_last_moment_only_the_way_home_is_left() -> None:
     # The corner of the zone (26, 5) is 6 + 5 = 11 steps from (20, 10), then one slot to charge in.
-    (mask,) = _mask([{"x": 20, "y": 10, "battery": 12}])
+    (mask,) = _mask({"x": 20, "y": 10, "battery": 12})
     assert np.nonzero(mask)[0].tolist() == [NORTH, EAST]
     # With plenty of battery all is open.
-    (mask,) = _mask([{"x": 20, "y": 10, "battery": 60}])
+    (mask,) = _mask({"x": 20, "y": 10, "battery": 60})
     assert mask.all()
     # Somewhere in between the guard closes in; never before it must.
-    opened = [_mask([{"x": 20, "y": 10, "battery": b}])[0].sum() for b in range(12, 30)]
+    opened = [_mask({"x": 20, "y": 10, "battery": b})[0].sum() for b in range(12, 30)]
     assert opened == sorted(opened)
     assert opened[3:] == [5] * len(opened[3:])
 
 
 def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
-    (mask,) = _mask([{"x": 0, "y": 0}])
+    (mask,) = _mask({"x": 0, "y": 0})
     assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH, HOVER]
     parked = {"x": 26, "y": 3, "latch": True, "battery": 20}
-    mask = _mask([{"x": 25, "y": 3}, parked])[0]
+    mask = _mask({"x": 25, "y": 3}, parked)[0]
     assert not mask[EAST]
     assert mask[[NORTH, SOUTH, WEST, HOVER]].all()
 
@@ -93,9 +77,9 @@ def test_the_edge_of_the_grid_and_parked_teammates_are_closed() -> None:
 def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> None:
     # Both want the cell between them; the one with less battery goes first.
     first, second = {"x": 10, "y": 10, "battery": 50}, {"x": 10, "y": 12, "battery": 60}
-    open_to_both = _mask([first, second])
+    open_to_both = _mask(first, second)
     assert open_to_both[0, SOUTH] and open_to_both[1, NORTH]
-    collided = _mask([first | {"overruled": True}, second | {"overruled": True}])
+    collided = _mask(first | {"overruled": True}, second | {"overruled": True})
     assert collided[0, SOUTH] and not collided[1, NORTH]
     assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
 
@@ -103,20 +87,7 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> 
 # --- pads ---
 
 # One UAV far off, and two in the zone; C_S 30, C_C 80, 10 % per slot.
-QUEUE: dict[str, Any] = {"uavs": 3, "charge_start": 30, "charge_complete": 80, "pads": 1}
-
-
-def _wait(batteries: list[int], asked: list[int], quota: int = 440, **scenario: Any) -> int:
-    """The slots for which UAV 0 expects to wait; ``asked`` are those that have asked for a pad."""
-    space = ScenarioSpace.of(**(QUEUE | {"quota": quota} | scenario))
-    state = empty_state(1, 3, len(space.nodes))
-    state.missions[:] = constants_of(space)
-    team = state.uavs[0]
-    team["active"], team["battery"], team["pad_request"] = True, batteries, -1
-    team["quota"], team["slots_per_cell"], team["pad_request"][asked] = quota, 1, 0
-    return int(compiled.waiting_time(state.missions[0], team, 0))
-
-
+QUEUE: dict[str, Any] = {"charge_start": 30, "charge_complete": 80, "pads": 1}
 OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
 
 
@@ -141,17 +112,18 @@ OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
 def test_the_time_that_a_uav_expects_to_wait(
     batteries: list[int], asked: list[int], scenario: dict[str, Any], slots: int
 ) -> None:
-    assert _wait(batteries, asked, **scenario) == slots
+    uavs = [{"battery": b, "pad_request": -1, "communications": 0, "x": 0} for b in batteries]
+    for i in asked:
+        uavs[i]["pad_request"] = 0
+    state = placed(uavs, **QUEUE | scenario)
+    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0) == slots
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
-    space = ScenarioSpace.of(**QUEUE, failures={"pad_rate": 0.1})
-    state = empty_state(1, 3, len(space.nodes))
-    state.missions[:] = constants_of(space)
-    u = state.uavs[0, 0]
-    u["battery"], u["quota"], u["slots_per_cell"] = 5, 440, 1
-    assert compiled.must_charge(state.missions[0], u, 1e6)
-    state.missions["pads_out"][0, 0] = 1
-    assert not compiled.must_charge(state.missions[0], u, 1e6)
-    state.missions["pad_repair"] = 0.5
-    assert compiled.must_charge(state.missions[0], u, 1e6)
+    state = placed([{"battery": 5}], **QUEUE, failures={"pad_rate": 0.1})
+    mission, u = state.missions[0], state.uavs[0, 0]
+    assert compiled.must_charge(mission, u, 1e6)
+    mission["pads_out"][0] = 1
+    assert not compiled.must_charge(mission, u, 1e6)
+    mission["pad_repair"] = 0.5
+    assert compiled.must_charge(mission, u, 1e6)

@@ -1,118 +1,32 @@
-"""The maps hold what eq. 19-22 put in them: by hand, and against maps that are built in full."""
-
-import re
-from typing import NamedTuple
+"""The maps hold what eq. 19-22 put in them: compared with maps that are built in full."""
 
 import numpy as np
-import pytest
-from hypothesis import event, given
+from hypothesis import given
 from hypothesis import strategies as st
 
-from dess import InputError
-from dess.observations.maps import (
-    BATTERY_SCALE,
-    DATA,
-    DATA_SCALE,
-    FLYING_TIME,
-    STATUS,
-    ZONE,
-    Maps,
-)
-from dess.observations.states import (
-    ACTIVE,
-    BATTERY,
-    CompactStates,
-    Layout,
-    X,
-    Y,
-    empty_states,
-)
-
-GRID = 32  # centred: 63 cells a side with the UAV at 31; global: 21 cells with the UAV's at 10
-ZONE_CELLS = (26, 2, 4, 4)
-
-
-class Observed(NamedTuple):
-    """The observation of one UAV."""
-
-    near: np.ndarray
-    far: np.ndarray
-    own: np.ndarray
-
-
-def _team(*uavs: tuple[int, int, int, int], residual: tuple[float, ...] = ()) -> CompactStates:
-    """The state of one mission with UAVs (x, y, battery, active)."""
-    states = empty_states(1, len(uavs), len(residual))
-    states.uavs[0][:, [X, Y, BATTERY, ACTIVE]] = uavs
-    states.residual[0] = residual
-    return states
-
-
-def _layout(*nodes: tuple[int, int]) -> Layout:
-    return Layout(GRID, np.array(ZONE_CELLS), np.array(nodes, np.int64).reshape(-1, 2))
-
-
-def _observe(layout: Layout, states: CompactStates, uav: int = 0) -> Observed:
-    near, far, own = Maps(layout).encode(states, np.array([0]), np.array([uav]))
-    return Observed(near[0], far[0], own[0])
-
-
-def _filled(layer: np.ndarray) -> dict[tuple[int, int], float]:
-    """The cells (x, y) of a layer that are not zero."""
-    return {(int(x), int(y)): float(layer[y, x]) for y, x in np.argwhere(layer)}
-
-
-def test_the_team_is_on_the_map_and_who_is_done_is_not() -> None:
-    states = _team((10, 10, 60, 1), (12, 7, 35, 1), (11, 10, 50, 0), (0, 0, 0, 0))
-    seen = _observe(_layout(), states)
-    assert _filled(seen.near[FLYING_TIME]) == pytest.approx({(8, 8): 0.6, (10, 5): 0.35})
-    assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (10, 5): 1.0}
-    assert _filled(seen.far[STATUS]) == pytest.approx({(10, 10): 1 / 9, (11, 9): 1 / 9})
-    # The other one sees the first from its own place, and its own battery.
-    seen = _observe(_layout(), states, uav=1)
-    assert _filled(seen.near[STATUS]) == {(8, 8): 1.0, (6, 11): 1.0}
-    assert seen.own == pytest.approx(0.35)
-    # Who is done is not even on its own map.
-    seen = _observe(_layout(), states, uav=2)
-    assert _filled(seen.near[STATUS]) == {(7, 8): 1.0, (9, 5): 1.0}
-    assert seen.own == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize(
-    ("settings", "line"),
-    [
-        ({"crop": 16}, "crop: 16 is no such number; allowed: an odd one 1..63"),
-        ({"crop": 65}, "crop: 65 is no such number; allowed: an odd one 1..63"),
-        ({"crop": -1}, "crop: -1 is no such number; allowed: an odd one 1..63"),
-        ({"pool": 0}, "pool: 0 is out of range; allowed: 1..63"),
-        ({"pool": 64}, "pool: 64 is out of range; allowed: 1..63"),
-    ],
-)
-def test_refuses_maps_that_do_not_fit(settings: dict[str, int], line: str) -> None:
-    with pytest.raises(InputError, match=re.escape(line)):
-        Maps(_layout(), **settings)
+from dess.observations import states as column
+from dess.observations.maps import CROP, DATA, FLYING_TIME, POOL, STATUS, ZONE, Maps
+from dess.observations.states import CompactStates, Layout, empty_states
 
 
 @st.composite
 def _worlds(draw: st.DrawFn) -> tuple[Maps, CompactStates, np.ndarray, np.ndarray]:
-    """Any layout, map sizes, three missions of a team, and rows of them."""
-    grid = draw(st.integers(2, 12))
+    """Any layout, three missions of a team, and rows of them."""
+    grid = draw(st.integers(2, 14))
     width, height = draw(st.integers(1, grid)), draw(st.integers(1, grid))
     x, y = draw(st.integers(0, grid - width)), draw(st.integers(0, grid - height))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     nodes = rng.integers(0, grid, (draw(st.integers(1, 5)), 2))
     layout = Layout(grid, np.array([x, y, width, height]), nodes)
-    crop = 2 * draw(st.integers(0, grid - 1)) + 1
-    maps = Maps(layout, crop, draw(st.integers(1, 2 * grid - 1)))
 
     states = empty_states(3, draw(st.integers(1, 4)), len(nodes))
     fleet = states.uavs.shape[:2]
-    states.uavs[..., [X, Y]] = rng.integers(0, grid, (*fleet, 2))
-    states.uavs[..., BATTERY] = rng.integers(0, 101, fleet)
-    states.uavs[..., ACTIVE] = rng.integers(0, 2, fleet)
+    states.uavs[..., [column.X, column.Y]] = rng.integers(0, grid, (*fleet, 2))
+    states.uavs[..., column.BATTERY] = rng.integers(0, 101, fleet)
+    states.uavs[..., column.ACTIVE] = rng.integers(0, 2, fleet)
     states.residual[:] = rng.uniform(0, 20, states.residual.shape)
     missions, uavs = (rng.integers(0, most, 7) for most in fleet)
-    return maps, states, missions, uavs
+    return Maps(layout), states, missions, uavs
 
 
 def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -120,10 +34,10 @@ def _layers(layout: Layout, team: np.ndarray, residual: np.ndarray) -> np.ndarra
     layers = np.zeros((4, layout.grid, layout.grid))
     x, y, width, height = layout.zone
     layers[ZONE, y : y + height, x : x + width] = 1
-    np.add.at(layers[DATA], (layout.nodes[:, 1], layout.nodes[:, 0]), residual / DATA_SCALE)
-    active = team[team[:, ACTIVE] != 0]
-    cells = active[:, Y], active[:, X]
-    np.add.at(layers[FLYING_TIME], cells, active[:, BATTERY] / BATTERY_SCALE)
+    np.add.at(layers[DATA], (layout.nodes[:, 1], layout.nodes[:, 0]), residual / 20)
+    active = team[team[:, column.ACTIVE] != 0]
+    cells = active[:, column.Y], active[:, column.X]
+    np.add.at(layers[FLYING_TIME], cells, active[:, column.BATTERY] / 100)
     np.add.at(layers[STATUS], cells, 1)
     return layers
 
@@ -133,22 +47,22 @@ def test_the_maps_are_those_cut_from_the_whole_centred_map(
     world: tuple[Maps, CompactStates, np.ndarray, np.ndarray],
 ) -> None:
     maps, states, missions, uavs = world
-    grid, crop, pool, width = maps.layout.grid, maps.crop, maps.pool, maps.width
+    centred = 2 * maps.layout.grid - 1
+    wide, width = max(centred, CROP), centred // POOL
     encoded = maps.encode(states, missions, uavs)
     assert [a.shape[1:] for a in encoded] == list(maps.shapes)
-    assert all(a.dtype == np.float32 for a in encoded)
-    event(f"cells left out {(2 * grid - 1) % pool > 0}")
-
     for near, far, own, mission, uav in zip(*encoded, missions, uavs, strict=True):
         team = states.uavs[mission]
-        layers = _layers(maps.layout, team, states.residual[mission])
-        x, y = team[uav, X], team[uav, Y]
-        padded = np.pad(layers, ((0, 0), (grid - 1, grid - 1), (grid - 1, grid - 1)))
-        centred = padded[:, y : y + 2 * grid - 1, x : x + 2 * grid - 1]
-        edge = (2 * grid - 1 - crop) // 2
-        cut = centred[:, edge : edge + crop, edge : edge + crop]
-        blocks = centred[:, : width * pool, : width * pool]
-        pooled = blocks.reshape(4, width, pool, width, pool).mean((2, 4))
-        np.testing.assert_allclose(near, cut, rtol=1e-6)
-        np.testing.assert_allclose(far, pooled, rtol=1e-5)
-        np.testing.assert_allclose(own, team[uav, BATTERY] / BATTERY_SCALE, rtol=1e-6)
+        x, y = team[uav, column.X], team[uav, column.Y]
+        whole = np.zeros((4, 3 * wide, 3 * wide))
+        inner = slice(wide, wide + maps.layout.grid)
+        whole[:, inner, inner] = _layers(maps.layout, team, states.residual[mission])
+        # Centred on the UAV, a map from ``edge`` cells before it to as many behind it.
+        for found, edge, pool in ((near, CROP // 2, 1), (far, maps.layout.grid - 1, POOL)):
+            top, left = wide + y - edge, wide + x - edge
+            side = found.shape[1] * pool
+            cut = whole[:, top : top + side, left : left + side]
+            pooled = cut.reshape(4, side // pool, pool, side // pool, pool).mean((2, 4))
+            np.testing.assert_allclose(found, pooled, rtol=1e-5)
+        assert far.shape[1] == width
+        np.testing.assert_allclose(own, team[uav, column.BATTERY] / 100, rtol=1e-6)

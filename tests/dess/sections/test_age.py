@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess import InputError
 from dess.mission import simulate
-from dess.scenario import Scenario, load_scenario
-from dess.sections.age import MOST_TEETH, age_of_teeth
+from dess.scenario import Scenario
+from dess.sections.age import age_of_teeth
 from dess.view import View
 
 Tooth = tuple[float, float]
@@ -80,11 +79,3 @@ class _Hover:
 
     def act(self, view: View) -> np.ndarray:
         return np.full(len(view), 4)
-
-
-def test_too_many_communication_slots_are_refused_only_where_ages_are_measured() -> None:
-    slots = MOST_TEETH // 4
-    load_scenario("paper", max_slots=slots, **{"age.measured": True})
-    load_scenario("paper", max_slots=slots + 1)
-    with pytest.raises(InputError, match=f"age.measured: .*allowed: .* <= {MOST_TEETH}"):
-        load_scenario("paper", max_slots=slots + 1, **{"age.measured": True})

@@ -3,11 +3,9 @@
 from typing import Any
 
 import numpy as np
-import pytest
 from scipy.stats import kstest, poisson
 
 from analysis.verification.queues.sources import arrivals_of, integrated
-from dess import InputError
 from dess.scenario import ScenarioSpace, load_scenario
 
 
@@ -37,24 +35,3 @@ def test_a_node_has_its_own_rate() -> None:
     assert len(arrivals_of(space, 0)) == 0
     assert 0.01 < poisson.cdf(len(arrivals_of(space, 1)), 5000) < 0.99
     assert 0.01 < poisson.cdf(len(arrivals_of(space, 2)), 100) < 0.99
-
-
-# --- scenarios ---
-
-
-@pytest.mark.parametrize(
-    ("arrivals", "message"),
-    [
-        ({"process": "slotted", "buffer": 3}, "process: slotted .*allowed: continuous"),
-        ({"process": "slotted", "service": "newest"}, "process: slotted"),
-        ({"rates": [0.1]}, "arrivals.rates: there are 1 rates for 25 nodes"),
-        ({"rates": [-0.1] * 25}, "arrivals.rates"),
-        ({"schedule": [[3, 1], [3, 2]]}, "schedule: slot 3 comes after slot 3"),
-        ({"schedule": [[3, 101]]}, "arrivals.schedule"),
-        ({"buffer": -1}, "arrivals.buffer: -1 is out of range"),
-        ({"process": "poisson"}, "arrivals.process: .* allowed: slotted, continuous"),
-    ],
-)
-def test_arrivals_that_make_no_sense_are_refused(arrivals: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        _space(**arrivals)

@@ -1,6 +1,5 @@
 """Buffers of packets by hand, and against laws of queues."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -8,12 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.sections.buffers import DELIVERED, LOST, PACKET, WAITING, Buffers, teeth_of
+from dess.sections.buffers import PACKET, Buffers, teeth_of
+
+WAITING, DELIVERED, LOST = range(3)
 
 
-def _left(buffers: Buffers) -> list[float | None]:
-    """When each packet left its buffer."""
-    return [None if math.isnan(time) else time for time in buffers.packets["left"].tolist()]
+def _status(buffers: Buffers) -> np.ndarray:
+    """What has become of each packet."""
+    status = np.where(np.isnan(buffers.packets["left"]), WAITING, LOST)
+    status[buffers.delivered] = DELIVERED
+    return status
 
 
 def test_the_newest_packet_is_served_first_by_hand() -> None:
@@ -22,9 +25,9 @@ def test_the_newest_packet_is_served_first_by_hand() -> None:
     buffers.serve(0, 1.0, 0.5)  # half of packet 0
     buffers.store(0, 2.0, 1.0)
     buffers.serve(0, 3.0, 1.0)  # packet 1 goes first; the rest of packet 0 stays
-    assert _left(buffers) == [None, 3.0]
+    assert np.array_equal(buffers.packets["left"], [np.nan, 3.0], equal_nan=True)
     buffers.serve(0, 4.0, 0.5)
-    assert _left(buffers) == [4.0, 3.0]
+    assert buffers.packets["left"].tolist() == [4.0, 3.0]
     assert buffers.delivered == [1, 0]
 
 
@@ -33,8 +36,7 @@ def test_a_full_buffer_refuses_the_new_packet_or_loses_its_oldest_by_hand() -> N
     for buffers, lost in ((refuses, 2), (replaces, 0)):
         assert [buffers.store(0, float(time), 1.0) for time in range(3)] == [-1, -1, lost]
         assert buffers.store(1, 3.0, 1.0) == -1  # the buffer of another node
-        assert buffers.packets["status"][lost] == LOST
-        assert buffers.packets["left"][lost] == 2.0
+        assert _status(buffers)[lost] == LOST and buffers.packets["left"][lost] == 2.0
         assert [*map(len, buffers.queues)] == [2, 1]
         assert (len(buffers.all), buffers.delivered, buffers.lost) == (4, [], 1)
 
@@ -67,14 +69,13 @@ def test_laws_of_every_queue(steps: list[Any], limit: int, newest_first: bool) -
             if lost >= 0:
                 lost_data[k] += buffers.packets["remaining"][lost]
         else:
-            waiting = buffers.packets["status"] == WAITING
-            data = buffers.packets["remaining"][waiting & (buffers.packets["node"] == k)].sum()
+            data = sum(buffers.all[number].remaining for number in buffers.queues[k])
             buffers.serve(k, now, amount)
             served[k] += min(amount, data)
         assert limit == 0 or max(map(len, buffers.queues)) <= limit
     for k in (0, 1):
-        own = buffers.packets[buffers.packets["node"] == k]
-        status = own["status"]
+        of_node = buffers.packets["node"] == k
+        own, status = buffers.packets[of_node], _status(buffers)[of_node]
         assert len(own) == stored[k]
         assert (status == WAITING).sum() == len(buffers.queues[k])
         held = own["remaining"][status == WAITING].sum()
@@ -87,28 +88,15 @@ def test_laws_of_every_queue(steps: list[Any], limit: int, newest_first: bool) -
         if not newest_first:
             order = [n for n in buffers.delivered if buffers.packets["node"][n] == k]
             assert order == sorted(order)
-    assert len(buffers.delivered) == (buffers.packets["status"] == DELIVERED).sum()
-    assert buffers.lost == (buffers.packets["status"] == LOST).sum()
+    assert buffers.lost == (_status(buffers) == LOST).sum()
 
 
 # --- age ---
 
 
-def _done(*deliveries: tuple[int, float, float]) -> np.ndarray:
-    """Delivered packets: (node, generated, delivered)."""
-    packets = np.zeros(len(deliveries), PACKET)
-    for row, values in enumerate(deliveries):
-        packets[["node", "generated", "left"]][row] = values
-    return packets
-
-
-def _teeth(*deliveries: tuple[int, float, float], nodes: int = 1, end: float) -> Any:
-    lows, highs, peaks = teeth_of(_done(*deliveries), nodes, end)
-    return list(zip(lows.tolist(), highs.tolist(), strict=True)), peaks
-
-
 def test_the_sawtooth_of_time_stamps_by_hand() -> None:
     """At 2 the age falls from 2 to 1, at 5 from 4 to 2; older data change nothing."""
-    teeth, peaks = _teeth((0, 1.0, 2.0), (0, 3.0, 5.0), (0, 2.0, 6.0), end=8.0)
-    assert teeth == [(0.0, 2.0), (1.0, 4.0), (2.0, 5.0)]
-    assert peaks == 2
+    done = np.zeros(3, PACKET)
+    done["generated"], done["left"] = [1.0, 3.0, 2.0], [2.0, 5.0, 6.0]
+    lows, highs, peaks = teeth_of(done, 1, 8.0)
+    assert (lows.tolist(), highs.tolist(), peaks) == ([0.0, 1.0, 2.0], [2.0, 4.0, 5.0], 2)

@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from dess import InputError
-from dess.scenario import Scenario, load_scenario
+from dess.scenario import Scenario
 from tests.dess.flights import batteries, flown
 
 # Three UAVs hover in a zone of three cells, far from the only node; all may charge at once.
@@ -76,18 +75,3 @@ def test_a_queue_by_hand(case: str) -> None:
     assert record.pad_requests == requests
     charged = record.uavs["slots_charging"].sum()
     assert record.utilisation == charged / (scenario.pads * record.slots)
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "message"),
-    [
-        ("order", "last-come", "'last-come' is unknown"),
-        ("power", -1, "-1 is out of range; allowed: an integer 0..6,400"),
-        ("power", 1.5, "1.5 is not an integer"),
-        ("measured", "yes", "allowed: true or false"),
-        ("queue", True, "unknown key"),
-    ],
-)
-def test_what_a_scenario_may_not_say(field: str, value: Any, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        load_scenario("paper", **{f"charging.{field}": value})

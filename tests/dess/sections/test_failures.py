@@ -9,9 +9,8 @@ from hypothesis import event, given
 from hypothesis import strategies as st
 from scipy import stats
 
-from dess import InputError
 from dess.mission import simulate
-from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.scenario import Scenario, ScenarioSpace
 from dess.sections.failures import strike
 from dess.state import LOST, constants_of, empty_state
 from dess.view import View
@@ -164,25 +163,3 @@ def test_the_times_to_failure_and_to_repair_are_geometric() -> None:
         seen = np.histogram(times, [*edges, 400])[0]
         expected = -1000 * np.diff([*stats.geom.sf(edges - 1, probability), 0.0])
         assert stats.chisquare(seen, expected).pvalue > 0.01
-
-
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ({"uav_rate": 1.5}, "1.5 is out of range; allowed: a number 0..1"),
-        ({"node_rate": -0.1}, "-0.1 is out of range"),
-        ({"pad_repair": 0.5}, "pad_repair: 0.5 is less than a slot; allowed: 0, or 1 and more"),
-        ({"uav_data": "sold"}, "'sold' is unknown"),
-        ({"rate": 0.1}, "unknown key"),
-    ],
-)
-def test_what_a_scenario_may_not_say(values: dict[str, Any], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        load_scenario("paper", failures=values)
-
-
-def test_only_so_many_pads_can_fail() -> None:
-    values = {"zone": [0, 0, 13, 5], "failures": {"pad_rate": 0.1}}
-    with pytest.raises(InputError, match="pads: 65 are too many to fail; allowed: 64 at most"):
-        load_scenario("paper", **values)
-    load_scenario("paper", **values, pads=64)

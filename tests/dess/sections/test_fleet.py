@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dess import InputError, load_scenario, simulate
+from dess import simulate
 from dess.observations.states import compact_states, masks
 from dess.scenario import ScenarioSpace
 from dess.state import QUOTA, TRUNCATED
@@ -68,13 +68,3 @@ def test_a_uav_on_its_way_is_not_asked_and_may_only_hover() -> None:
     row = ROW | {"zone": [2, 2, 2, 1], "uavs": 2, "max_slots": 3}
     simulate(ScenarioSpace.of(**row, fleet=[{"slots_per_cell": 2}, {}]), Spy("S..", "..."), 1)
     assert seen == [([0, 1], [5, 5]), ([1], [1, 5]), ([0, 1], [5, 5])]
-
-
-def test_what_is_no_fleet_is_refused() -> None:
-    for kind in ({"slots_per_cell": 9}, {"quota": 0}, {"rate": 0}, {"flying_time": 101}):
-        (field,) = kind
-        with pytest.raises(InputError, match=field):
-            load_scenario("paper", fleet=[kind])
-    speeds = [{"slots_per_cell": s} for s in (5, 7, 8)]
-    with pytest.raises(InputError, match="fleet: slots_per_cell"):
-        load_scenario("paper", grid=256, communication_slots=64, nodes=[[0, 0]], fleet=speeds)

@@ -1,25 +1,29 @@
 """The constants of a scenario that are never sampled, with their limits, and its sections."""
 
-from typing import Annotated, Any
+from collections import Counter
+from collections.abc import Iterator
+from typing import Annotated, Any, Self
 
 import tomli_w
 from pydantic import (
     BaseModel,
-    ConfigDict,
+    BeforeValidator,
     Field,
     SerializerFunctionWrapHandler,
     TypeAdapter,
-    field_validator,
+    ValidationError,
     model_serializer,
+    model_validator,
 )
 
+from dess.errors import InputError, validation_line
 from dess.sea import Cell
-from dess.sections.age import Age
+from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
-from dess.sections.failures import Failures
-from dess.sections.fleet import UavType
-from dess.sections.section import Integer, Number, Section, tuples
+from dess.sections.failures import MOST_PADS, Failures
+from dess.sections.fleet import UavType, legs, places_per_slot
+from dess.sections.section import Integer, Number, Section, Strict
 from dess.sections.wind import Wind
 
 # Section VI-A: all combinations of five columns and five rows.
@@ -28,6 +32,16 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 # The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
 MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
 
+# Largest amount of initial data of a node [data units].
+MOST_DATA = 10**9
+
+# Largest number of packets of a mission with continuous arrivals, at their highest rate: some 70
+# bytes each, and less than a second of compiled code to draw them all.
+MOST_PACKETS = 2_000_000
+
+# Largest number of entries in the channel's table (dess.channel): 8 GiB if all of it were filled.
+MOST_ENTRIES = 2**30
+
 # The fields that go beyond the paper.
 EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 
@@ -35,10 +49,17 @@ EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
 Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
 
 
-class Constants(BaseModel):
-    """The constants that are never sampled: the common base of both kinds of scenario."""
+def is_number(value: Any) -> bool:
+    """Whether a value is an integer or a float, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+# Lets a single number stand for a range of one element.
+AS_RANGE = BeforeValidator(lambda value: (value, value) if is_number(value) else value)
+
+
+class Constants(Strict):
+    """The constants that are never sampled: the common base of both kinds of scenario."""
 
     # World
     grid: Integer = Field(
@@ -95,7 +116,7 @@ class Constants(BaseModel):
     )
 
     # Data
-    initial_data: tuple[Number, Number] = Field(
+    initial_data: Annotated[tuple[Number, Number], AS_RANGE] = Field(
         (5.0, 20.0), description="initial data per node [data units]: a number or [low, high]"
     )
     arrival_rate: Number = Field(
@@ -137,15 +158,27 @@ class Constants(BaseModel):
         values = handler(self)
         return {n: v for n, v in values.items() if n not in EXTENSIONS or self.has(n)}
 
-    @field_validator("nodes", "zone", "fleet", mode="before")
-    @classmethod
-    def _lists_to_tuples(cls, value: Any) -> Any:
-        return tuples(value)
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Self:
+        for problem in self._problems():
+            raise ValueError(problem)
+        return self
 
-    @field_validator("initial_data", mode="before")
+    def _problems(self) -> Iterator[str]:
+        """What does not fit together, as no field can check alone."""
+        yield from _off_the_grid(self)
+        yield from _too_large(self)
+        yield from _unfit(self)
+
     @classmethod
-    def _number_to_range(cls, value: Any) -> Any:
-        return (value, value) if is_number(value) else tuples(value)
+    def of(cls, scenario: "Constants | None" = None, **values: Any) -> Self:
+        """A scenario of the given values, on top of another one (default: the paper's).
+
+        Raises:
+            InputError: For unknown keys, wrong types and values out of range.
+        """
+        base = scenario.model_dump() if scenario is not None else {}
+        return validated(cls, merged(base, values), "scenario")
 
     @property
     def zone_cells(self) -> int:
@@ -195,6 +228,88 @@ class Constants(BaseModel):
         return tomli_w.dumps(self.model_dump(mode="json", exclude_none=True))
 
 
-def is_number(value: Any) -> bool:
-    """Whether a value is an integer or a float, and no truth value."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def merged(base: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
+    """Values on top of others; ``failures.uav_rate`` and a table replace parts of a section."""
+    result: dict[str, Any] = {}
+    for name, value in (dotted(base) | dotted(values)).items():
+        section, _, part = name.partition(".")
+        table = result.setdefault(section, {}) if part and section in EXTENSIONS else None
+        if isinstance(table, dict):
+            table[part] = value
+        else:
+            result[name] = value
+    return result
+
+
+def dotted(values: dict[str, Any]) -> dict[str, Any]:
+    """Values by field: the table of a section becomes fields such as ``failures.uav_rate``."""
+    fields: dict[str, Any] = {}
+    for name, value in values.items():
+        if name in EXTENSIONS and isinstance(value, dict):
+            fields |= {f"{name}.{part}": of_part for part, of_part in value.items()}
+        else:
+            fields[name] = value
+    return fields
+
+
+def validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any:
+    """The model of these values.
+
+    Raises:
+        InputError: If they are not valid; ``where`` is their name or path.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        raise InputError(validation_line(error, where, model)) from None
+
+
+def _off_the_grid(c: Constants) -> Iterator[str]:
+    (x, y, width, height), grid = c.zone, c.grid
+    if min(x, y) < 0 or min(width, height) < 1 or max(x + width, y + height) > grid:
+        yield (
+            f"zone: {[*c.zone]} does not lie on the {grid} x {grid} grid; "
+            "allowed: [x, y, width, height] with 0 <= x, y and x + width, y + height <= grid"
+        )
+    for node, count in Counter(c.nodes).items():
+        if not all(0 <= coordinate < grid for coordinate in node):
+            yield f"nodes: {[*node]} is off the grid; allowed: 0 <= x, y < {grid}"
+        if count > 1:
+            yield f"nodes: {[*node]} is listed twice; allowed: distinct cells"
+
+
+def _too_large(c: Constants) -> Iterator[str]:
+    """The tables of a mission fit into memory."""
+    ways = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet))
+    if c.grid**2 * c.communication_slots * ways > MOST_ENTRIES:
+        yield (
+            "grid, nodes, communication_slots, fleet: too large together; allowed: 5 * grid^2 * "
+            f"nodes * communication_slots <= {MOST_ENTRIES}, and less with slots_per_cell"
+        )
+    has_teeth = c.age.measured and not c.needs_events
+    if has_teeth and c.max_slots * c.communication_slots > MOST_TEETH:
+        yield (
+            "age.measured: the mission has too many communication slots; allowed: "
+            f"max_slots * communication_slots <= {MOST_TEETH}"
+        )
+    if c.packets > MOST_PACKETS:
+        yield (
+            f"arrivals: {c.packets:,.0f} packets at the highest rate; allowed: "
+            f"{MOST_PACKETS:,} at most (rates of all nodes * highest factor * max_slots)"
+        )
+
+
+def _unfit(c: Constants) -> Iterator[str]:
+    """The rates, the pads and the initial data fit to the nodes and the zone."""
+    rates, (low, high) = c.arrivals.rates, c.initial_data
+    if rates and len(rates) != len(c.nodes):
+        yield f"arrivals.rates: there are {len(rates)}; allowed: {len(c.nodes)}, a rate per node"
+    if c.charging_pads > c.zone_cells:
+        yield f"pads: {c.pads} is more than the zone has cells; allowed: 1..{c.zone_cells}"
+    if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
+        yield f"pads: {c.charging_pads} are too many to fail; allowed: {MOST_PADS} at most"
+    if not 0 <= low <= high <= MOST_DATA:
+        yield (
+            f"initial_data: {[low, high]} is not a range; allowed: a number 0..{MOST_DATA:,} "
+            f"or [low, high] with 0 <= low <= high <= {MOST_DATA:,}"
+        )

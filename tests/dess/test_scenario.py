@@ -1,0 +1,231 @@
+"""Scenarios: TOML in and out, refusals in one clear line, and the draws of a space."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dess import InputError, streams
+from dess.channel import world_of
+from dess.files.parsing import parse_toml
+from dess.scenario import SAMPLED, Scenario, ScenarioSpace, load_scenario, scenario_names
+from dess.sections.age import MOST_TEETH
+from dess.state import check_seed, constants_of, sample_scenario, spaces_of
+from tests.drawn import continuous_spaces, extended_spaces, replications, scenarios, seeds, spaces
+
+
+@given(spaces() | extended_spaces() | continuous_spaces())
+def test_a_space_survives_toml(space: ScenarioSpace) -> None:
+    assert ScenarioSpace.of(**parse_toml(space.to_toml(), "text")) == space
+
+
+def test_the_shipped_scenarios_are_the_papers_and_a_bay() -> None:
+    assert scenario_names() == ["bay", "fig1", "fig4", "paper"]
+    paper, fig4 = load_scenario("paper"), load_scenario("fig4")
+    assert paper == ScenarioSpace.of()  # Section VI-A, Table II and Table III are the defaults
+    assert (paper.uavs, paper.initial_data, paper.flying_time) == ((1, 3), (5.0, 20.0), (70, 80))
+    assert (paper.charge_start, paper.charge_complete) == ((10, 50), (60, 100))
+    assert (fig4.uavs, fig4.initial_data, fig4.flying_time) == ((1, 3), (12.5, 12.5), (80, 80))
+    assert (fig4.charge_start, fig4.charge_complete) == ((30, 30), (80, 80))
+    assert (paper.grid, paper.cell_size, paper.altitude, paper.max_slots) == (32, 800, 10, 500)
+    assert (paper.communication_slots, paper.quota, paper.arrival_rate) == (4, 440, 0.02)
+    assert (paper.path_loss_exponent, paper.shadowing_variance) == (2.27, 2.0)
+    assert (paper.zone, paper.charging_pads, len(paper.nodes)) == ((26, 2, 4, 4), 16, 25)
+    rewards = {name: value for name, value in paper if name.startswith("reward")}
+    assert [*rewards.values()] == [1.3, -1.0, -300.0, 0.05, 100.0, -0.1]
+
+
+# --- refusals ---
+
+SPEEDS = [{"slots_per_cell": s} for s in (5, 7, 8)]
+FAILING = {"failures.pad_rate": 0.1}
+# Fields of the paper's scenario, and what the message says of the last of them, and allows.
+REFUSED: list[tuple[dict[str, Any], str, str]] = [
+    ({"speed": 3}, "unknown key", ""),
+    *(({"uavs": value}, "", "") for value in (2.0, True, "2", [1, 2, 3])),
+    *(({"uavs": value}, "", "1..16 (cells of the zone") for value in (0, 17, [3, 1])),
+    *(({"grid": value}, "is not an integer", "2..256") for value in ("32", 32.0)),
+    ({"grid": 1}, "1 is out of range", "2..256"),
+    ({"cell_size": 0}, "out of range", "0.01..100,000"),
+    ({"cell_size": True}, "is not a number", ""),
+    ({"altitude": float("inf")}, "out of range", ""),
+    ({"edge_snr": float("nan")}, "out of range", ""),
+    ({"nodes": []}, "too short", "[x, y] for each (of length 1..1,024)"),
+    ({"nodes": [[1, 2, 3]]}, "too long", ""),
+    ({"nodes": [[1.5, 2]]}, "1.5 is not an integer", ""),
+    ({"nodes": [[0, 0], [32, 0]]}, "[32, 0] is off the grid", "0 <= x, y < 32"),
+    ({"nodes": [[0, -1]]}, "[0, -1] is off the grid", ""),
+    ({"nodes": [[4, 5], [6, 7], [4, 5]]}, "[4, 5] is listed twice", "distinct"),
+    *(({"zone": zone}, f"{zone}", "x + width") for zone in ([29, 2, 4, 4], [0, 0, 0, 4])),
+    ({"zone": [-1, 2, 4, 4]}, "[-1, 2, 4, 4]", "0 <= x"),
+    ({"zone": [1, 2, 3]}, "too short", ""),
+    ({"pads": 17}, "17 is more than the zone has cells", "1..16"),
+    ({"pads": 0}, "out of range", "an integer from 1"),
+    ({"forbid_swaps": 1}, "1 is not a truth value", "true or false"),
+    ({"initial_data": -1}, "is not a range", "0 <= low <= high"),
+    ({"initial_data": [5, 4]}, "is not a range", "0 <= low <= high"),
+    ({"initial_data": True}, "True", ""),
+    ({"flying_time": [0, 5]}, "[0, 5] is out of range", "1..100"),
+    ({"flight_cost": 2}, "out of range", "0..1"),
+    ({"charge_start": 60}, "60 is not below charge_complete 60", "eq. 1"),
+    ({"charge_start": [10, 70]}, "70 is not below charge_complete 60", ""),
+    ({"grid": 256, "nodes": [[0, 0]], "fleet": SPEEDS, "communication_slots": 64}, "", "<= 1"),
+    ({"max_slots": MOST_TEETH // 4 + 1, "age.measured": True}, "too many", f"<= {MOST_TEETH}"),
+    ({"arrivals": {"buffer": 3}}, "slotted arrivals have no", "continuous"),
+    ({"arrivals": {"service": "newest"}}, "slotted arrivals have no", "continuous"),
+    ({"arrivals": {"process": "poisson"}}, "'poisson' is unknown", "slotted, continuous"),
+    ({"arrivals": {"process": "continuous", "rates": [0.1]}}, "there are 1", "25"),
+    ({"arrivals": {"process": "continuous", "rates": [-0.1] * 25}}, "out of range", ""),
+    ({"arrivals": {"process": "continuous", "schedule": [[3, 1], [3, 2]]}}, "slot 3 comes", ""),
+    ({"arrivals": {"process": "continuous", "schedule": [[3, 101]]}}, "", ""),
+    ({"arrivals.process": "continuous", "arrival_rate": 99, "max_slots": 1000}, "packets", ""),
+    ({"charging.order": "last-come"}, "'last-come' is unknown", "first-come, lowest-battery"),
+    ({"charging.power": -1}, "out of range", "an integer 0..6,400"),
+    ({"charging.measured": "yes"}, "", "true or false"),
+    ({"charging.queue": True}, "unknown key", ""),
+    ({"failures.uav_rate": 1.5}, "1.5 is out of range", "a number 0..1"),
+    ({"failures.pad_repair": 0.5}, "0.5 is less than a slot", "0, or 1 and more"),
+    (FAILING | {"zone": [0, 0, 13, 5]}, "65 are too many to fail", "64 at most"),
+    ({"wind": 3}, "3 is not a table", ""),
+    ({"fleet": [{"slots_per_cell": 9}]}, "", "1..8"),
+]
+
+
+@pytest.mark.parametrize(("values", "problem", "allowed"), REFUSED, ids=lambda v: str(v)[:40])
+def test_bad_values_are_refused_in_one_line(values: dict, problem: str, allowed: str) -> None:
+    with pytest.raises(InputError) as error:
+        load_scenario("paper", **values)
+    line = str(error.value)
+    assert re.match(r"scenario paper: [\w., ]+: \S", line) and "\n" not in line
+    told, _, end = line.partition("; allowed: ")
+    assert problem in told and allowed in end
+
+
+def test_what_just_fits_is_allowed() -> None:
+    load_scenario("paper", max_slots=MOST_TEETH // 4, **{"age.measured": True})
+    load_scenario("paper", zone=[0, 0, 13, 5], pads=64, **FAILING)
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"uavs = 1\nuavs = 2\n", "not valid TOML"),
+        (b"\xff\xfe\x00", "cannot be read"),
+        (b"quotas = 3\n", "quotas: unknown key"),
+    ],
+)
+def test_bad_files_are_named(tmp_path: Path, content: bytes, complaint: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=f"^{path}: {complaint}.*$"):
+        load_scenario(path)
+
+
+def test_missing_scenarios_are_refused() -> None:
+    with pytest.raises(InputError, match="allowed: bay, fig1, fig4, paper, or a TOML file"):
+        load_scenario("none")
+    with pytest.raises(InputError, match=r"no such scenario \(did you mean paper\?\)"):
+        load_scenario("papper")
+
+
+@pytest.mark.parametrize("values", [(-1, 0), (2**64, 0), (0, -1), (0, 2**32)])
+def test_seeds_off_the_counter_are_refused(values: tuple[int, int]) -> None:
+    with pytest.raises(InputError, match="out of range; allowed: 0.."):
+        check_seed(*values)
+    check_seed(streams.MAX_SEED, streams.MAX_REPLICATION)
+
+
+# --- sampling ---
+
+
+def test_both_ends_of_every_range_are_drawn_about_equally_often() -> None:
+    space = load_scenario("paper")
+    drawn = [sample_scenario(space, 11, replication) for replication in range(3000)]
+    for name in SAMPLED:
+        low, high = getattr(space, name)
+        counts = np.bincount([getattr(scenario, name) - low for scenario in drawn])
+        assert len(counts) == high - low + 1
+        expected = len(drawn) / len(counts)
+        # 5 standard deviations of a binomial count: about 1e-6 per value.
+        assert abs(counts - expected).max() < 5 * np.sqrt(expected)
+
+
+@given(spaces(), seeds, replications, st.sampled_from(SAMPLED))
+def test_fixing_one_field_leaves_the_other_draws(
+    space: ScenarioSpace, seed: int, replication: int, name: str
+) -> None:
+    free = sample_scenario(space, seed, replication)
+    assert sample_scenario(spaces_of([free])[0], seed, replication) == free
+    fixed = ScenarioSpace.of(space, **{name: getattr(space, name)[1]})
+    drawn = sample_scenario(fixed, seed, replication)
+    for other in SAMPLED:
+        low, high = getattr(space, other)
+        assert low <= getattr(free, other) <= high
+        assert getattr(drawn, other) == (high if other == name else getattr(free, other))
+
+
+# --- the arrays made of it ---
+
+
+@given(scenarios())
+def test_constants_are_the_scenarios(scenario: Scenario) -> None:
+    (space,) = spaces_of([scenario])
+    (mission,) = constants_of(space)
+    for name in set(mission.dtype.names) & set(Scenario.model_fields) - {"nodes", "pads"}:
+        assert mission[name] == getattr(scenario, name)
+    assert mission["nodes"] == len(scenario.nodes)
+    assert mission["pads"] == (scenario.pads or scenario.zone[2] * scenario.zone[3])
+    zone = [mission[f"zone_{name}"] for name in ("x", "y", "width", "height")]
+    assert tuple(zone) == scenario.zone
+    assert (mission["initial_low"], mission["initial_high"]) == scenario.initial_data
+    length = scenario.slot_length / scenario.communication_slots
+    assert mission["communication_slot_length"] == length
+    assert mission["shadowing_deviation"] == pytest.approx(scenario.shadowing_variance**0.5)
+
+
+@given(scenarios(), st.data())
+def test_the_path_loss_table_is_eq_10(scenario: Scenario, data: st.DataObject) -> None:
+    m, grid, size = scenario.communication_slots, scenario.grid, scenario.cell_size
+    coarse = data.draw(st.integers(0, grid - 1))
+    fine = data.draw(st.integers(0, m * (grid - 1)))
+    distance = np.linalg.norm([size * coarse, size * fine / m, scenario.altitude])
+    edge = np.sqrt(2) / 2 * grid * size
+    snr = 10 ** (scenario.edge_snr / 10) * (distance / edge) ** -scenario.path_loss_exponent
+    table = world_of(spaces_of([scenario])[0]).mean_snr
+    assert table[coarse, fine] == pytest.approx(10 * np.log10(snr), abs=1e-9)
+
+
+# --- limits ---
+
+
+def test_values_at_the_limits_are_allowed_and_those_beyond_are_not() -> None:
+    space = ScenarioSpace.of(charge_start=10, charge_complete=100)
+    fields = (*SAMPLED, "pads", "quota", "arrival_rate", "communication_slots", "edge_snr")
+    for field in fields:
+        low, high = space.limits(field)
+        kind = type(getattr(space, field)[0] if field in SAMPLED else getattr(space, field) or 1)
+        for allowed in (low, high):
+            if (field, allowed) not in {("charge_start", 100), ("charge_complete", 10)}:
+                ScenarioSpace.of(space, **{field: kind(allowed)})
+        for refused in (low - 1, high + 1):
+            with pytest.raises(InputError, match=field):
+                ScenarioSpace.of(space, **{field: kind(refused)})
+
+
+def test_no_number_of_a_scenario_is_minus_zero() -> None:
+    """Compiled code divides by rates, and by -0.0 with another result than by 0.0."""
+    space = load_scenario("paper")
+    values: dict[str, Any] = {
+        name: -0.0
+        for name in space.numeric
+        if space.limits(name)[0] <= 0 and isinstance(space.value(name), float)
+    }
+    assert {"arrival_rate", "shadowing_variance", "wind.direction", "failures.uav_rate"} < {*values}
+    values |= {"initial_data": [-0.0, -0.0], "arrivals.process": "continuous"}
+    values |= {"arrivals.rates": [-0.0] * 25, "arrivals.schedule": [[-0.0, -0.0], [5, 1]]}
+    dumped = ScenarioSpace.of(space, **values).model_dump_json()
+    assert "-0.0" not in dumped and '"schedule":[[0.0,0.0],[5.0,1.0]]' in dumped
