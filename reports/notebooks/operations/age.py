@@ -22,19 +22,19 @@ from pathlib import Path
 
 from analysis import load_results, names, numbers
 from analysis.figures.settings import lines
-from analysis.questions.operations import answers, effects
+from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
 # %%
 study = load_results(Path(results) / "age")
 ages = [names.AGE, "peak_age", "age_p99"]
-means = effects.means(study, [*ages, names.RATIO])
+means = operations.means(study, [*ages, names.RATIO])
 missions, level = numbers.span(means["n"]), numbers.level(LEVEL)
 rates = "arrival_rate"
 
 # %%
-html.say("{answer}", answer=html.composed(answers.age(study)))
+html.say("{answer}", answer=html.composed(operations.age(study)))
 
 # %% [markdown]
 # ## What was simulated
@@ -72,9 +72,9 @@ html.gallery(
 # for the distance, `age` by their age for the distance.
 
 # %%
-change = answers.age_changes(study)
+change = operations.age_changes(study)
 html.table(
-    effects.listed(change, None, ["policy", "uavs"], rates, answers.relative),
+    operations.listed(change, ["policy", "uavs"], rates, operations.relative),
     f"Change of the average age of information from one UAV, with {level} intervals of the ratio "
     "of means over common replications, by arrival rate",
     data=change,
@@ -85,7 +85,9 @@ html.table(
 
 # %%
 html.table(
-    effects.listed(means, names.AGE, ["policy", "uavs"], rates),
+    operations.listed(
+        means[means["metric"] == names.AGE], ["policy", "uavs"], rates, numbers.quantities
+    ),
     f"{names.metric_label(names.AGE)}: means with {level} intervals, by arrival rate",
     data=means,
 )

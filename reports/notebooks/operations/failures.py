@@ -24,7 +24,7 @@ from IPython.display import display
 
 from analysis import load_results, names, numbers
 from analysis.figures.settings import lines
-from analysis.questions.operations import answers, effects
+from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -33,13 +33,13 @@ study = load_results(Path(results) / "failures")
 columns = [c for c in ("failures", "slots_grounded", "lost") if c in study.missions]
 counts = [c for c in columns if study.missions[c].max() > 0]
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
-means = effects.means(study, [*metrics, *counts])
+means = operations.means(study, [*metrics, *counts])
 missions = numbers.span(means.loc[means["metric"].isin(metrics), "n"])
 level = numbers.level(LEVEL)
-rate, repair = answers.RATE, answers.REPAIR
+rate, repair = operations.RATE, operations.REPAIR
 
 # %%
-html.say("{answer}", answer=html.composed(answers.failures(study)))
+html.say("{answer}", answer=html.composed(operations.failures(study)))
 
 # %% [markdown]
 # ## What was simulated
@@ -70,13 +70,13 @@ html.gallery(
 display(
     *(
         html.table(
-            effects.listed(change, None, ["policy", "uavs", repair], rate, numbers.points),
+            operations.listed(change, ["policy", "uavs", repair], rate, numbers.points),
             f"{names.metric_name(metric)} minus that without failures: paired differences in "
             f"percentage points with {level} intervals, by failure rate per mission slot",
             data=change,
         )
         for metric in metrics
-        for change in [effects.changes(study, rate, 0.0, metric)]
+        for change in [operations.changes(study, rate, 0.0, metric)]
     )
 )
 
@@ -87,11 +87,12 @@ display(
 display(
     *(
         html.table(
-            effects.listed(means, metric, ["policy", "uavs", repair], rate),
+            operations.listed(rows, ["policy", "uavs", repair], rate, numbers.quantities),
             f"{names.metric_label(metric)} per mission: means with {level} intervals, by failure "
             "rate per mission slot; nothing where nothing can fail",
         )
         for metric in counts
+        for rows in [means[means["metric"] == metric]]
     )
 )
 

@@ -26,7 +26,7 @@ from IPython.display import display
 from analysis import load_results, names, numbers
 from analysis.figures.learning import courses
 from analysis.figures.settings import lines
-from analysis.questions.operations import answers, effects, queue
+from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -34,12 +34,12 @@ from reports.pages import html
 study = load_results(Path(results) / "pads")
 uses = ["waiting", "queue", names.UTILISATION]
 metrics = [names.SUCCESS, names.PRODUCT, *uses]
-means = effects.means(study, metrics)
+means = operations.means(study, metrics)
 missions = numbers.span(means["n"])
 level = numbers.level(LEVEL)
 
 # %%
-html.say("{answer}", answer=html.composed(answers.pads(study, margin)))
+html.say("{answer}", answer=html.composed(operations.pads(study, margin)))
 
 # %% [markdown]
 # ## What was simulated
@@ -66,9 +66,9 @@ drawn = [
 html.gallery(drawn[:2])
 
 # %%
-lost = effects.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
+lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
 html.table(
-    effects.listed(lost, None, ["policy", "pads"], "uavs", numbers.points),
+    operations.listed(lost, ["policy", "pads"], "uavs", numbers.points),
     "Collection ratio and communication with fewer pads, minus that with the most pads: paired "
     f"differences in percentage points with {level} intervals, by number of UAVs",
     data=lost,
@@ -92,8 +92,8 @@ html.gallery(drawn[2:])
 # number of pads that is not enough.
 
 # %%
-waves = queue.over_time(study, study.policies[0], answers.short_of_pads(study, margin))
-low, high = map(numbers.level, queue.BAND)
+waves = operations.queues(study, study.policies[0], operations.short_of_pads(study, margin))
+low, high = map(numbers.level, operations.BAND)
 titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in waves["uavs"].unique()}
 html.figure(
     courses(waves.assign(panel=waves["uavs"]), "pads", "", titles, "Number of charging pads"),
@@ -107,10 +107,11 @@ html.figure(
 display(
     *(
         html.table(
-            effects.listed(means, metric, ["policy", "pads"], "uavs"),
+            operations.listed(rows, ["policy", "pads"], "uavs", numbers.written(metric)),
             f"{names.metric_label(metric)}: means with {level} intervals, by number of UAVs",
         )
         for metric in uses
+        for rows in [means[means["metric"] == metric]]
     )
 )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis import load_results
-from analysis.questions.operations import answers, queue
+from analysis.questions import operations
 from tests.by_hand import bounded
 from tests.reports.small import run_small_studies, said_by, words
 
@@ -19,7 +19,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_on_pads(results: Path) -> None:
     text = said_by("pads", results=str(results), margin=0.1)
     study = load_results(results / "pads")
-    assert text.lstrip().startswith(words(answers.pads(study, 0.1)).replace("`", "")[:40])
+    assert text.lstrip().startswith(words(operations.pads(study, 0.1)).replace("`", "")[:40])
     values = study.missions.query("uavs == 4 and pads == 1")["utilisation"].to_numpy()
     mean, low, high = bounded(values)
     assert f"{mean:.4g} [{low:.4g}, {high:.4g}]" in text
@@ -47,7 +47,7 @@ def test_the_page_on_failures(results: Path) -> None:
 
 def test_the_queue_of_the_logs_is_that_of_the_records(results: Path) -> None:
     study = load_results(results / "pads")
-    table = queue.over_time(study, "greedy", [3]).set_index("slot")  # four UAVs, one pad
+    table = operations.queues(study, "greedy", [3]).set_index("slot")  # four UAVs, one pad
     missions = study.missions.query("point == 3 and replication < 2")
     assert len(table) == missions["slots"].max()
     waited = (missions["queue"] * missions["slots"]).sum() / 2
