@@ -2,7 +2,7 @@
 
     results = load_results("results/fleets")  # of a study with a table [costs]
     front(results, "success")  # cost and success, with the probability of being on the front
-    judged(results, {"success": 0.99})  # which settings meet that, and the cheapest of them
+    judged(results)  # of a search for the cheapest setting: which settings meet the requirements
 
 A setting is a policy at a design point. The fields that an operator decides on, such as the numbers
 of UAVs and pads, make up the fleet. All other fields that the design varies are conditions under
@@ -22,13 +22,19 @@ from analysis.names import COST, DECISIONS, METRICS, SUCCESS, parameter, value_t
 from analysis.questions.settings import points, ranked
 from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
-from analysis.study.cheapest import Cheapest
+from analysis.study.cheapest import Cheapest, CheapestChoice
 from analysis.study.costs import PARTS, Costs
 from dess.errors import InputError, one_of
 
-MET, MISSED, OPEN = "met", "missed", "open"
+MISSED, OPEN, MET = "missed", "open", "met"  # the most serious first
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables
+EVERYWHERE = "all conditions"
 _UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
+_WHY_NOT = {
+    MET: "meets the requirements as well, and saves less than the indifference",
+    OPEN: "is not known to meet the requirements",
+    MISSED: "misses the requirements",
+}
 
 
 def priced(results: Results) -> pd.DataFrame:
@@ -44,13 +50,11 @@ def priced(results: Results) -> pd.DataFrame:
     """
     _prices(results)
     table = ranked(results, COST).drop(columns=["rank", "tied"])
-    words = {name: _words(results, name == "fleet") for name in ("condition", "fleet")}
-    for place, (name, texts) in enumerate(words.items()):
-        table.insert(place, name, [texts[point] for point in table["point"]])
-    order = {text: number for number, text in enumerate(dict.fromkeys(words["condition"]))}
-    return table.sort_values("condition", key=lambda c: c.map(order), kind="stable").reset_index(
-        drop=True
-    )
+    conditions, fleets = _conditions(results), _fleets(results)
+    table.insert(0, "condition", [conditions[point] for point in table["point"]])
+    table.insert(1, "fleet", [fleets[point] for point in table["point"]])
+    order = {"kind": "stable", "key": lambda texts: texts.map(conditions.index)}
+    return table.sort_values("condition", ignore_index=True, **order)
 
 
 def parts(results: Results) -> pd.DataFrame:
@@ -66,8 +70,7 @@ def parts(results: Results) -> pd.DataFrame:
     prices, missions = _prices(results), results.missions
     amounts = prices.parts(results.store.manifest.scenarios, missions, results.uavs)
     table = missions[["policy", "point", COST]].assign(**amounts)
-    means = table.groupby(["policy", "point"], sort=False)[[*PARTS, COST]].mean()
-    return means.reset_index()
+    return table.groupby(["policy", "point"], sort=False, as_index=False)[[*PARTS, COST]].mean()
 
 
 def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
@@ -97,42 +100,24 @@ def front(results: Results, metric: str = SUCCESS) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def judged(results: Results, requirements: Mapping[str, float] | None = None) -> pd.DataFrame:
-    """Which settings meet requirements, and the cheapest of these under each condition.
+def judged(results: Results) -> pd.DataFrame:
+    """Which settings meet the requirements, and the cheapest of these under each condition.
 
     Args:
-        results: The study.
-        requirements: For each required metric its lowest acceptable mean, between 0 and 1. By
-            default those of the study's selection.
+        results: A study that searches for the cheapest setting.
 
     Returns:
         The rows of ``priced`` with two more columns: ``verdict`` (``met``, ``missed`` or ``open``),
         and ``selected``, which is true for the cheapest setting of each policy under each condition
-        whose verdict is ``met``. Both are those of the study's selection, with its guarantee. For
-        other requirements they follow from the 95 % intervals: met if all intervals are completely
-        above the requirements, missed if one is completely below.
-
-    Raises:
-        InputError: If the study has no prices, or the requirements are missing or not allowed.
+        whose verdict is ``met``. Both have the guarantee of the search.
     """
-    rule, table = results.store.manifest.selection, priced(results)
-    if isinstance(rule, Cheapest) and requirements in (None, rule.requirements):
-        choices = {policy: results.cheapest(policy) for policy in results.policies}
-        verdicts, selected = [], []
-        for policy, point in zip(table["policy"], table["point"], strict=True):
-            choice = choices[policy]
-            assert choice is not None
-            verdicts.append(choice.verdicts[point])
-            at_conditions = [a.points for a in choice.answers if a.condition is not None]
-            selected.append((point,) in at_conditions)
-        return table.assign(verdict=verdicts, selected=selected)
-    wanted = _checked(requirements)
-    above = [table[f"{metric}_low"] >= least for metric, least in wanted.items()]
-    below = [table[f"{metric}_high"] < least for metric, least in wanted.items()]
-    met, missed = np.logical_and.reduce(above), np.logical_or.reduce(below)
-    table = table.assign(verdict=np.select([met, missed], [MET, MISSED], OPEN))
-    best = table[met].drop_duplicates(["condition", "policy"]).index
-    return table.assign(selected=table.index.isin(best))
+    tables = []
+    for policy, rows in priced(results).groupby("policy", sort=False):
+        choice = _choice(results, str(policy))
+        selected = [a.points[0] for a in choice.answers if a.condition is not None and a.points]
+        verdicts = rows["point"].map(dict(enumerate(choice.verdicts)))
+        tables.append(rows.assign(verdict=verdicts, selected=rows["point"].isin(selected)))
+    return pd.concat(tables).sort_index()
 
 
 def checks(results: Results) -> pd.DataFrame:
@@ -161,40 +146,28 @@ def everywhere(results: Results, table: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for (policy, fleet), part in table.groupby(["policy", "fleet"], sort=False):
         if len(part) == conditions > 1:
-            verdicts = {*part["verdict"]}
-            verdict = next(v for v in (MISSED, OPEN, MET) if v in verdicts)
-            rows.append((policy, fleet, part[COST].mean(), verdict, {*part["point"]}))
-    fleets = pd.DataFrame(rows, columns=["policy", "fleet", COST, "verdict", "points"])
-    fleets = fleets.sort_values(COST, kind="stable", ignore_index=True)
-    choices = {policy: results.cheapest(policy) for policy in fleets["policy"].unique()}
-    if any(choices.values()):
-        last = {name: {*choice.answers[-1].points} for name, choice in choices.items() if choice}
-        selected = [row.points == last[str(row.policy)] for row in fleets.itertuples()]
-    else:
-        best = fleets[fleets["verdict"] == MET].drop_duplicates("policy").index
-        selected = fleets.index.isin(best).tolist()
-    return fleets.drop(columns="points").assign(selected=selected)
+            verdict = min(part["verdict"], key=[MISSED, OPEN, MET].index)
+            selected = {*_choice(results, policy).answers[-1].points} == {*part["point"]}
+            rows.append((policy, fleet, part[COST].mean(), verdict, selected))
+    fleets = pd.DataFrame(rows, columns=["policy", "fleet", COST, "verdict", "selected"])
+    return fleets.sort_values(COST, kind="stable", ignore_index=True)
 
 
-def answers(
-    results: Results, table: pd.DataFrame, requirements: Mapping[str, float] | None = None
-) -> list[str]:
+def answers(results: Results, table: pd.DataFrame) -> list[str]:
     """In words: the cheapest setting for each policy and condition, and why no cheaper one.
 
     Args:
         results: The study.
         table: The result of ``judged``.
-        requirements: As for ``judged``.
     """
     rule, currency = results.store.manifest.selection, _prices(results).currency
-    given = requirements or (rule.requirements if isinstance(rule, Cheapest) else {})
-    wanted, sentences = {str(metric): least for metric, least in given.items()}, []
-    for (condition, policy), rows in table.groupby(["condition", "policy"], sort=False):
-        where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
-        sentences.append(f"{_capital(where)}: {_answer(rows, wanted, currency)}")
-    for policy, fleets in everywhere(results, table).groupby("policy", sort=False):
-        text = _answer_everywhere(fleets, table[table["policy"] == policy], currency)
-        sentences.append(f"All conditions together, `{policy}`: {text}")
+    wanted = rule.requirements if isinstance(rule, Cheapest) else {}
+    together = everywhere(results, table).assign(condition=EVERYWHERE)
+    sentences = []
+    for rows, required in ((table, wanted), (together, {})):
+        for (condition, policy), part in rows.groupby(["condition", "policy"], sort=False):
+            where = f"{condition}, `{policy}`" if condition else f"`{policy}`"
+            sentences.append(f"{where[:1].upper()}{where[1:]}: {_answer(part, required, currency)}")
     return sentences
 
 
@@ -207,105 +180,54 @@ def selections(results: Results) -> pd.DataFrame:
         conditions), ``setting`` (the fleet in words), ``missions`` of the policy, ``left`` (number
         of settings that may be as good), ``guaranteed`` and ``guarantee``.
     """
-    conditions, fleets = (_words(results, decisions) for decisions in (False, True))
+    conditions, fleets = [*dict.fromkeys(_conditions(results)), EVERYWHERE], _fleets(results)
     rows = []
     for policy in results.policies:
-        if choice := results.cheapest(policy):
-            texts = iter(dict.fromkeys(conditions))
-            for answer in choice.answers:
-                fleet = fleets[answer.points[0]] if answer.points else "none"
-                is_one = answer.condition is not None
-                condition = next(texts) if is_one else "all conditions"
-                point = answer.points[0] if answer.points and is_one else None
-                found = (policy, condition, point, fleet, choice.missions, len(answer.left))
-                rows.append((*found, answer.settled, choice.guarantee))
+        choice = _choice(results, policy)
+        for condition, answer in zip(conditions, choice.answers, strict=False):
+            fleet = fleets[answer.points[0]] if answer.points else "none"
+            point = answer.points[0] if answer.points and answer.condition is not None else None
+            found = (policy, condition, point, fleet, choice.missions, len(answer.left))
+            rows.append((*found, answer.settled, choice.guarantee))
     columns = ["policy", "condition", "point", "setting", "missions", "left", "guaranteed"]
     return pd.DataFrame(rows, columns=[*columns, "guarantee"]).astype({"point": "Int64"})
 
 
-def _answer(rows: pd.DataFrame, wanted: Mapping[str, float], currency: str) -> str:
-    """The answer for one policy under one condition, from its rows of ``judged``."""
-    best = rows[rows["selected"]]
-    cheaper = rows[rows[COST] < best[COST].iloc[0]] if len(best) else rows
-    texts = []
-    if len(best):
-        row = best.iloc[0]
-        texts.append(f"the cheapest setting that meets the requirements is {_what(row, currency)}.")
-        texts.append(f"It has {_metrics(row, wanted)}.")
-        if cheaper.empty:
-            texts.append("No setting of the study is cheaper.")
-    else:
-        is_open = (rows["verdict"] == OPEN).any()
-        found = "is known to meet" if is_open else "meets"
-        texts.append(f"no setting {found} the requirements.")
-    if len(cheaper):
-        leads = np.min([rows[metric] - least for metric, least in wanted.items()], axis=0)
-        row = cheaper.iloc[-1 if len(best) else int(np.argmax(leads))]
-        which = "next cheaper" if len(best) else "closest"
-        texts.append(f"The {which} one, {_what(row, currency)}, {_why_not(row, wanted)}.")
-    return " ".join(texts)
-
-
-def _answer_everywhere(fleets: pd.DataFrame, rows: pd.DataFrame, currency: str) -> str:
-    """The answer for one policy over all conditions.
+def _answer(rows: pd.DataFrame, wanted: Mapping[Any, float], currency: str) -> str:
+    """The answer for one policy under one condition.
 
     Args:
-        fleets: The rows of ``everywhere`` for the policy.
-        rows: The rows of ``judged`` for the policy.
+        rows: The rows of ``judged`` or ``everywhere``, the cheapest first.
+        wanted: The requirements, for what the rows have of their metrics.
         currency: The currency of the costs.
     """
-    best = fleets[fleets["selected"]]
-    if best.empty:
-        return "no fleet is known to meet the requirements under each of them."
-    text = f"the cheapest fleet that meets the requirements is {_what(best.iloc[0], currency)}, "
-    text += "the mean cost over the conditions."
-    cheaper = fleets[fleets[COST] < best[COST].iloc[0]]
-    if cheaper.empty:
-        return f"{text} No fleet of the study is cheaper."
-    row = cheaper.iloc[-1]
-    text += f" The next cheaper one, {_what(row, currency)}, "
-    if row["verdict"] == MET:
-        return f"{text}saves less than the indifference."
-    failed = rows[(rows["fleet"] == row["fleet"]) & (rows["verdict"] == row["verdict"])]
-    does = "misses them" if row["verdict"] == MISSED else "is not known to meet them"
-    return f"{text}{does} under {numbers.words([*failed['condition']])}."
-
-
-def _what(row: pd.Series, currency: str) -> str:
-    """``**3 UAVs and 1 pad** for 69,000 EUR``."""
-    return f"**{row['fleet']}** for {numbers.money(row[COST], currency)}"
-
-
-def _metrics(row: pd.Series, wanted: Mapping[str, float]) -> str:
-    """The metrics of a setting with the requirements, in words."""
-    return numbers.words(
-        [f"{_name(m)} {_interval(row, m)} ({numbers.level(q)} required)" for m, q in wanted.items()]
-    )
-
-
-def _why_not(row: pd.Series, wanted: Mapping[str, float]) -> str:
-    """Why a cheaper setting is not selected, in words."""
-    if row["verdict"] == MET:
-        return "meets the requirements as well, and saves less than the indifference"
-    short = {m: q for m, q in wanted.items() if row[f"{m}_low"] < q}
-    if row["verdict"] == MISSED:
-        short = {m: q for m, q in short.items() if row[m] < q} or short
-        words = "misses the requirements"
+    best = rows[rows["selected"]]
+    if len(best):
+        found = _told(best.iloc[0], wanted, currency)
+        cheaper = rows[rows[COST] < best[COST].iloc[0]].tail(1)
+        text, which = (
+            f"the cheapest setting that meets the requirements is {found}.",
+            "next cheaper",
+        )
     else:
-        words = "is not known to meet the requirements"
-    return f"{words}: it has {_metrics(row, short or wanted)}"
+        leads = pd.DataFrame({metric: rows[metric] - least for metric, least in wanted.items()})
+        cheaper = rows.loc[leads.min(axis=1).nlargest(1).index]
+        text, which = "no setting is known to meet the requirements.", "closest"
+    for _, row in cheaper.iterrows():
+        text += f" The {which} one, {_told(row, wanted, currency)}, {_WHY_NOT[row['verdict']]}."
+    return text
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _interval(row: pd.Series, metric: str) -> str:
-    return numbers.interval(row[metric], row[f"{metric}_low"], row[f"{metric}_high"])
-
-
-def _name(metric: str) -> str:
-    return "success" if metric == SUCCESS else METRICS[metric].lower()
+def _told(row: pd.Series, wanted: Mapping[Any, float], currency: str) -> str:
+    """A setting, its cost, and its metrics with the requirements, in words."""
+    metrics = [
+        f"{'success' if metric == SUCCESS else METRICS[metric].lower()} "
+        f"{numbers.interval(*row[[metric, f'{metric}_low', f'{metric}_high']])} "
+        f"({numbers.level(least)} required)"
+        for metric, least in wanted.items()
+    ]
+    text = f"**{row['fleet']}** for {numbers.money(row[COST], currency)}"
+    return f"{text} with {numbers.words(metrics)}" if metrics else text
 
 
 def _prices(results: Results) -> Costs:
@@ -317,15 +239,14 @@ def _prices(results: Results) -> Costs:
     return prices
 
 
-def _checked(requirements: Mapping[str, float] | None) -> Mapping[str, float]:
-    if not requirements:
-        raise InputError("requirements: none are given; allowed: metric -> least mean")
-    for metric, least in requirements.items():
-        if metric not in METRICS:
-            raise InputError(f"requirements: {metric!r} is unknown{one_of(metric, METRICS)}")
-        if not 0 < least < 1:
-            raise InputError(f"requirements: {metric}: {least}; allowed: between 0 and 1")
-    return requirements
+def _choice(results: Results, policy: str) -> CheapestChoice:
+    choice = results.cheapest(policy)
+    if choice is None:
+        raise InputError(
+            f"{results.store.folder}: does not search for the cheapest setting; allowed: a study "
+            'with the procedure "cheapest"'
+        )
+    return choice
 
 
 def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
@@ -336,14 +257,22 @@ def _samples(results: Results, rows: pd.DataFrame, name: str) -> np.ndarray:
     return wide.reindex(columns=keys).to_numpy(float).T
 
 
-def _words(results: Results, decisions: bool) -> list[str]:
-    """The fleet of every design point in words, or its condition."""
-    table = points(results)
-    fields = [field for field in table if (field in DECISIONS) == decisions]
-    rows = [[_value(str(f), row[f]) for f in fields] for row in table.to_dict("records")]
-    if decisions:
-        return [numbers.words(row) if row else "the fleet of the scenario" for row in rows]
-    return [", ".join(row) for row in rows]
+def _fleets(results: Results) -> list[str]:
+    """The fleet of every design point in words."""
+    return [numbers.words(row) or "the fleet of the scenario" for row in _words(results, True)]
+
+
+def _conditions(results: Results) -> list[str]:
+    """The condition of every design point in words."""
+    return [", ".join(row) for row in _words(results, False)]
+
+
+def _words(results: Results, decisions: bool) -> list[list[str]]:
+    """The fields of every design point that an operator decides on, or all others, in words."""
+    rows = points(results).to_dict("records")
+    return [
+        [_value(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions] for r in rows
+    ]
 
 
 def _value(field: str, value: Any) -> str:

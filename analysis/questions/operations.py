@@ -26,8 +26,10 @@ PUBLISHED = {2: -0.46, 10: -0.79}
 RATE, REPAIR = "failures.uav_rate", "failures.uav_repair"
 BAND = (0.1, 0.9)  # the quantiles between which most queues are
 # The events that begin and end the wait of a UAV for a pad.
-_WAITS = ("charge_request", "charge_start", "charge_withdrawal", "uav_failure", "quota_filled")
-_WAITS += ("battery_empty", "mission_end")
+_WAITS = (
+    *("charge_request", "charge_start", "charge_withdrawal", "uav_failure", "quota_filled"),
+    *("battery_empty", "mission_end"),
+)
 _ENDS = ["mean", "low", "high"]
 
 

@@ -13,15 +13,11 @@ from analysis.study.design import NOISE, Saltelli
 from dess import InputError
 
 METRICS = (*SHARES, *MEANS)
+RESAMPLES = 1000  # bootstrap resamples of the blocks of the design; every metric has the same
 
 
 def sensitivity(
-    design: Saltelli,
-    missions: pd.DataFrame,
-    metrics: Sequence[str] = METRICS,
-    level: float = LEVEL,
-    resamples: int = 1000,
-    seed: int = 0,
+    design: Saltelli, missions: pd.DataFrame, metrics: Sequence[str] = METRICS
 ) -> pd.DataFrame:
     """First-order and total Sobol indices of each metric to each parameter and to the noise.
 
@@ -48,35 +44,27 @@ def sensitivity(
         missions: The missions of one policy, a row per design point in order: columns ``point``,
             ``replication`` and the metrics.
         metrics: Columns to analyse.
-        level: Confidence level.
-        resamples: Bootstrap resamples of the blocks of the design.
-        seed: Of the resamples; every metric has the same.
 
     Returns:
         A row per metric and parameter, the noise last: ``metric``, ``parameter``, ``first``,
         ``first_low``, ``first_high``, ``total``, ``total_low``, ``total_high`` and ``n``, the
-        number of missions. Intervals are normal intervals with the standard error of the bootstrap.
-        Their coverage is right where the noise dominates. Where the parameters dominate they are
-        too wide, because the design covers the space more evenly than the resamples. Estimates are
-        not limited to [0, 1]; that of a small index may be negative. If a metric has the same value
-        in all missions of A and B, its indices are nan.
+        number of missions. Intervals are normal 95 % intervals with the standard error of the
+        bootstrap. Their coverage is right where the noise dominates. Where the parameters dominate
+        they are too wide, because the design covers the space more evenly than the resamples.
+        Estimates are not limited to [0, 1]; that of a small index may be negative. If a metric has
+        the same value in all missions of A and B, its indices are nan.
 
     Raises:
         InputError: If the missions are not one per point of the design, in order.
     """
-    _check(design, missions)
-    parameters = design.problem["names"]
-    rows = [
-        (metric, parameter, *indices, len(missions))
-        for metric in metrics
-        for parameter, indices in zip(
-            parameters,
-            _indices(design, missions[metric].to_numpy(float), level, resamples, seed),
-            strict=True,
+    expected = [(number, point.replication) for number, point in enumerate(design.points)]
+    if [*missions[["point", "replication"]].itertuples(index=False, name=None)] != expected:
+        raise InputError(
+            f"missions: {len(missions)} that are not those of the design; "
+            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
         )
-    ]
-    ends = [f"{index}{end}" for index in ("first", "total") for end in ("", "_low", "_high")]
-    return pd.DataFrame(rows, columns=["metric", "parameter", *ends, "n"])
+    tables = {metric: _indices(design, missions[metric].to_numpy(float)) for metric in metrics}
+    return pd.concat(tables, names=["metric"]).reset_index("metric").reset_index(drop=True)
 
 
 def index_table(indices: pd.DataFrame) -> pd.DataFrame:
@@ -110,35 +98,21 @@ def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
     )
 
 
-def _indices(
-    design: Saltelli, values: np.ndarray, level: float, resamples: int, seed: int
-) -> np.ndarray:
-    """(D, 6) first-order and total indices, each with the ends of its interval."""
+def _indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
+    """A row per parameter: first-order and total indices, each with the ends of its interval."""
     from SALib.analyze import sobol
 
-    factors = design.problem["num_vars"]
-    samples = values.reshape(design.base, factors + 2)[:, [0, -1]]  # A and B
-    if np.ptp(samples) <= np.finfo(float).eps * np.ptp(values):
-        return np.full((factors, 6), np.nan)
-    indices = sobol.analyze(
-        design.problem,
-        values,
-        calc_second_order=False,
-        num_resamples=resamples,
-        conf_level=level,
-        seed=np.random.default_rng(seed),  # not the seed itself, since SALib takes 0 for "no seed"
-    )
-    pairs = [(indices[name], indices[f"{name}_conf"]) for name in ("S1", "ST")]
-    return np.column_stack(
-        [ends for mean, half in pairs for ends in (mean, mean - half, mean + half)]
-    )
-
-
-def _check(design: Saltelli, missions: pd.DataFrame) -> None:
-    expected = [(number, point.replication) for number, point in enumerate(design.points)]
-    keys = list(missions[["point", "replication"]].itertuples(index=False, name=None))
-    if keys != expected:
-        raise InputError(
-            f"missions: {len(keys)} that are not those of the design; "
-            f"allowed: one for each of its {len(expected)} points, in order, of one policy"
-        )
+    samples = values.reshape(design.base, -1)[:, [0, -1]]  # A and B
+    varies = np.ptp(samples) > np.finfo(float).eps * np.ptp(values)
+    indices: dict = dict.fromkeys(("S1", "S1_conf", "ST", "ST_conf"), np.nan)
+    if varies:
+        # Not the seed itself, since SALib takes 0 for "no seed".
+        options: dict = {"num_resamples": RESAMPLES, "conf_level": LEVEL}
+        options["seed"] = np.random.default_rng(0)
+        indices = sobol.analyze(design.problem, values, calc_second_order=False, **options)
+    table = pd.DataFrame({"parameter": design.problem["names"]})
+    for name, index in (("first", "S1"), ("total", "ST")):
+        half = indices[f"{index}_conf"]
+        table[name] = indices[index]
+        table[f"{name}_low"], table[f"{name}_high"] = table[name] - half, table[name] + half
+    return table.assign(n=len(values))

@@ -26,9 +26,9 @@ from analysis.names import (
     value_text,
 )
 from analysis.results.tables import Results
-from analysis.stats.correction import adjust
+from analysis.stats.correction import with_adjusted
 from analysis.stats.differences import column_tests
-from analysis.stats.intervals import Interval, column_intervals, stratified
+from analysis.stats.intervals import column_intervals, stratified
 from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
 
@@ -60,7 +60,7 @@ def points(results: Results) -> pd.DataFrame:
         values = [of_point[field] for of_point in manifest.values]
         if field == "pads":  # without a number, it depends on the zone
             values = [results.scenario(number).charging_pads for number in range(len(values))]
-        texts = _hashable(field, values)
+        texts = _texts(field, values)
         if len({*texts}) > 1:
             columns[field] = texts
     return pd.DataFrame(columns, index=range(len(manifest.points)))
@@ -92,19 +92,18 @@ def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -
     Raises:
         InputError: If there is no such metric or policy.
     """
-    missions = _missions(results, metric, policy)
-    others = [name for name in metrics_in(missions) if name != metric]
-    cells = missions.groupby(["policy", "point"], sort=False)
-    table = cells.size().rename("n").reset_index()
+    missions, cell = _missions(results, metric, policy), ["policy", "point"]
+    table = missions.groupby(cell, sort=False).size().rename("n").reset_index()
     table = table.join(points(results), on="point")
+    others = [name for name in metrics_in(missions) if name != metric]
     for name in (*others, metric):
-        wide = missions.pivot(index="replication", columns=["policy", "point"], values=name)
-        wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[["policy", "point"]]))
+        wide = missions.pivot(index="replication", columns=cell, values=name)
+        wide = wide.reindex(columns=pd.MultiIndex.from_frame(table[cell]))
         ends = column_intervals(wide, name)
         table[[name, f"{name}_low", f"{name}_high"]] = ends[["mean", "low", "high"]].to_numpy()
     table["tied"] = _tied(wide, metric)  # by the ranking metric, which was computed last
-    sign = 1 if metric in LESS_IS_BETTER else -1
-    table = table.iloc[np.argsort(sign * table[metric], kind="stable")].reset_index(drop=True)
+    less = metric in LESS_IS_BETTER
+    table = table.sort_values(metric, ascending=less, kind="stable", ignore_index=True)
     table.insert(0, "rank", np.arange(1, len(table) + 1))
     return table
 
@@ -156,12 +155,12 @@ def main_effects(
     tables = []
     for field, values in points(results).items():
         binned = _binned(values)
-        order = {value: place for place, value in enumerate(_ordered(binned))}
-        rows = _averaged(results, binned.to_frame("value"), metric, policy)
-        rows.insert(0, "field", field)
-        rows.insert(2, "position", rows["value"].map(order).astype(int))
-        rows["value"] = rows["value"].map(value_text)
-        tables.append(rows.sort_values(["policy", "position"], kind="stable", key=_in_order))
+        means = _averaged(results, binned.to_frame("value"), metric, policy)
+        for _, rows in means.groupby("policy", sort=False):
+            rows.insert(0, "field", field)
+            rows.insert(2, "position", rows["value"].map(_ordered(binned).index).astype(int))
+            rows["value"] = rows["value"].map(value_text)
+            tables.append(rows.sort_values("position", kind="stable"))
     return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
 
 
@@ -210,17 +209,15 @@ def against(results: Results, point: int = 0, metrics: Iterable[str] = METRICS) 
     tables = []
     for metric in metrics:
         parts = []
-        for policy in results.policies:
-            missions = _missions(results, metric, policy)
+        for policy, missions in _missions(results, metric, None).groupby("policy", sort=False):
             wide = missions.pivot(index="replication", columns="point", values=metric).astype(float)
             tests = column_tests(wide.drop(columns=point), wide[point], metric)
-            parts.append(tests[tests["n"] > 0].reset_index().assign(metric=metric, policy=policy))
-        table = pd.concat(parts, ignore_index=True)
-        tables.append(table.assign(p_adjusted=adjust(table["p"].to_numpy(float), "holm")))
-    whole = pd.concat(tables, ignore_index=True)
-    fields = points(results).loc[whole["point"]].reset_index(drop=True)
+            tests = tests[tests["n"] > 0].join(points(results)).reset_index()
+            parts.append(tests.assign(metric=metric, policy=policy))
+        tables.append(with_adjusted(pd.concat(parts, ignore_index=True), "holm"))
     measured = ["difference", "low", "high", "p", "p_adjusted", "n"]
-    return pd.concat([whole[["metric", "policy", "point"]], fields, whole[measured]], axis=1)
+    columns = ["metric", "policy", "point", *points(results), *measured]
+    return pd.concat(tables, ignore_index=True)[columns]
 
 
 def _averaged(
@@ -262,13 +259,12 @@ def _over_points(values: pd.DataFrame, cell_of: np.ndarray, metric: str) -> pd.D
         cell_of: (K,) the cell of every point.
         metric: The metric.
     """
-    samples, rows = values.to_numpy(float), []
+    rows = []
     for cell in range(cell_of.max() + 1):
-        sample = samples[:, cell_of == cell]
-        complete = sample[~np.isnan(sample).any(axis=1)]
-        ends = stratified(complete, metric) if len(complete) else Interval(*[np.nan] * 3)
+        complete = values.loc[:, cell_of == cell].dropna().to_numpy(float)
+        ends = stratified(complete, metric) if len(complete) else [np.nan] * 3
         rows.append((*ends, len(complete)))
-    return pd.DataFrame(rows, columns=[*Interval._fields, "n"])
+    return pd.DataFrame(rows, columns=["mean", "low", "high", "n"])
 
 
 def check_metric(results: Results, metric: str) -> None:
@@ -284,17 +280,11 @@ def _missions(results: Results, metric: str, policy: str | None) -> pd.DataFrame
     Raises:
         InputError: If there is no such metric or policy.
     """
-    missions = results.missions
     check_metric(results, metric)
     if policy is None:
-        return missions
+        return results.missions
     results.check_policy(policy)
-    return missions[missions["policy"] == policy]
-
-
-def _in_order(column: pd.Series) -> pd.Series:
-    """A key for sorting: policies by their order of appearance, other columns unchanged."""
-    return column if is_numeric_dtype(column) else pd.Series(pd.factorize(column)[0], column.index)
+    return results.missions[results.missions["policy"] == policy]
 
 
 def _tied(values: pd.DataFrame, metric: str) -> np.ndarray:
@@ -319,30 +309,16 @@ def _binned(values: pd.Series) -> pd.Series:
     return places.map(dict(enumerate(names))).astype(pd.CategoricalDtype(names, ordered=True))
 
 
-def _hashable(field: str, values: Sequence[Any]) -> list[Any]:
+def _texts(field: str, values: Sequence[Any]) -> list[Any]:
     """The values unchanged if all are numbers, otherwise as text."""
-    plain = [
-        v[0] if isinstance(v, list | tuple) and len({*map(str, v)}) == 1 else v for v in values
-    ]
     if field == "nodes":
-        return _numbered([f"{len(nodes)} cells" for nodes in values], values)
+        maps, _ = pd.factorize(pd.Series(map(str, values)))
+        return [f"{len(nodes)} cells (map {n})" for nodes, n in zip(values, maps + 1, strict=True)]
     if field == "zone":
         return [f"{width} x {height} at ({x}, {y})" for x, y, width, height in values]
     plain = [
-        v[0] if isinstance(v, list | tuple) and len(v) == 2 and v[0] == v[1] else v for v in plain
+        v[0] if isinstance(v, list | tuple) and v and all(item == v[0] for item in v) else v
+        for v in values
     ]
-    if any(isinstance(value, bool | list | tuple | dict) for value in plain):
-        return [value_text(value) for value in plain]
-    return plain
-
-
-def _numbered(names: Sequence[str], values: Sequence[Any]) -> list[str]:
-    """The names, with a number added where different values have the same name."""
-    found: dict[str, list[Any]] = {}
-    for name, value in zip(names, values, strict=True):
-        if value not in found.setdefault(name, []):
-            found[name].append(value)
-    return [
-        name if len(found[name]) == 1 else f"{name} ({found[name].index(value) + 1})"
-        for name, value in zip(names, values, strict=True)
-    ]
+    is_text = any(isinstance(value, bool | list | tuple | dict) for value in plain)
+    return [*map(value_text, plain)] if is_text else plain

@@ -10,22 +10,33 @@ Every function takes results, or the missions of results.
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import LESS_IS_BETTER, MEANS, METRICS, PRODUCT, RATIO, SHARES, SUCCESS
+from analysis.names import (
+    LESS_IS_BETTER,
+    MEANS,
+    METRICS,
+    PRODUCT,
+    RATIO,
+    SHARES,
+    SUCCESS,
+    value_text,
+)
 from analysis.questions import costs
 from analysis.questions.sensitivity import sensitivity
 from analysis.results.chunks import parts_of
 from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.distribution import distribution
-from analysis.stats.intervals import groups, summary
+from analysis.stats.intervals import summary
 from analysis.stats.learners import compare_learners
 from analysis.stats.paired import compare
 from analysis.stats.screening import may_be_best
+from analysis.stats.verdict import MARKS, position
 from analysis.study.cheapest import Cheapest
 from analysis.study.design import Saltelli
 from analysis.study.stopping import Precision
@@ -75,18 +86,16 @@ def with_verdicts(results: Results, means: pd.DataFrame) -> pd.DataFrame:
         it is one of several that may be the best, ``WORSE`` if another one is significantly better,
         ``ONLY`` if there is no other one.
     """
-    verdicts, policies = np.full(len(means), ONLY, object), means["policy"].to_numpy()
-    places = means.groupby(["metric", "point"], sort=False).indices
-    for metric in means["metric"].unique():
-        wide = results.missions.pivot(
-            index=["point", "replication"], columns="policy", values=metric
-        )
-        for point, rows in wide.groupby(level="point"):
-            here = places.get((metric, point), [])
-            if len(here) > 1:
-                values = rows.to_numpy(float)[:, wide.columns.get_indexer(policies[here])]
-                sign = -1.0 if metric in LESS_IS_BETTER else 1.0
-                verdicts[here] = _verdicts(sign * values, metric in SHARES)
+    verdicts = pd.Series(ONLY, means.index, dtype=object)
+    for (metric, point), rows in means.groupby(["metric", "point"], sort=False):
+        if len(rows) > 1:
+            missions = results.missions[results.missions["point"] == point]
+            wide = missions.pivot(index="replication", columns="policy", values=metric)
+            sign = -1.0 if metric in LESS_IS_BETTER else 1.0
+            values = sign * wide[rows["policy"]].to_numpy(float)
+            may_be = may_be_best(values, metric in SHARES)
+            best = TIED if may_be.sum() > 1 else BEST
+            verdicts[rows.index] = np.where(may_be, best, WORSE)
     return means.assign(verdict=verdicts)
 
 
@@ -96,11 +105,9 @@ def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
     Returns:
         Rows of ``analysis.summary`` by ``policy`` (in order of appearance) and ``uavs`` (sorted).
     """
-    policies = [part for _, part in groups(missions, ["policy"])]
-    return pd.concat(
-        [summary(part.sort_values("uavs"), by=["policy", "uavs"]) for part in policies],
-        ignore_index=True,
-    )
+    policies = missions.groupby("policy", sort=False)
+    tables = [summary(part.sort_values("uavs"), by=["policy", "uavs"]) for _, part in policies]
+    return pd.concat(tables, ignore_index=True)
 
 
 def fleet_table(fleets: pd.DataFrame) -> pd.DataFrame:
@@ -109,6 +116,40 @@ def fleet_table(fleets: pd.DataFrame) -> pd.DataFrame:
     table = numbers.wide(rows, ["policy", "uavs", "n"]).reset_index()
     table["n"] = table["n"].map("{:,}".format)
     return table.rename(columns={"policy": "Policy", "uavs": "UAVs", "n": "Missions", **METRICS})
+
+
+def beside_paper(
+    estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
+) -> pd.DataFrame:
+    """The metrics of every policy, with marks relative to the numbers that the paper prints.
+
+    Args:
+        estimates: Rows of ``analysis.summary`` by ``policy``, and by ``uavs`` if needed.
+        printed: The printed numbers by number of UAVs (None for all missions), then by metric.
+
+    Returns:
+        A row of the printed numbers and a row per policy, with a column of text per metric and
+        number of UAVs, see ``with_mark``.
+    """
+    columns = {("", "Policy"): ["paper", *estimates["policy"].unique()]}
+    for metric in next(iter(printed.values())):
+        of_metric = estimates[estimates["metric"] == metric]
+        for uavs, figures in printed.items():
+            rows = of_metric if uavs is None else of_metric[of_metric["uavs"] == uavs]
+            texts = [with_mark(row, figures[metric]) for row in rows.itertuples()]
+            head = "" if uavs is None else f"I = {uavs}"
+            columns[METRICS[metric], head] = [numbers.percent(figures[metric]), *texts]
+    return pd.DataFrame(columns)
+
+
+def with_mark(estimate: Any, printed: float) -> str:
+    """An estimate and its difference from a printed number: ``97.3 % [96.1, 98.1] +7.4 ▲``.
+
+    The mark tells where the whole interval lies relative to the printed number.
+    """
+    text = numbers.interval(estimate.mean, estimate.low, estimate.high)
+    mark = MARKS[position(estimate, printed)]
+    return f"{text} {numbers.difference(estimate.mean, printed)} {mark}"
 
 
 def guard_in_words(means: pd.DataFrame) -> str:
@@ -123,13 +164,9 @@ def guard_in_words(means: pd.DataFrame) -> str:
         "Every policy of this project except `random-unguarded` acts under the return guard, which "
         "allows only actions after which a UAV can still reach the charging zone in time."
     )
-    if "random" in shares:
-        text += f" So even `random` has a success of {shares['random']}."
-    if "random-unguarded" in shares:
-        text += (
-            " `random-unguarded` makes random moves as well, but without the guard: its success is "
-            f"{shares['random-unguarded']}."
-        )
+    for policy, guarded in (("random", "under"), ("random-unguarded", "without")):
+        if policy in shares:
+            text += f" Random moves {guarded} the guard have a success of {shares[policy]}."
     return text
 
 
@@ -143,11 +180,12 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
         missions: A row per mission.
         among: The policies to rank; by default all.
     """
-    if among is not None:
-        missions = missions[missions["policy"].isin([*among])]
+    among = missions["policy"].unique() if among is None else [*among]
     at_points = missions.groupby(["policy", "point"], sort=False)[PRODUCT].mean()
-    means = at_points.groupby("policy", sort=False).mean()
-    return [str(policy) for policy in means.sort_values(ascending=False, kind="stable").index]
+    means = (
+        at_points.groupby("policy", sort=False).mean().sort_values(ascending=False, kind="stable")
+    )
+    return [str(policy) for policy in means.index if policy in among]
 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
@@ -158,7 +196,7 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
 def settings(results: Results) -> list[str]:
     """Every design point in words: the fields that the design sets, with their values."""
     return [
-        ", ".join(f"{field} {_value(value)}" for field, value in point.values.items())
+        ", ".join(f"{field} {value_text(value)}" for field, value in point.values.items())
         for point in results.store.manifest.points
     ]
 
@@ -184,11 +222,11 @@ def worst(
         ratio): ``policy``, ``point``, ``replication``, the metrics, and ``command``, which
         simulates the mission again.
     """
-    policy_missions = results.missions[results.missions["policy"] == policy]
+    of_policy = results.missions[results.missions["policy"] == policy]
     if point is not None:
-        policy_missions = policy_missions[policy_missions["point"] == point]
-    ordered = policy_missions.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)
-    table = ordered.loc[: missions - 1, ["policy", "point", "replication", *SHARES, *MEANS]]
+        of_policy = of_policy[of_policy["point"] == point]
+    table = of_policy.sort_values([PRODUCT, RATIO], kind="stable", ignore_index=True)[:missions]
+    table = table[["policy", "point", "replication", *SHARES, *MEANS]]
     keys = zip(table["point"], table["replication"], strict=True)
     folder = folder or results.usual_folder
     return table.assign(command=[results.command(policy, *key, folder) for key in keys])
@@ -242,12 +280,6 @@ def learned_against_heuristic(results: Results) -> pd.DataFrame:
     return for_choice(table, len(heuristics))
 
 
-def _verdicts(values: np.ndarray, share: bool) -> np.ndarray:
-    """The verdicts on K > 1 policies by their (R, K) values in the same replications."""
-    may_be = may_be_best(values, share) if len(values) > 1 else np.ones(values.shape[1], bool)
-    return np.where(may_be, TIED if may_be.sum() > 1 else BEST, WORSE)
-
-
 def _same_missions(results: Results) -> bool:
     counts = results.store.manifest.missions
     return len({n for of_team in counts for n in of_team}) == 1
@@ -277,12 +309,11 @@ def precisions(results: Results) -> pd.DataFrame:
     if data is None:
         return pd.DataFrame()
     rule = Precision.model_validate_json(json.dumps(data))
-    tables = []
-    for team, policy in enumerate(results.policies):
-        table = pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
-        table.insert(0, "policy", policy)
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+    tables = {
+        policy: pd.DataFrame(rule.reached(results.store.samples(parts_of(manifest, team))))
+        for team, policy in enumerate(results.policies)
+    }
+    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
 
 
 def sensitivities(results: Results) -> pd.DataFrame:
@@ -296,12 +327,9 @@ def sensitivities(results: Results) -> pd.DataFrame:
     if not design or design["kind"] != "saltelli":
         return pd.DataFrame()
     saltelli = Saltelli.model_validate_json(json.dumps(design))
-    tables = []
-    for policy in results.policies:
-        table = sensitivity(saltelli, results.missions.query("policy == @policy"), [*METRICS])
-        table.insert(0, "policy", policy)
-        tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+    missions = results.missions.groupby("policy", sort=False)
+    tables = {policy: sensitivity(saltelli, rows, [*METRICS]) for policy, rows in missions}
+    return pd.concat(tables, names=["policy"]).reset_index("policy").reset_index(drop=True)
 
 
 def selections(results: Results) -> pd.DataFrame:
@@ -315,23 +343,15 @@ def selections(results: Results) -> pd.DataFrame:
     """
     if isinstance(results.store.manifest.selection, Cheapest):
         return costs.selections(results)
+    words, rows = settings(results), []
+    for policy in results.policies:
+        if (c := results.choice(policy)) is not None:
+            found = (policy, c.best, words[c.best], c.missions, len(c.survivors))
+            rows.append((*found, c.guaranteed, c.guarantee))
     columns = ["policy", "point", "setting", "missions", "left", "guaranteed", "guarantee"]
-    words = settings(results)
-    choices = [(policy, results.choice(policy)) for policy in results.policies]
-    rows = [
-        (policy, c.best, words[c.best], c.missions, len(c.survivors), c.guaranteed, c.guarantee)
-        for policy, c in choices
-        if c is not None
-    ]
     return pd.DataFrame(rows, columns=columns)
 
 
 def checks(results: Results) -> pd.DataFrame:
     """Means with intervals of the selected points, over missions not used for the selection."""
     return summary(results.checks, by=["policy", "point"])
-
-
-def _value(value: object) -> str:
-    if isinstance(value, list | tuple):
-        return "..".join(map(_value, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)

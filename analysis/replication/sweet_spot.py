@@ -5,7 +5,6 @@ import pandas as pd
 from analysis import numbers
 from analysis.names import METRICS, parameter, value_text
 from analysis.questions import summary
-from analysis.questions.printed import with_mark
 from analysis.replication import paper
 from analysis.results.tables import Results
 
@@ -23,7 +22,7 @@ def table(results: Results) -> pd.DataFrame:
     rows = [{"Policy": "paper", **dict.fromkeys(setting(results, 0), ""), **printed}]
     for row in summary.selections(results).itertuples():
         means = {
-            name: with_mark(checks[row.policy, metric], paper.SWEET_SPOT[metric])
+            name: summary.with_mark(checks[row.policy, metric], paper.SWEET_SPOT[metric])
             for metric, name in METRICS.items()
             if checks
         }

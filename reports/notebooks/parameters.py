@@ -142,9 +142,10 @@ html.gallery(
 # %%
 html.table(
     sweet_spot.table(sweet),
-    f"The selected setting and its check: means with {level} intervals (▲ above the paper's "
-    "number, ▼ below, ≈ contains it), the number of missions of the selection, and the number of "
-    "settings that were not ruled out, the selected one included",
+    f"The selected setting and its check: means with {level} intervals, and the difference from "
+    "the paper in percentage points (▲ above the paper's number, ▼ below, ≈ contains it), the "
+    "number of missions of the selection, and the number of settings that were not ruled out, the "
+    "selected one included",
 )
 
 # %%

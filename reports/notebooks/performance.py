@@ -27,16 +27,15 @@ from analysis import load_results, numbers, summary
 from analysis.figures import comparison
 from analysis.figures import settings as figures
 from analysis.names import METRICS, PRODUCT, SUCCESS
-from analysis.questions import printed
+from analysis.questions import summary as questions
 from analysis.questions.optimality import gap
-from analysis.questions.summary import best_policy, by_fleet, fleet_table, guard_in_words
 from analysis.replication import paper
 from reports.pages import html
 
 # %%
 table4, fig4 = (load_results(Path(results) / name) for name in ("table4", "fig4"))
 overall = summary(table4.missions, by=["policy"])
-fleets, fig4_fleets = by_fleet(table4.missions), by_fleet(fig4.missions)
+fleets, fig4_fleets = questions.by_fleet(table4.missions), questions.by_fleet(fig4.missions)
 bounded = gap.results_in(Path(results) / "gap")
 
 # %% [markdown]
@@ -64,16 +63,16 @@ html.gallery(
 
 # %%
 html.table(
-    printed.beside(overall, paper.TABLE_IV),
+    questions.beside_paper(overall, {None: paper.TABLE_IV}),
     "Means with 95 % intervals, and the difference from the paper in percentage points. ▲ the "
     "interval is above the paper's number, ▼ it is below, ≈ it contains the number (inconclusive).",
 )
 
 # %%
-html.say("{text}", text=html.composed(guard_in_words(overall)))
+html.say("{text}", text=html.composed(questions.guard_in_words(overall)))
 
 # %%
-best = best_policy(table4.missions)
+best = questions.best_policy(table4.missions)
 rows = overall[overall["policy"] == best].set_index("metric")[["mean", "low", "high"]]
 html.say(
     "The best policy by collection ratio and communication is **{best}**: {product}, with success "
@@ -109,7 +108,7 @@ html.gallery(
 )
 
 # %%
-html.table(fleet_table(fleets), "Means with 95 % intervals")
+html.table(questions.fleet_table(fleets), "Means with 95 % intervals")
 
 # %% [markdown]
 # ## <a id="fig-4"></a>One setting: the paper's Fig. 4
@@ -138,8 +137,9 @@ html.gallery(
 
 # %%
 html.table(
-    printed.beside_by_fleet(fig4_fleets, paper.FIG_4),
-    "Means with 95 % intervals. ▲ the interval is above the paper's number, ▼ below, ≈ contains it",
+    questions.beside_paper(fig4_fleets, paper.FIG_4),
+    "Means with 95 % intervals, and the difference from the paper in percentage points. ▲ the "
+    "interval is above the paper's number, ▼ below, ≈ contains it",
 )
 
 # %% [markdown]

@@ -49,12 +49,13 @@ def by_fleet(results: Results) -> pd.DataFrame:
     overall = means_of(results.missions, by=["policy"]).assign(uavs=ALL)
     fleets = summary.by_fleet(results.missions).sort_values("uavs", kind="stable")
     rows = pd.concat([fleets, overall] if fleets["uavs"].nunique() > 1 else [fleets])
-    rows = rows[rows["metric"].isin(_SHOWN)].set_index(["uavs", "policy", "n", "metric"])
-    order = rows.droplevel("metric").index.unique()
-    wide = rows.unstack("metric").loc[order]
-    wide.columns = [name if end == "mean" else f"{name}_{end}" for end, name in wide.columns]
-    wide[f"{BOUND}_high"] = wide[f"{BOUND}_high"].clip(upper=1.0)
-    return wide[[f"{m}{end}" for m in _SHOWN for end in ("", "_low", "_high")]].reset_index()
+    keys = ["uavs", "policy", "n"]
+    table = rows.drop_duplicates(keys)[keys]
+    for metric in _SHOWN:
+        names = {"mean": metric, "low": f"{metric}_low", "high": f"{metric}_high"}
+        of_metric = rows[rows["metric"] == metric].rename(columns=names)
+        table = table.merge(of_metric[[*keys, *names.values()]])
+    return table.assign(**{f"{BOUND}_high": table[f"{BOUND}_high"].clip(upper=1.0)})
 
 
 def listed(table: pd.DataFrame) -> pd.DataFrame:
@@ -77,13 +78,13 @@ def at_most(table: pd.DataFrame) -> pd.DataFrame:
         A row per policy, the closest one first, and a column per number of UAVs: the upper end of
         the interval of the gap, in points.
     """
-    ends = table.assign(text=[f"{100 * end:.1f}" for end in table[f"{GAP}_high"]])
-    wide = ends.pivot(index="policy", columns="uavs", values="text")
-    wide = wide[[*dict.fromkeys(table["uavs"])]]
     closest = table[table["uavs"] == table["uavs"].iloc[-1]].sort_values(GAP, kind="stable")
-    wide = wide.loc[closest["policy"]].rename_axis(columns=None)
-    heads = {name: "all missions" if name == ALL else fleet(name) for name in wide}
-    return wide.rename(columns=heads).reset_index(names="Policy")
+    columns = {"Policy": closest["policy"].to_numpy()}
+    for uavs, rows in table.groupby("uavs", sort=False):
+        ends = 100 * rows.set_index("policy").loc[closest["policy"], f"{GAP}_high"]
+        head = "all missions" if uavs == ALL else fleet(int(str(uavs)))
+        columns[head] = ends.map("{:.1f}".format).to_numpy()
+    return pd.DataFrame(columns)
 
 
 def in_words(results: Results, policy: str | None = None) -> str:
@@ -95,10 +96,10 @@ def in_words(results: Results, policy: str | None = None) -> str:
     """
     policy = policy or summary.best_policy(results.missions)
     table = by_fleet(results)
-    rows = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
+    table = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
+    rows = table.assign(text=numbers.estimates(table, GAP, _points))
     parts = [
-        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap "
-        f"{_points(row[GAP], row[f'{GAP}_low'], row[f'{GAP}_high'])})"
+        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap {row['text']})"
         for _, row in rows.iterrows()
     ]
     return (

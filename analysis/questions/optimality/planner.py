@@ -1,6 +1,7 @@
 """A planner beside a learner, in the same missions: who is ahead, where, and at what price in time.
 
-pair = planner.Beside(results, "planner", "ddqn")
+table = differences(results, ["planner"], "ddqn")
+answer(table, "planner")
 """
 
 from collections.abc import Sequence
@@ -21,8 +22,15 @@ from analysis.stats.front import on_front
 from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
 from policies.planner import Course, Planner, first_plan
 from policies.registry import load
+
+_CLAIMS = {
+    ABOVE: "The planner is better",
+    BELOW: "The learner is better",
+    INCONCLUSIVE: "The missions do not tell which is better",
+}
 
 
 def differences(results: Results, planners: Sequence[str], learner: str) -> pd.DataFrame:
@@ -38,13 +46,11 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
     for policy in (*planners, learner):
         results.check_policy(policy)
     missions = results.missions[results.missions["policy"].isin([*planners, learner])]
-    by_fleet = compare(missions, learner, [PRODUCT, SUCCESS], by=["uavs"])
-    overall = compare(missions, learner, [PRODUCT, SUCCESS]).assign(uavs=ALL)
-    table = pd.concat([by_fleet, overall])
-    order = {policy: place for place, policy in enumerate(planners)}
-    return table.sort_values(
-        "policy", kind="stable", key=lambda names: names.map(order), ignore_index=True
-    )
+    metrics = [PRODUCT, SUCCESS]
+    by_fleet = compare(missions, learner, metrics, by=["uavs"])
+    table = pd.concat([by_fleet, compare(missions, learner, metrics).assign(uavs=ALL)])
+    order = {"kind": "stable", "key": lambda names: names.map(planners.index)}
+    return table.sort_values("policy", ignore_index=True, **order)
 
 
 def answer(table: pd.DataFrame, planner: str) -> str:
@@ -55,24 +61,15 @@ def answer(table: pd.DataFrame, planner: str) -> str:
         planner: The planner.
     """
     rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
-    overall = rows[rows["uavs"] == ALL].iloc[0]
+    (overall,) = rows[rows["uavs"] == ALL].itertuples()
     parts = [
         f"{_points(row)} with {fleet(row.uavs)}" for row in rows.itertuples() if row.uavs != ALL
     ]
-    learner, difference = overall["baseline"], _points(overall)
-    if overall["low"] > 0:
-        claim = f"The planner is better: `{planner}` is {difference} points ahead of `{learner}`"
-    elif overall["high"] < 0:
-        claim = f"The learner is better: `{planner}` minus `{learner}` is {difference} points"
-    else:
-        claim = (
-            f"The missions do not tell which is better: `{planner}` minus `{learner}` is "
-            f"{difference} points"
-        )
     return (
-        f"**{claim}** in the product (collection ratio and communication), over {overall['n']:,} "
-        f"common missions: {numbers.words(parts)}. Brackets are {numbers.level(LEVEL)} intervals "
-        "of paired differences."
+        f"**{_CLAIMS[position(overall)]}: `{planner}` minus `{overall.baseline}` is "
+        f"{_points(overall)} points** in the product (collection ratio and communication), over "
+        f"{overall.n:,} common missions: {numbers.words(parts)}. Brackets are "
+        f"{numbers.level(LEVEL)} intervals of paired differences."
     )
 
 
@@ -80,10 +77,8 @@ def listed(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of ``differences`` as a table of text."""
     heads = {PRODUCT: "Product [points]", SUCCESS: "Success [points]"}
     rows = table.assign(mean=table["difference"], metric=table["metric"].map(heads))
-    index = ["policy", "uavs", "n"]
-    wide = numbers.wide(rows, index, write=numbers.points).reset_index()
-    names = {"policy": "Policy", "uavs": "UAVs", "n": "Pairs"}
-    return wide.rename(columns=names)
+    wide = numbers.wide(rows, ["policy", "uavs", "n"], write=numbers.points)
+    return wide.reset_index(names=["Policy", "UAVs", "Pairs"])
 
 
 def front(results: Results, times: Times) -> pd.DataFrame:
@@ -94,12 +89,11 @@ def front(results: Results, times: Times) -> pd.DataFrame:
         product, ``seconds`` (median time of a call for one mission), and ``on_front``: whether no
         other policy is at least as fast and as good, and better in one of the two.
     """
-    means = means_of(results.missions, by=["policy"])
-    means = means[means["metric"] == PRODUCT][["policy", "mean", "low", "high"]]
+    means = means_of(results.missions, by=["policy"]).query("metric == @PRODUCT")
     seconds = {cost.policy: cost.median for cost in times.costs}
-    table = means.assign(seconds=means["policy"].map(seconds)).dropna(ignore_index=True)
-    table["on_front"] = on_front(table["seconds"].to_numpy(), table["mean"].to_numpy())
-    return table.sort_values("seconds", ignore_index=True)
+    table = means[["policy", "mean", "low", "high"]].assign(seconds=means["policy"].map(seconds))
+    table = table.dropna().sort_values("seconds", ignore_index=True)
+    return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
 
 
 def mean_bound(results: Results) -> float:
@@ -110,11 +104,8 @@ def mean_bound(results: Results) -> float:
 def coverage(results: Results, policy: str) -> np.ndarray:
     """The (K,) mean shares of their data that the nodes lose to a policy, over kept event logs."""
     nodes = len(results.scenario().nodes)
-    shares = []
-    for events in _logs(results, policy):
-        fleet_size = int(events["uav"].max()) + 1
-        shares.append(collected(events, fleet_size, nodes).sum(axis=0) / held(events, nodes))
-    return np.mean(shares, axis=0)
+    data = [(collected(log, _uavs(log), nodes), held(log, nodes)) for log in _logs(results, policy)]
+    return np.mean([of_uavs.sum(axis=0) / of_nodes for of_uavs, of_nodes in data], axis=0)
 
 
 def at_home(results: Results, policies: Sequence[str]) -> pd.DataFrame:
@@ -131,47 +122,32 @@ def at_home(results: Results, policies: Sequence[str]) -> pd.DataFrame:
         inside = slots["x"].between(left, left + width - 1)
         inside &= slots["y"].between(top, top + height - 1)
         rows = inside.groupby(slots["slot"]).agg(share="mean", n="size").reset_index()
-        rows = rows[rows["n"] >= rows["n"].iloc[0] / 2]
-        tables.append(rows.assign(policy=policy))
+        tables.append(rows[rows["n"] >= rows["n"].iloc[0] / 2].assign(policy=policy))
     return pd.concat(tables, ignore_index=True)
 
 
 def returns(results: Results, policies: Sequence[str]) -> pd.DataFrame:
-    """When and how UAVs go home: their charging sessions in kept event logs.
+    """When and how UAVs go home: their charging sessions in kept event logs, as a table of text.
 
     Returns:
-        A row per policy: ``policy``, ``sessions`` per UAV, mean ``slot`` and ``battery`` [%] at the
-        beginning of a session, and ``n`` UAVs.
+        A row per policy: the sessions per UAV, mean slot and battery at the beginning of a session,
+        and the number of UAVs.
     """
     rows = []
     for policy in policies:
-        logs = [*_logs(results, policy)]
+        logs = _logs(results, policy)
         begun = pd.concat([events[events["event"] == "charge_start"] for events in logs])
-        uavs = sum(int(events["uav"].max()) + 1 for events in logs)
-        rows.append(
-            (policy, len(begun) / uavs, begun["time"].mean(), begun["battery"].mean(), uavs)
-        )
-    return pd.DataFrame(rows, columns=["policy", "sessions", "slot", "battery", "n"])
-
-
-def returns_listed(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of ``returns`` as a table of text."""
-    columns = {
-        "Policy": table["policy"],
-        "Sessions per UAV": table["sessions"].map("{:.2f}".format),
-        "Begin in slot": table["slot"].map("{:.1f}".format),
-        "Battery then": table["battery"].map("{:.1f} %".format),
-        "UAVs": table["n"],
-    }
-    return pd.DataFrame(columns)
+        uavs, (slot, battery) = sum(map(_uavs, logs)), begun[["time", "battery"]].mean()
+        sessions = f"{len(begun) / uavs:.2f}"
+        rows.append((policy, sessions, f"{slot:.1f}", f"{battery:.1f} %", uavs))
+    heads = ["Policy", "Sessions per UAV", "Begin in slot", "Battery then", "UAVs"]
+    return pd.DataFrame(rows, columns=heads)
 
 
 def example(results: Results, policy: str) -> LoggedMission:
     """The first mission of the smallest fleet whose event log is kept."""
-    first = results.cell(policy, 0).first
-    logged = range(first, first + results.manifest["study"]["logged"])
     missions = results.missions[results.missions["policy"] == policy].set_index("replication")
-    replication = int(missions.loc[[*logged], "uavs"].idxmin())
+    replication = int(missions.loc[[*_logged(results, policy)], "uavs"].idxmin())
     return logged_mission(results, policy, 0, replication)
 
 
@@ -195,12 +171,18 @@ def node_prices(results: Results, replication: int) -> np.ndarray:
     return results.bounds[0, replication].prices.sum(axis=0)
 
 
-def _logs(results: Results, policy: str) -> list[pd.DataFrame]:
+def _logged(results: Results, policy: str) -> range:
+    """The replications whose event logs are kept."""
     first = results.cell(policy, 0).first
-    return [
-        results.events(policy, 0, number)
-        for number in range(first, first + results.manifest["study"]["logged"])
-    ]
+    return range(first, first + results.manifest["study"]["logged"])
+
+
+def _logs(results: Results, policy: str) -> list[pd.DataFrame]:
+    return [results.events(policy, 0, number) for number in _logged(results, policy)]
+
+
+def _uavs(events: pd.DataFrame) -> int:
+    return int(events["uav"].max()) + 1
 
 
 def _points(row: Any) -> str:

@@ -138,11 +138,9 @@ html.figure(
 )
 
 # %%
-sessions = questions.returns(study, [planner, learner])
 html.table(
-    questions.returns_listed(sessions),
+    questions.returns(study, [planner, learner]),
     f"Means over charging sessions of the same {logged} missions",
-    data=sessions,
 )
 
 # %% [markdown]

@@ -3,7 +3,6 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm
 
 from analysis.questions.sensitivity import (
     METRICS,
@@ -79,24 +78,24 @@ KNOWN = {
 def test_known_shares_of_parameters_and_noise(case):
     function, first, total = KNOWN[case]
     design = unit(len(first) - 1, base=2048)
-    table = sensitivity(design, evaluated(design, y=function), ["y"], level=0.999)
+    table = sensitivity(design, evaluated(design, y=function), ["y"])
     for index, truth in (("first", first), ("total", total)):
         low, high = table[f"{index}_low"], table[f"{index}_high"]
-        assert ((low <= truth) & (truth <= high)).all()
+        room = (high - low) / 2  # some of so many intervals of 95 % miss
+        assert ((low - room <= truth) & (truth <= high + room)).all()
         assert (high - low < 0.25).all()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("level", [0.8, 0.95])
 @pytest.mark.parametrize("case", KNOWN)
-def test_intervals_cover_what_they_claim(case, level):
+def test_intervals_cover_what_they_claim(case):
     function, *truths = KNOWN[case]
-    runs = 600
+    level, runs = 0.95, 300
     hits = np.zeros((2, len(truths[0])))
     for seed in range(runs):
         design = unit(len(truths[0]) - 1, base=256, seed=seed)
         missions = evaluated(design, y=function)
-        table = sensitivity(design, missions, ["y"], level=level, resamples=200, seed=seed)
+        table = sensitivity(design, missions, ["y"])
         for row, (index, truth) in enumerate(zip(("first", "total"), truths, strict=True)):
             hits[row] += (table[f"{index}_low"] <= truth) & (truth <= table[f"{index}_high"])
     # Four standard errors of the binomial. Intervals of smooth parameters are wider than need be:
@@ -117,16 +116,13 @@ def test_the_table_is_tidy():
     assert (table["n"] == 16 * 5).all()
 
 
-def test_intervals_are_symmetric_and_scale_with_the_level():
+def test_intervals_are_symmetric():
     design = unit(2, base=64)
-    missions = evaluated(design, y=lambda x, y, e: x * y + e)
-    narrow, wide = (sensitivity(design, missions, ["y"], level=level) for level in (0.5, 0.99))
+    table = sensitivity(design, evaluated(design, y=lambda x, y, e: x * y + e), ["y"])
     for index in ("first", "total"):
-        half = wide[f"{index}_high"] - wide[index]
+        half = table[f"{index}_high"] - table[index]
         assert (half > 0).all()
-        assert half.to_numpy() == pytest.approx((wide[index] - wide[f"{index}_low"]).to_numpy())
-        ratio = half / (narrow[f"{index}_high"] - narrow[index])
-        assert ratio.to_numpy() == pytest.approx(norm.ppf(0.995) / norm.ppf(0.75))
+        assert half.to_numpy() == pytest.approx((table[index] - table[f"{index}_low"]).to_numpy())
 
 
 def test_a_metric_without_variance_has_no_shares():
@@ -156,19 +152,14 @@ def test_a_single_failure_is_no_trouble(point):
     assert table[INDICES].isna().all(axis=None) == (point not in (0, 4))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_intervals_depend_on_their_seed_alone(seed):
+def test_intervals_do_not_depend_on_other_metrics_or_what_was_drawn_before():
     design = unit(1, base=64)
     missions = evaluated(design, other=lambda x, e: x * e, y=lambda x, e: x + e)
     np.random.seed(1)
-    alone = sensitivity(design, missions, ["y"], seed=seed)
+    alone = sensitivity(design, missions, ["y"])
     np.random.seed(2)
-    both = sensitivity(design, missions, ["other", "y"], seed=seed)
+    both = sensitivity(design, missions, ["other", "y"])
     pd.testing.assert_frame_equal(alone, both.iloc[2:].reset_index(drop=True))
-    others = sensitivity(design, missions, ["y"], seed=seed + 1)
-    estimates = ["first", "total"]
-    pd.testing.assert_frame_equal(alone[estimates], others[estimates])
-    assert (alone["first_low"] != others["first_low"]).all()
 
 
 WRONG = {

@@ -56,7 +56,8 @@ def test_long_and_unset_values_are_short_texts(tmp_path):
         "2 x 2 at (0, 0)",
         *["3 x 2 at (5, 0)"] * 3,
     ]
-    assert table["nodes"].tolist() == [*["3 cells"] * 2, *(f"2 cells ({n})" for n in (1, 2, 1))]
+    maps = ["3 cells (map 1)", "2 cells (map 2)", "2 cells (map 3)"]
+    assert table["nodes"].tolist() == [maps[0], *maps, maps[1]]
     assert table["forbid_swaps"].tolist() == ["no", "no", "no", "yes", "no"]
     assert table["initial_data"].tolist() == [*["5–20"] * 4, "4"]
 

@@ -78,7 +78,7 @@ def test_settings_are_in_words(results, tmp_path):
     design = grid(initial_data=[5, [5, 7.5]])
     study = small_study(tmp_path, missions=1, design=design)
     words = summary.settings(run_study(study, tmp_path / "out"))
-    assert words == ["initial_data 5", "initial_data 5..7.5"]
+    assert words == ["initial_data 5", "initial_data 5–7.5"]
 
 
 def test_the_worst_missions_come_with_commands_that_simulate_them_again(results, tmp_path, capsys):
@@ -193,6 +193,26 @@ def test_the_guard_is_named_with_what_success_is_without_it():
     ends = {"mean": [0.998, 0.0], "low": [0.993, 0.0], "high": [0.999, 0.004]}
     means = pd.DataFrame({"policy": ["random", "random-unguarded"], "metric": "success", **ends})
     text = summary.guard_in_words(means)
-    assert "even `random` has a success of 99.8 % [99.3, 99.9]." in text
-    assert text.endswith("without the guard: its success is 0.0 % [0.0, 0.4].")
+    assert "under the guard have a success of 99.8 % [99.3, 99.9]." in text
+    assert text.endswith("without the guard have a success of 0.0 % [0.0, 0.4].")
     assert summary.guard_in_words(means.iloc[:0]).endswith("in time.")
+
+
+def test_estimates_stand_beside_the_papers_numbers():
+    rows = [
+        ("tour", 1, "success", 0.95, 0.94, 0.96),
+        ("tour", 1, "collection_ratio", 0.7, 0.65, 0.75),
+        ("greedy", 1, "success", 0.9, 0.85, 0.92),
+        ("greedy", 1, "collection_ratio", 0.8, 0.79, 0.81),
+    ]
+    table = pd.DataFrame(rows, columns=["policy", "uavs", "metric", "mean", "low", "high"])
+    printed = {"success": 0.93, "collection_ratio": 0.7}
+    assert summary.beside_paper(table, {None: printed}).to_numpy().tolist() == [
+        ["paper", "93.0 %", "70.0 %"],
+        ["tour", "95.0 % [94.0, 96.0] +2.0 ▲", "70.0 % [65.0, 75.0] 0.0 ≈"],
+        ["greedy", "90.0 % [85.0, 92.0] −3.0 ▼", "80.0 % [79.0, 81.0] +10.0 ▲"],
+    ]
+    both = pd.concat([table, table.assign(uavs=2, mean=table["mean"] + 0.01)])
+    fleets = summary.beside_paper(both, {1: printed, 2: {"success": 0.5, "collection_ratio": 1}})
+    assert [fleet for _, fleet in fleets.columns[1:]] == ["I = 1", "I = 2"] * 2
+    assert fleets.iloc[1, 2] == "96.0 % [94.0, 96.0] +46.0 ▲"

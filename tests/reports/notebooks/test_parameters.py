@@ -54,7 +54,8 @@ def test_the_sweet_spot_is_checked_by_missions_of_its_own(results: Path, text: s
         values = checks.loc[checks["policy"] == policy, PRODUCT].to_numpy(float)
         mean, low, high = bounded(values)
         mark = "▲" if low > PRINTED else "▼" if high < PRINTED else "≈"
-        shown = f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}] {mark}"
+        shown = f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}] "
+        shown += f"{100 * (mean - PRINTED):+.1f} {mark}"
         assert shown.replace("-", "−") in text
 
 
