@@ -22,7 +22,7 @@ ROOMS = {
         *("replication", "verification", "figures", "sweeps"),
     ),
     "reports": (
-        *("folders", "tables", "player", "tools", "pages", "explorer", "crate"),
+        *("folders", "tables", "tools", "pages", "player", "explorer", "crate"),
         *("interrupts", "cli", "__main__"),
     ),
 }

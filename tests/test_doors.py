@@ -107,8 +107,6 @@ PARSED = {
     # Lists and tables that are no objects of JSON, by types of pydantic.
     "analysis.results.parquet": {"validate_json"},
     "reports.pages.verify": {"validate_json"},
-    # A template of this project.
-    "reports.player.layout": {"loads"},
     # Keys of dictionaries and of a cache, which are texts of JSON.
     "analysis.study.candidates": {"loads"},
     "analysis.results.provenance": {"loads"},

@@ -18,7 +18,7 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "plotly", "sklearn", "SALib", "IPython", "jinja2"),
+        *("matplotlib", "PIL", "seaborn", "sklearn", "SALib", "IPython", "jinja2"),
         *("jupytext", "markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
     ),
     "distributed": ("distributed",),

@@ -2,18 +2,17 @@
 
 write_animation(log, scenario, "mission.gif", GIF)
 
-Its frames show what the player shows: what moves is the same traces, drawn by matplotlib.
+Its frames show what the player shows, drawn by matplotlib.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
 from subprocess import CalledProcessError
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.animation import FFMpegWriter
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
@@ -22,15 +21,14 @@ from analysis.figures import missions, style
 from analysis.results.event_log import Events
 from dess import InputError
 from dess.scenario import Scenario
-from reports.player.playback import Playback
-from reports.player.scene import STATUS, Json, moving, ranges, still
+from reports.player.playback import TRAIL, Playback
 
 GIF, MP4 = "gif", "mp4"
 SLOTS_PER_SECOND = 10
 LAST_SECONDS = 2  # for which the end of the mission is shown
 # The width, and the height for each of the curves [px], even as videos need; dots per inch.
 WIDTH, HEIGHT, DPI = 810, 144, 90
-_POINT = 72 / DPI  # the size of a pixel [points]
+NODE_SIZE, UAV_SIZE, PAD_SIZE = 20, 12, 17  # diameters, and the side of a square [points]
 
 
 def write_animation(
@@ -118,25 +116,23 @@ class Film:
     """
 
     def __init__(self, events: Events, scenario: Scenario, title: str = ""):
-        playback = Playback(pd.DataFrame(events), scenario)
-        self.end, self._moving = playback.end, moving(playback)
-        curves = missions.curves(scenario)
+        self.playback = Playback(events, scenario)
+        self.end, curves = self.playback.end, missions.curves(scenario)
         self.figure = Figure(figsize=(WIDTH / DPI, HEIGHT * len(curves) / DPI), dpi=DPI)
         self.figure.set_layout_engine("constrained", rect=(0, 0, 0.95, 1))  # notes at the right
         self.figure.suptitle(title, x=0.012, ha="left", fontsize=11)
         widths, heights = (1.05, 1), [*curves.values()]
         grid = self.figure.add_gridspec(len(curves), 2, width_ratios=widths, height_ratios=heights)
-        sea = self.figure.add_subplot(grid[:, 0], anchor="N" if playback.measures_age else "C")
-        missions.chart(scenario, sea)
-        sea.set_title(" ")  # the place of the status
-        self.axes = {"1": sea, str(STATUS): sea}
-        for row, (panel, draw) in enumerate(zip(ranges(playback), curves, strict=True)):
-            ax = self.axes[str(panel)] = self.figure.add_subplot(grid[row, 1])
+        self.sea = self.figure.add_subplot(grid[:, 0])
+        missions.chart(scenario, self.sea)
+        self.sea.set_title(" ")  # the place of the status
+        self.curves = [self.figure.add_subplot(grid[row, 1]) for row in range(len(curves))]
+        for ax, draw in zip(self.curves, curves, strict=True):
             draw(events, scenario, ax)
-            if row < len(curves) - 1:
-                ax.set_xlabel("")
-        rings, *_ = still(playback)
-        self.draw(rings)
+        for ax in self.curves[:-1]:
+            ax.set_xlabel("")
+        self._discs(self.playback.residual.max(axis=0), facecolors="white",
+                    edgecolors=self.playback.node_colours, linewidths=1)  # fmt: skip
         self.canvas = FigureCanvasAgg(self.figure)
         self.canvas.draw()
         self._background = self.canvas.copy_from_bbox(self.figure.bbox)
@@ -152,45 +148,40 @@ class Film:
     def frame(self, slot: int) -> np.ndarray:
         """The pixels of the mission after a number of slots, (height, width, 4)."""
         self.canvas.restore_region(self._background)
-        for trace in (part.at(slot) for part in self._moving):
-            if trace["mode"] == "text":
-                trace["text"] = [f"slot {slot} of {self.end} · {trace['text'][0]}"]
-            for artist in self.draw(trace):
-                self.figure.draw_artist(artist)
-                artist.remove()
+        for artist in self.moving(slot):
+            self.figure.draw_artist(artist)
+            artist.remove()
         return np.array(self.canvas.buffer_rgba())
 
-    def draw(self, trace: Json) -> list[Artist]:
-        """Draw a trace on the axes of its panel, if the film has this panel."""
-        ax = self.axes.get(trace.get("xaxis", "x1")[1:])
-        if ax is None:
-            return []
-        if trace["mode"] == "text":
-            return [ax.text(0, 1.02, trace["text"][0], transform=ax.transAxes)]
-        if trace["name"].startswith("cursor"):
-            return [ax.axvline(trace["x"][0], color=style.INK, linewidth=1.2)]
-        if trace["mode"] == "lines":
-            width, alpha = trace["line"]["width"], trace.get("opacity", 1)
-            return [*ax.plot(trace["x"], trace["y"], color=trace["line"]["color"], alpha=alpha,
-                             linewidth=width * _POINT)]  # fmt: skip
-        return [*_dots(trace, ax)]
+    def moving(self, slot: int) -> Iterator[Artist]:
+        """All that moves, as it is after a number of slots, from the bottom to the top."""
+        playback, fleet = self.playback, self.playback.fleet
+        cells = np.stack([fleet["x"], fleet["y"]], 2)
+        for uav, colour in enumerate(playback.uav_colours):
+            way = cells[max(slot - TRAIL, 0) : slot + 1, uav].T
+            yield from self.sea.plot(way[0], way[1], color=colour, alpha=0.35, linewidth=3)
+            if (node := fleet["node"][slot, uav]) >= 0:
+                link = np.array([cells[slot, uav], playback.scenario.nodes[node]]).T
+                yield from self.sea.plot(
+                    link[0], link[1], color=playback.node_colours[node], linewidth=2
+                )
+        yield self._discs(playback.residual[slot], c=playback.node_colours, linewidths=0)
+        for state, fill in (("waiting", "none"), ("charging", style.ZONE_EDGE)):
+            spots = cells[slot, fleet[state][slot]].T
+            yield self.sea.scatter(spots[0], spots[1], PAD_SIZE**2, marker="s", facecolors=fill,
+                                   edgecolors=style.INK, linewidths=1)  # fmt: skip
+        x, y = cells[slot].T
+        yield self.sea.scatter(x, y, UAV_SIZE**2, c=playback.uav_colours,
+                               edgecolors="white", alpha=1 - 0.6 * fleet["over"][slot])  # fmt: skip
+        for uav in range(len(x)):
+            yield self.sea.text(x[uav], y[uav], str(uav + 1), size=7, color="white", weight="bold",
+                                ha="center", va="center_baseline")  # fmt: skip
+        yield self.sea.text(0, 1.02, playback.status(slot), transform=self.sea.transAxes)
+        for ax in self.curves:
+            yield ax.axvline(slot, color=style.INK, linewidth=1.2)
 
-
-def _dots(trace: Json, ax: Axes) -> Iterator[Artist]:
-    """Discs or squares, and the texts in them."""
-    marker, edge = trace["marker"], trace["marker"]["line"]
-    alpha = np.broadcast_to(marker["opacity"], len(trace["x"]))
-    if not alpha.any():
-        return
-    x, y = (np.array(trace[axis])[alpha > 0] for axis in "xy")
-    sizes = np.array(marker["size"], float)
-    areas = 2 * sizes / marker["sizeref"] if "sizeref" in marker else sizes**2
-    look: Json = {"c": marker["color"], "alpha": alpha[alpha > 0]}
-    if str(marker["color"]).startswith("rgba"):
-        look = {"facecolors": "none"}
-    yield ax.scatter(x, y, areas * _POINT**2, marker="s" if "symbol" in marker else "o",
-                     linewidths=edge["width"] * _POINT, edgecolors=edge.get("color", "none"),
-                     clip_on=False, **look)  # fmt: skip
-    for text in zip(x, y, trace.get("text", ()), strict=False):
-        yield ax.text(*text, size=7, color="white", weight="bold", ha="center",
-                      va="center_baseline")  # fmt: skip
+    def _discs(self, data: np.ndarray, **look: Any) -> Artist:
+        """A disc per node, whose area is proportional to its data."""
+        areas = NODE_SIZE**2 * data / max(self.playback.residual.max(), 1e-9)
+        x, y = zip(*self.playback.scenario.nodes, strict=True)
+        return self.sea.scatter(x, y, areas, **look)

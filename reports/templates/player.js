@@ -1,11 +1,283 @@
-const plot = document.getElementById("{plot_id}"), layouts = {{ layouts | tojson }};
-let shown;
-function arrange() {
-    const fits = layouts[plot.clientWidth < {{ wide }} ? "narrow" : "wide"];
-    if (fits === shown) return;
-    shown = fits;
-    plot.style.height = fits.height + "px";
-    Plotly.relayout(plot, fits.change);
+// Shows a mission slot by slot on a canvas: a map, and curves over time whose cursor is the slot.
+// What it shows is computed in Python (reports/player/playback.py); this file only draws it.
+function playMission(id, mission) {
+    "use strict";
+    const INK = "{{ style.INK }}", MUTED = "{{ style.MUTED }}", GRID = "{{ style.GRID }}";
+    const SEA = "{{ style.SEA }}", ZONE = "{{ style.ZONE }}", ZONE_EDGE = "{{ style.ZONE_EDGE }}";
+    const WIDE = 720; // width [px] from which the curves are beside the map, and not below it
+    const NODE = 12.5, UAV = 8, PAD = 10.5; // radii of the largest disc and of a UAV, half a square
+    const figure = document.getElementById(id), canvas = figure.querySelector("canvas");
+    const button = figure.querySelector("button"), slider = figure.querySelector("input");
+    const speed = figure.querySelector("select"), status = figure.querySelector("output");
+    const fleet = mission.fleet, residual = mission.residual, end = residual.length - 1;
+    const uavs = mission.colours.uavs, nodes = mission.nodes;
+    const range = (n) => [...Array(n).keys()];
+    const ends = uavs.map((_, i) => fleet.over.findIndex((row) => row[i])).map((t) => t < 0 ? end : t);
+    const most = nodes.map((_, k) => Math.max(...residual.map((row) => row[k])));
+    const largest = Math.max(...most, 1e-9);
+    const sums = residual.map((row) => row.reduce((a, b) => a + b, 0));
+    const pen = canvas.getContext("2d", { willReadFrequently: true });
+    let slot = 0, timer = null, panels = [];
+
+    // A panel is a box of the canvas with its own scales, and functions that draw into it.
+    function panel(title, box, x, y, draw, move, ticks = {}) {
+        const px = (v) => box.x + (v - x[0]) / (x[1] - x[0]) * box.w;
+        const py = (v) => box.y + (v - y[0]) / (y[1] - y[0]) * box.h;
+        return { title, box, x, y, px, py, draw, move, ...ticks };
+    }
+
+    function line(points, colour, width = 1.5, alpha = 1) {
+        pen.globalAlpha = alpha;
+        pen.strokeStyle = colour;
+        pen.lineWidth = width;
+        pen.beginPath();
+        points.forEach(([x, y], n) => n ? pen.lineTo(x, y) : pen.moveTo(x, y));
+        pen.stroke();
+        pen.globalAlpha = 1;
+    }
+
+    function disc(x, y, radius, fill, edge = null, width = 1.5) {
+        pen.beginPath();
+        pen.arc(x, y, radius, 0, 2 * Math.PI);
+        if (fill) { pen.fillStyle = fill; pen.fill(); }
+        if (edge) { pen.strokeStyle = edge; pen.lineWidth = width; pen.stroke(); }
+    }
+
+    function rectangle(x, y, w, h, fill, edge, width = 1) {
+        if (fill) { pen.fillStyle = fill; pen.fillRect(x, y, w, h); }
+        if (edge) { pen.strokeStyle = edge; pen.lineWidth = width; pen.strokeRect(x, y, w, h); }
+    }
+
+    function text(words, x, y, align = "left", font = "12px", colour = INK, base = "middle") {
+        pen.font = `${font} system-ui, sans-serif`;
+        pen.fillStyle = colour;
+        pen.textAlign = align;
+        pen.textBaseline = base;
+        pen.fillText(words, x, y);
+    }
+
+    // Round numbers, about as many as asked for, from 0 or the beginning of the range.
+    function steps([low, high], count) {
+        const rough = Math.abs(high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
+        const step = [1, 2, 5, 10].map((m) => m * power).find((m) => m >= rough);
+        const [from, to] = [Math.min(low, high), Math.max(low, high)], first = Math.ceil(from / step);
+        return range(Math.floor(to / step) - first + 1).map((n) => Number(((first + n) * step).toPrecision(9)));
+    }
+
+    function frame(p) {
+        const { box } = p;
+        text(p.title, box.x, box.y - 10, "left", "bold 12.5px");
+        for (const v of p.yTicks ?? steps(p.y, 4)) {
+            if (!p.yTicks) line([[box.x, p.py(v)], [box.x + box.w, p.py(v)]], GRID, 1);
+            text(v.toLocaleString("en"), box.x - 6, p.py(v), "right", "11px");
+        }
+        for (const v of p.xTicks ?? []) text(v, p.px(v), box.y + box.h + 10, "center", "11px");
+        if (p.xTitle) text(p.xTitle, box.x + box.w / 2, box.y + box.h + 26, "center", "12px");
+        rectangle(box.x, box.y, box.w, box.h, null, MUTED);
+    }
+
+    const radius = (data) => NODE * Math.sqrt(data / largest);
+
+    function map(box) {
+        const size = [-0.5, mission.grid - 0.5], [x, y, w, h] = mission.zone;
+        const numbers = steps([0, mission.grid - 1], 7);
+        const p = panel("", box, size, size, () => {
+            rectangle(p.px(x - 0.5), p.py(y - 0.5), p.px(w) - p.px(0), p.py(h) - p.py(0), ZONE, ZONE_EDGE);
+            nodes.forEach(([x, y], k) => disc(p.px(x), p.py(y), radius(most[k]), "white", mission.colours.nodes[k]));
+        }, (t) => {
+            const at = (s, i) => [p.px(fleet.x[s][i]), p.py(fleet.y[s][i])];
+            uavs.forEach((colour, i) =>
+                line(range(mission.trail + 1).map((n) => at(Math.max(t - n, 0), i)), colour, 4, 0.35));
+            uavs.forEach((_, i) => {
+                const k = fleet.node[t][i];
+                if (k >= 0) line([at(t, i), [p.px(nodes[k][0]), p.py(nodes[k][1])]], mission.colours.nodes[k], 2.5);
+            });
+            nodes.forEach(([x, y], k) => disc(p.px(x), p.py(y), radius(residual[t][k]), mission.colours.nodes[k]));
+            uavs.forEach((colour, i) => {
+                const [x, y] = at(t, i);
+                if (fleet.waiting[t][i]) rectangle(x - PAD, y - PAD, 2 * PAD, 2 * PAD, null, INK, 1.8);
+                if (fleet.charging[t][i]) rectangle(x - PAD, y - PAD, 2 * PAD, 2 * PAD, ZONE_EDGE, INK, 1.2);
+                pen.globalAlpha = fleet.over[t][i] ? 0.4 : 1;
+                disc(x, y, UAV, colour, "white");
+                text(i + 1, x, y + 0.5, "center", "bold 11px", "white");
+                pen.globalAlpha = 1;
+            });
+        }, { fill: SEA, xTicks: numbers, yTicks: numbers, xTitle: "x, east [cells]", isMap: true });
+        return p;
+    }
+
+    function overTime(title, y, draw, move, ticks) {
+        return (box) => {
+            const p = panel(title, box, [0, Math.max(end, 1)], y, () => draw(p), (t) => {
+                line([[p.px(t), box.y], [p.px(t), box.y + box.h]], INK, 1.2);
+                if (move) move(p, t);
+            }, ticks);
+            return p;
+        };
+    }
+
+    const battery = overTime("Battery [%]", [103, 0], (p) => {
+        for (const [name, level] of Object.entries(mission.thresholds)) {
+            line([[p.px(0), p.py(level)], [p.px(p.x[1]), p.py(level)]], MUTED, 1);
+            text(`${name} ${level}`, p.box.x + p.box.w + 4, p.py(level), "left", "11px");
+        }
+        uavs.forEach((colour, i) =>
+            line(range(ends[i] + 1).map((t) => [p.px(t), p.py(fleet.battery[t][i])]), colour));
+    }, (p, t) => uavs.forEach((colour, i) => disc(p.px(t), p.py(fleet.battery[t][i]), 4.5, colour, "white")));
+
+    const data = overTime("Residual data, a band per node", [1.05 * Math.max(...sums, 1), 0], (p) => {
+        let base = residual.map(() => 0);
+        nodes.forEach((_, k) => {
+            const top = base.map((b, t) => b + residual[t][k]);
+            pen.globalAlpha = 0.75;
+            pen.fillStyle = mission.colours.nodes[k];
+            pen.beginPath();
+            top.forEach((v, t) => pen.lineTo(p.px(t), p.py(v)));
+            [...base].reverse().forEach((v, n) => pen.lineTo(p.px(end - n), p.py(v)));
+            pen.fill();
+            pen.globalAlpha = 1;
+            base = top;
+        });
+    });
+
+    const age = mission.meanAge && overTime(
+        "Mean age of the nodes [slots]", [1.05 * Math.max(...mission.meanAge.map((corner) => corner[1]), 1), 0],
+        (p) => line(mission.meanAge.map(([t, v]) => [p.px(t), p.py(v)]), INK));
+
+    const room = 0.6 + Math.max(0, 3 - uavs.length) / 2; // so that a single row does not fill the panel
+    const waits = fleet.waiting.some((row) => row.some(Boolean));
+    const pads = `${mission.pads} pad${mission.pads === 1 ? "" : "s"}`;
+    const charging = overTime(`Charging, ${pads}${waits ? "; hollow: waiting" : ""}`, [1 - room, uavs.length + room], (p) => {
+        uavs.forEach((colour, i) => {
+            const y = p.py(i + 1), half = (p.py(1.3) - p.py(1));
+            line([[p.px(0), y], [p.px(ends[i]), y]], colour);
+            for (let t = 1; t <= end; t++) {
+                const box = [p.px(t - 1), y - half, p.px(1) - p.px(0), 2 * half];
+                if (fleet.charging[t][i]) rectangle(...box, colour, colour);
+                if (fleet.waiting[t][i]) rectangle(...box, "white", colour);
+            }
+            text(mission.filled[i] ? "✓" : "✕", p.px(ends[i]) + 4, y);
+        });
+    }, null, {
+        yTicks: range(uavs.length).map((i) => i + 1).filter((i) => (i - 1) % Math.ceil(uavs.length / 6) === 0),
+        xTicks: steps([0, Math.max(end, 1)], 7), xTitle: "time [mission slots]",
+    });
+
+    function nodeAges(box) {
+        const top = 1.05 * Math.max(...mission.ages.flat(), 1);
+        const p = panel("Age of each node [slots]", box, [-0.7, nodes.length - 0.3], [top, 0], () => {}, (t) =>
+            mission.ages[t].forEach((value, k) => {
+                line([[p.px(k), p.py(0)], [p.px(k), p.py(value)]], INK, 1);
+                disc(p.px(k), p.py(value), 4, mission.colours.nodes[k]);
+            }), { xTicks: steps([0, nodes.length - 1], 10), xTitle: "node" });
+        return p;
+    }
+
+    // Where the panels are; beside each other if there is room, and otherwise one below the other.
+    function arrange() {
+        const width = canvas.clientWidth || 600, wide = width >= WIDE, left = 44, right = 44;
+        const side = Math.min((wide ? 0.5 * width : width) - left - 8, 620);
+        const x = wide ? left + side + 70 : left, w = width - x - right;
+        let y = side + 50;
+        panels = [map({ x: left, y: 8, w: side, h: side })];
+        if (mission.ages) {
+            panels.push(nodeAges({ x: left, y: y + 20, w: side, h: 90 }));
+            y += 160;
+        }
+        const bottom = y;
+        y = wide ? 28 : y + 20;
+        const curves = [[battery, 1.5], [data, 1.5], ...(age ? [[age, 1.5]] : []), [charging, 1]];
+        const share = curves.reduce((sum, [, part]) => sum + part, 0);
+        const unit = wide ? (Math.max(bottom, 360) - 40 - 38 * curves.length) / share : 80;
+        for (const [make, part] of curves) {
+            panels.push(make({ x, y, w, h: part * unit }));
+            y += part * unit + 38;
+        }
+        const height = Math.max(bottom, y + 4), scale = window.devicePixelRatio || 1;
+        canvas.style.height = `${height}px`;
+        canvas.width = Math.round(width * scale);
+        canvas.height = Math.round(height * scale);
+        pen.setTransform(scale, 0, 0, scale, 0, 0);
+        still = null;
+        draw();
+    }
+
+    let still = null; // the picture of all that does not move
+    function draw() {
+        pen.clearRect(0, 0, canvas.width, canvas.height);
+        if (still) {
+            pen.putImageData(still, 0, 0);
+        } else {
+            rectangle(0, 0, canvas.clientWidth, canvas.clientHeight, "white");
+            for (const p of panels) {
+                if (p.fill) rectangle(p.box.x, p.box.y, p.box.w, p.box.h, p.fill);
+                frame(p);
+                p.draw();
+            }
+            still = pen.getImageData(0, 0, canvas.width, canvas.height);
+        }
+        for (const p of panels) p.move(slot);
+        status.textContent = mission.status[slot];
+        slider.value = slot;
+    }
+
+    function show(next) {
+        slot = Math.max(0, Math.min(end, Math.round(next)));
+        draw();
+    }
+
+    function pause() {
+        clearInterval(timer);
+        timer = null;
+        button.textContent = "Play";
+    }
+
+    function play() {
+        if (slot === end) show(0);
+        button.textContent = "Pause";
+        timer = setInterval(() => slot < end ? show(slot + 1) : pause(), 1000 / Number(speed.value));
+    }
+
+    const toggle = () => timer === null ? play() : pause();
+    const KEYS = {
+        " ": toggle, ArrowRight: () => show(slot + 1), ArrowLeft: () => show(slot - 1),
+        Home: () => show(0), End: () => show(end),
+    };
+
+    // The panel at a place of the canvas, if there is one.
+    function under(event) {
+        const [x, y] = [event.offsetX, event.offsetY];
+        const p = panels.find(({ box }) => x >= box.x && x <= box.x + box.w && y >= box.y && y <= box.y + box.h);
+        return [p, x, y];
+    }
+
+    button.addEventListener("click", toggle);
+    slider.addEventListener("input", () => show(Number(slider.value)));
+    speed.addEventListener("change", () => { if (timer !== null) { pause(); play(); } });
+    figure.addEventListener("keydown", (event) => {
+        if (!(event.key in KEYS) || event.target === button || event.target === speed) return;
+        event.preventDefault();
+        KEYS[event.key]();
+    });
+    canvas.addEventListener("click", (event) => {
+        const [p, x] = under(event);
+        if (p && p.y !== p.x && p.x[0] === 0) show((x - p.box.x) / p.box.w * p.x[1]);
+    });
+    canvas.addEventListener("mousemove", (event) => {
+        const [p, x, y] = under(event), near = ([a, b]) => Math.hypot(p.px(a) - x, p.py(b) - y) <= NODE;
+        canvas.title = "";
+        if (!p || !p.isMap) return;
+        const i = uavs.findIndex((_, i) => near([fleet.x[slot][i], fleet.y[slot][i]])), k = nodes.findIndex(near);
+        if (i >= 0) canvas.title = `UAV ${i + 1}: battery ${fleet.battery[slot][i]} %`;
+        else if (k >= 0) canvas.title = `node ${k}: ${residual[slot][k].toFixed(1)} data units`;
+    });
+    function follow() {
+        const asked = location.hash.match(/^#slot=(\d+)$/);
+        if (asked) show(Number(asked[1]));
+    }
+    canvas.style.width = "100%";
+    window.addEventListener("resize", arrange);
+    window.addEventListener("hashchange", follow);
+    arrange();
+    follow();
 }
-arrange();
-window.addEventListener("resize", arrange);

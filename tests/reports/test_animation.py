@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.animation import FFMpegWriter
+from matplotlib.collections import PathCollection
 from PIL import Image
 
 import dess
@@ -25,8 +26,6 @@ from reports.player.animation import (
     Film,
     write_animation,
 )
-from reports.player.playback import Playback
-from reports.player.scene import moving
 
 
 @pytest.fixture(scope="module")
@@ -40,19 +39,20 @@ def mission() -> tuple[pd.DataFrame, Scenario]:
 
 def test_a_film_draws_what_the_player_shows(mission: tuple[pd.DataFrame, Scenario]) -> None:
     log, scenario = mission
-    slots, residual, traces = uav_slots(log), residual_data(log), moving(Playback(log, scenario))
+    slots, residual = uav_slots(log), residual_data(log).clip(lower=0)
     with style.look():
         film = Film(log, scenario)
-    (nodes,) = (trace for trace in traces if trace.style["name"] == "nodes")
-    (uavs,) = (trace for trace in traces if trace.style["name"] == "UAVs")
-    for slot in range(film.end + 1):
-        now = slots[slots["slot"] == slot - 1]
-        dots: Any
-        dots, *numbers = film.draw(uavs.at(slot))
-        assert np.array_equal(dots.get_offsets()[now["uav"]], now[["x", "y"]])
-        assert [number.get_text() for number in numbers] == ["1", "2", "3"]
-        areas, data = film.draw(nodes.at(slot))[0].get_sizes(), residual.iloc[slot].clip(lower=0)
-        assert np.allclose(areas / areas.max(), data / data.max(), atol=1e-3)
+        for slot in range(film.end + 1):
+            now = slots[slots["slot"] == slot - 1]
+            artists: Any = [*film.moving(slot)]
+            nodes, waiting, charging, uavs = (a for a in artists if isinstance(a, PathCollection))
+            assert np.array_equal(uavs.get_offsets()[now["uav"]], now[["x", "y"]])
+            for spots, state in ((waiting, "waiting"), (charging, "charging")):
+                assert np.array_equal(spots.get_offsets(), now.loc[now[state], ["x", "y"]])
+            areas, data = nodes.get_sizes(), residual.iloc[slot]
+            assert np.allclose(areas / areas.max(), data / data.max(), atol=1e-3)
+            for artist in artists:
+                artist.remove()
     pictures = [film.frame(slot) for slot in (0, film.end, 0)]
     assert np.array_equal(pictures[0], pictures[2])
     assert not np.array_equal(pictures[0], pictures[1])
