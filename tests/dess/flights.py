@@ -1,9 +1,10 @@
 """Missions that are flown by a script on both engines, and what their logs say."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
 from dess.batch import simulate_batch
 from dess.mission import simulate
@@ -53,3 +54,32 @@ def rows_of(log: Log, event: str, *names: str) -> list:
 def batteries(log: Log, uav: int = 0) -> list[float]:
     """The battery of a UAV at the end of every slot in which it was active."""
     return [battery for i, battery in rows_of(log, "move", "uav", "value") if i == uav]
+
+
+class Case(NamedTuple):
+    """A mission.
+
+    Attributes:
+        fields: Fields of its scenario.
+        routes: What each UAV does; then it hovers.
+        expected: Numbers by what they are: the columns of an event, ``record`` or ``uavs``.
+        starts: The cells in which the UAVs start, where there are several.
+    """
+
+    fields: dict[str, Any]
+    routes: tuple[str, ...]
+    expected: dict[str, Any]
+    starts: Any = None
+
+
+def check(case: Case) -> None:
+    """Check a mission that was worked by hand."""
+    record, log = flown(Scenario.of(**case.fields), *case.routes, starts=case.starts)
+    for what, numbers in case.expected.items():
+        kind, *names = what.split()
+        if kind == "record":
+            found: Any = [getattr(record, name) for name in names]
+        else:
+            found = record.uavs[names].tolist() if kind == "uavs" else rows_of(log, kind, *names)
+        flat = np.array(found, float).ravel().tolist()
+        assert flat == pytest.approx(np.array(numbers, float).ravel().tolist(), abs=1e-9), what

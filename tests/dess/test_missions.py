@@ -9,14 +9,11 @@ scenario wants in dB, is 255 * 100 / 12800 = 1.9921875.
 """
 
 import math
-from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 
-from dess.scenario import Scenario
 from dess.state import BATTERY, QUOTA, TRUNCATED
-from tests.dess.flights import CHANNEL, flown, rows_of
+from tests.dess.flights import CHANNEL, Case, check
 
 HAND = CHANNEL | {"charge_start": 11, "charge_complete": 25, "uavs": 1, "zone": [0, 0, 1, 1]}
 BESIDE = HAND | {"nodes": [[1, 0]], "initial_data": 50.0}
@@ -28,22 +25,6 @@ ONE_NODE = PAIR | {"nodes": [[0, 0]], "quota": 1, "flying_time": 20}
 def _bits(k: float) -> float:
     """Data units that a whole slot carries over k [cells^2]."""
     return math.log2(1 + 255 / (1 + 16 * k))
-
-
-class Case(NamedTuple):
-    """A mission.
-
-    Attributes:
-        fields: Fields of its scenario.
-        routes: What each UAV does; then it hovers.
-        expected: Numbers by what they are: the columns of an event, ``record`` or ``uavs``.
-        starts: The cells in which the UAVs start, where there are several.
-    """
-
-    fields: dict[str, Any]
-    routes: tuple[str, ...]
-    expected: dict[str, Any]
-    starts: Any = None
 
 
 def _emptied() -> Case:
@@ -282,12 +263,4 @@ CASES = {
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_a_mission_worked_by_hand(case: Case) -> None:
-    record, log = flown(Scenario.of(**case.fields), *case.routes, starts=case.starts)
-    for what, numbers in case.expected.items():
-        kind, *names = what.split()
-        if kind == "record":
-            found: Any = [getattr(record, name) for name in names]
-        else:
-            found = record.uavs[names].tolist() if kind == "uavs" else rows_of(log, kind, *names)
-        flat = np.array(found, float).ravel().tolist()
-        assert flat == pytest.approx(np.array(numbers, float).ravel().tolist(), abs=1e-9), what
+    check(case)

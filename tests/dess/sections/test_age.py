@@ -5,10 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.mission import simulate
 from dess.scenario import Scenario
 from dess.sections.age import age_of_teeth
-from dess.view import View
+from tests.dess.flights import flown
 
 Tooth = tuple[float, float]
 
@@ -52,30 +51,14 @@ def test_a_node_that_is_emptied_at_fixed_gaps() -> None:
     """A UAV hovers over a node, which new data reach in each slot: it is empty after t + 1/m."""
     slots, m = 40, 5
     scenario = Scenario.of(
-        grid=4,
-        zone=[1, 1, 1, 1],
-        nodes=[[1, 1]],
-        uavs=1,
-        slot_length=1000,
-        edge_snr=300,
-        arrival_rate=100,
-        quota=1000,
-        flying_time=100,
-        max_slots=slots,
-        communication_slots=m,
-        **{"age.measured": True},
+        **{"grid": 4, "zone": [1, 1, 1, 1], "nodes": [[1, 1]], "uavs": 1, "quota": 1000},
+        **{"slot_length": 1000, "edge_snr": 300, "arrival_rate": 100, "flying_time": 100},
+        **{"max_slots": slots, "communication_slots": m, "age.measured": True},
     )
-    record = simulate(scenario, _Hover(), seed=3)
+    record, _ = flown(scenario, "")
     assert record.slots == slots
     area = (1 / m) ** 2 / 2 + (slots - 1) / 2 + (1 - 1 / m) ** 2 / 2
     assert record.age == pytest.approx(area / slots)
     assert record.peak_age == pytest.approx((1 / m + slots - 1) / slots)
     # 39 of 41 teeth pass the highest ages.
     assert record.age_p99 == pytest.approx(1 - 0.01 * slots / (slots - 1))
-
-
-class _Hover:
-    name = "hover"
-
-    def act(self, view: View) -> np.ndarray:
-        return np.full(len(view), 4)

@@ -9,19 +9,10 @@ from tests.dess.flights import batteries, flown
 
 # Three UAVs hover in a zone of three cells, far from the only node; all may charge at once.
 THREE: dict[str, Any] = {
-    "grid": 4,
-    "zone": [0, 1, 3, 1],
-    "uavs": 3,
-    "nodes": [[3, 3]],
-    "initial_data": 1000.0,
-    "charge_start": 11,
-    "charge_complete": 20,
-    "charge_rate": 5,
+    **{"grid": 4, "zone": [0, 1, 3, 1], "uavs": 3, "nodes": [[3, 3]], "initial_data": 1000.0},
+    **{"charge_start": 11, "charge_complete": 20, "charge_rate": 5, "pads": 1, "max_slots": 7},
     "fleet": [{"flying_time": 11}, {"flying_time": 10}, {"flying_time": 9}],
-    "max_slots": 7,
 }
-
-
 EQUAL = [{"flying_time": 10}, {"flying_time": 10}, {"flying_time": 9}]
 # Fields of the scenario, the route of UAV 0, batteries of the UAVs, waiting slots, requests.
 QUEUES: dict[str, tuple[dict[str, Any], str, list[list[int]], list[int], int]] = {
@@ -66,7 +57,7 @@ QUEUES: dict[str, tuple[dict[str, Any], str, list[list[int]], list[int], int]] =
 @pytest.mark.parametrize("case", QUEUES)
 def test_a_queue_by_hand(case: str) -> None:
     fields, route, levels, waits, requests = QUEUES[case]
-    scenario = Scenario.of(**THREE | {"pads": 1} | fields)
+    scenario = Scenario.of(**THREE | fields)
     record, log = flown(scenario, route, "", "")
     assert [batteries(log, i) for i in range(3)] == levels
     assert record.uavs["slots_waiting"].tolist() == waits
@@ -74,4 +65,4 @@ def test_a_queue_by_hand(case: str) -> None:
     assert record.waiting == sum(waits) / requests
     assert record.pad_requests == requests
     charged = record.uavs["slots_charging"].sum()
-    assert record.utilisation == charged / (scenario.pads * record.slots)
+    assert record.utilisation == charged / (scenario.charging_pads * record.slots)

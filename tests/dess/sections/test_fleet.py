@@ -13,14 +13,8 @@ from tests.drawn import Script
 
 # There is one node, with data without end.
 ROW = {
-    "grid": 8,
-    "nodes": [[2, 6]],
-    "initial_data": 1e6,
-    "shadowing_variance": 0.0,
-    "arrival_rate": 0.0,
-    "flying_time": 50,
-    "charge_start": 10,
-    "max_slots": 4,
+    **{"grid": 8, "nodes": [[2, 6]], "initial_data": 1e6, "shadowing_variance": 0.0},
+    **{"arrival_rate": 0.0, "flying_time": 50, "charge_start": 10, "max_slots": 4},
 }
 LONE = ROW | {"zone": [2, 2, 1, 1], "uavs": 1}
 

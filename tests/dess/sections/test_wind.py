@@ -1,20 +1,19 @@
 """Wind: what moves against it cost, the same field in all missions, and a guard that counts it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from hypothesis import event, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 import policies
-from dess import simulate, simulate_batch
+from dess import simulate
 from dess.observations.reach import reach_of
 from dess.scenario import ScenarioSpace
 from dess.sections.wind import Wind, surcharges
 from dess.state import BATTERY, constants_of
 from policies.registry import HEURISTICS
-from tests.drawn import Script, replications, seeds, spaces
+from tests.dess.flights import batteries, flown
+from tests.drawn import replications, seeds, spaces
 
 OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
 GUARDED = st.sampled_from([name for name in HEURISTICS if name != "random-unguarded"])
@@ -31,26 +30,14 @@ def _table(wind: Wind, grid: int) -> np.ndarray:
     return surcharges(grid, *wind.push(), wind.gusts, wind.seed)
 
 
-def _batteries(route: str, **scenario: Any) -> list[float]:
-    """The battery of a lone UAV at the end of each slot."""
-    space = ScenarioSpace.of(**(OPEN | {"max_slots": len(route)} | scenario))
-    record = simulate(space, Script(route), 3, events=True)
-    assert record.events is not None
-    log = record.events.columns()
-    return log["value"][log["event"] == "move"].tolist()
-
-
-# --- costs by hand ---
-
-
 def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does() -> None:
-    # From the north: north costs 1 + 3, all other moves and hovering cost 1.
-    north = {"wind.strength": 3, "wind.direction": 0}
-    assert _batteries("NES.WN", **north) == [56, 55, 54, 53, 52, 48]
-    for direction, against in ((90, "E"), (180, "S"), (270, "W"), (360, "N")):
+    for direction, against in ((0, "N"), (90, "E"), (180, "S"), (270, "W"), (360, "N")):
         wind = {"wind.strength": 3, "wind.direction": direction}
-        for action in "NESW":
-            assert _batteries(action, **wind) == [56 if action == against else 59]
+        space = ScenarioSpace.of(**(OPEN | {"max_slots": 5} | wind))
+        for route in ("NESW.", "S.WEN"):
+            costs = [4 if action == against else 1 for action in route]
+            _, log = flown(space, route)
+            assert batteries(log) == (60 - np.cumsum(costs)).tolist()
 
 
 def test_a_slanting_wind_costs_its_component_on_average() -> None:
@@ -74,17 +61,9 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
 
 
 def test_a_battery_that_does_not_suffice_is_empty_and_not_negative() -> None:
-    scenario = ScenarioSpace.of(**OPEN | {"flying_time": 4, "charge_start": 10, "max_slots": 20})
-    wind = ScenarioSpace.of(scenario, **{"wind.strength": 8})
-    for record in (simulate(wind, Script("N..")), simulate_batch(wind, Script("N.."))):
-        assert record.uavs["battery"].ravel().tolist() == [0]
-        assert record.uavs["end"].ravel().tolist() == [BATTERY]
-
-
-# --- the field ---
-
-
-# --- the guard ---
+    fields = {"flying_time": 4, "charge_start": 10, "wind": {"strength": 8}}
+    record, _ = flown(ScenarioSpace.of(**OPEN | fields), "N..")
+    assert (record.uavs["battery"], record.uavs["end"]) == (0, BATTERY)
 
 
 @given(spaces(), winds)
@@ -98,15 +77,11 @@ def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
     x0, y0, width, height = space.zone
     for s in (1, 2):
         for y, x in np.ndindex(grid, grid):
-            if x0 <= x < x0 + width and y0 <= y < y0 + height:
-                assert reach[s - 1, y, x] == 0
-                continue
             steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
-            assert reach[s - 1, y, x] == min(
-                s + extra[action, b, a] + reach[s - 1, b, a]
-                for action, a, b in steps
-                if 0 <= a < grid and 0 <= b < grid
-            )
+            inside = [step for step in steps if min(step[1:]) >= 0 and max(step[1:]) < grid]
+            ways = [s + extra[action, b, a] + reach[s - 1, b, a] for action, a, b in inside]
+            in_zone = x0 <= x < x0 + width and y0 <= y < y0 + height
+            assert reach[s - 1, y, x] == (0 if in_zone else min(ways))
 
 
 @given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
@@ -117,4 +92,3 @@ def test_a_guarded_lone_uav_never_depletes_its_battery_in_wind(
     windy = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
     record = simulate(windy, policies.load(name), seed, replication)
     assert (record.uavs["end"] != BATTERY).all()
-    event(f"charged {record.uavs['slots_charging'][0] > 0}")
