@@ -25,7 +25,7 @@ QUICK = (
     *("dess/test_scenario.py", "dess/sections/test_age.py", "dess/sections/test_arrivals.py"),
     *("dess/sections/test_buffers.py", "dess/sections/test_charging.py"),
     *("dess/sections/test_failures.py", "dess/sections/test_fleet.py", "dess/test_errors.py"),
-    *("dess/test_files.py", "dess/test_locks.py", "dess/test_missions.py"),
+    *("dess/test_files.py", "dess/test_missions.py"),
     *("dess/test_paper_records.py", "dess/test_rules.py", "dess/test_sea.py"),
     *("dess/test_streams.py", "policies/test_trained.py", "analysis/stats", "test_doors.py"),
 )
