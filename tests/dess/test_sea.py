@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -55,9 +54,11 @@ def test_a_sea_may_lie_across_the_180th_meridian(tmp_path: Path) -> None:
 
 
 def test_a_scenario_names_a_file_beside_it(tmp_path: Path) -> None:
+    """It may be a link within the folder."""
     _csv(tmp_path, "lon,lat\n8.50,54.25\n8.52,54.26\n")
+    (tmp_path / "nodes.csv").symlink_to("buoys.csv")
     path = tmp_path / "sea.toml"
-    path.write_text('nodes = "buoys.csv"\ngrid = 12\nzone = [0, 0, 2, 2]\n')
+    path.write_text('nodes = "nodes.csv"\ngrid = 12\nzone = [0, 0, 2, 2]\n')
     space = load_scenario(path)
     # 0.02 degrees are 1,299 m at 54.255 degrees: 0.8 cells to both sides; 0.7 cells north, south.
     assert space.nodes == ((5, 6), (6, 5))
@@ -133,25 +134,24 @@ def test_a_geojson_file_that_is_refused(line: str, tmp_path: Path) -> None:
         nodes_in(path, 8, 800.0)
 
 
-def test_a_file_that_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(name: str, line: str) -> None:
-        with pytest.raises(InputError, match=line):
-            nodes_in(tmp_path / name, 8, 800.0)
+FILES = {
+    "nowhere.csv": "no such file; allowed: a CSV file",
+    "nowhere.json": "no such file; allowed: a GeoJSON",
+    "buoys.xlsx": "has no known file ending; allowed: .csv, .geojson, .json",
+    "bytes.csv": "cannot be read: it is not text",
+    "no.json": "not valid JSON",
+    "large.csv": "is too large; allowed: 7 bytes at most",
+}
 
-    refuse("nowhere.csv", "nowhere.csv: no such file; allowed: a CSV file")
-    refuse("nowhere.json", "nowhere.json: no such file; allowed: a GeoJSON")
-    refuse("buoys.xlsx", "buoys.xlsx: has no known file ending; allowed: .csv, .geojson, .json")
-    (tmp_path / "folder.csv").mkdir()
-    refuse("folder.csv", "folder.csv: cannot be read: it is a folder")
-    os.mkfifo(tmp_path / "pipe.csv")
-    refuse("pipe.csv", "pipe.csv: cannot be read: it is a pipe")
-    (tmp_path / "bytes.csv").write_bytes(b"x,y\n\xff,1\n")
-    refuse("bytes.csv", "bytes.csv: cannot be read: it is not text")
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_that_is_none(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "bytes.csv").write_bytes(b"x,y\n\xff")
     (tmp_path / "no.json").write_text("{")
-    refuse("no.json", "no.json: not valid JSON")
-    _csv(tmp_path, "x,y\n1,1\n")
+    (tmp_path / "large.csv").write_text("x,y\n1,1\n")
     monkeypatch.setattr(sea, "LIMIT", 7)
-    refuse("buoys.csv", "buoys.csv: is too large; allowed: 7 bytes at most")
+    with pytest.raises(InputError, match=f"{name}: {FILES[name]}"):
+        nodes_in(tmp_path / name, 8, 800.0)
 
 
 @pytest.mark.parametrize(
@@ -172,14 +172,6 @@ def test_a_table_lies_in_the_folder_of_its_scenario(name: str, tmp_path: Path) -
     with pytest.raises(InputError, match=f"^{path}: nodes: .*allowed: the name of a file") as error:
         load_scenario(path)
     assert "password" not in str(error.value)
-
-
-def test_a_link_within_the_folder_is_followed(tmp_path: Path) -> None:
-    _csv(tmp_path, "x,y\n5,6\n")
-    (tmp_path / "nodes.csv").symlink_to("buoys.csv")
-    path = tmp_path / "sea.toml"
-    path.write_text('nodes = "nodes.csv"\n')
-    assert load_scenario(path).nodes == ((5, 6),)
 
 
 def test_the_shipped_bay_has_its_nodes_beside_it() -> None:

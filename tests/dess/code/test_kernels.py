@@ -24,51 +24,38 @@ if __name__ == "__main__":
 
 CALLEE = """
 from dess.code.kernels import kernel
+from constant import ONE
 
 @kernel
 def inner(x):
-    return x + {}
+    return x + ONE
 """
 
 
-def _run(folder: Path) -> str:
-    script = [sys.executable, "caller.py"]
-    done = subprocess.run(script, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However it is reached; a comment is no change."""
     monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
     # Python itself misses a change within the second in which it wrote its bytecode.
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "callee.py").write_text(CALLEE.format(1))
-    assert _run(tmp_path) == "2 compiled"
-    return tmp_path
-
-
-def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(folder: Path) -> None:
-    assert _run(folder) == "2 cached"
-    (folder / "callee.py").write_text(CALLEE.format(10))
-    assert _run(folder) == "11 compiled"
-
-
-def test_a_comment_compiles_nothing_anew(folder: Path) -> None:
-    for name in ("caller.py", "callee.py"):
-        path = folder / name
-        path.write_text(f'"""A docstring."""\n\n# A comment.\n\n{path.read_text()}')
-    assert _run(folder) == "2 cached"
-
-
-def test_a_module_beside_the_script_counts_however_it_is_reached(folder: Path) -> None:
-    (folder / "constant.py").write_text("ONE = 1\n")
-    callee = "from constant import ONE\n" + CALLEE.format("ONE")
-    (folder / "callee.py").write_text(callee)
-    assert _run(folder) == "2 compiled"
-    (folder / "constant.py").write_text("ONE = 3\n")
-    assert _run(folder) == "4 compiled"
+    sources = {"caller.py": CALLER, "callee.py": CALLEE, "constant.py": "ONE = 1\n"}
+    commented = {name: f'"""Docs."""\n\n# A comment.\n{text}' for name, text in sources.items()}
+    for changed, printed in [
+        (sources, "2 compiled"),
+        ({}, "2 cached"),
+        (
+            {name: f'"""Docs."""\n\n# A comment.\n{text}' for name, text in sources.items()},
+            "2 cached",
+        ),
+        ({"callee.py": CALLEE.replace("x + ONE", "x + 10")}, "11 compiled"),
+        ({"callee.py": CALLEE, "constant.py": "ONE = 3\n"}, "4 compiled"),
+    ]:
+        for name, text in changed.items():
+            (tmp_path / name).write_text(text)
+        script = [sys.executable, "caller.py"]
+        done = subprocess.run(script, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert done.stdout.strip() == printed
 
 
 def test_without_compilation_there_is_no_simulator(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,11 @@
-"""Age of information against sawtooths worked out by hand and from the event log."""
+"""Age of information against a sawtooth worked out by hand, and against samples."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dess.scenario import Scenario
 from dess.sections.age import age_of_teeth
-from tests.dess.flights import flown
 
 Tooth = tuple[float, float]
 
@@ -15,9 +13,6 @@ Tooth = tuple[float, float]
 def _of_teeth(teeth: list[Tooth]) -> tuple[float, float]:
     lows, highs = (np.array(ends) for ends in zip(*teeth, strict=True))
     return age_of_teeth(lows, highs, np.ones(len(teeth)))
-
-
-# --- the teeth ---
 
 
 def test_two_teeth_by_hand() -> None:
@@ -42,23 +37,3 @@ def test_the_mean_and_the_percentile_are_those_of_a_fine_sample(teeth: list[Toot
     above = np.maximum(highs - np.maximum(lows, percentile), 0.0).sum()
     assert above == pytest.approx(0.01 * time)
     assert lows.min() <= percentile <= highs.max()
-
-
-# --- missions ---
-
-
-def test_a_node_that_is_emptied_at_fixed_gaps() -> None:
-    """A UAV hovers over a node, which new data reach in each slot: it is empty after t + 1/m."""
-    slots, m = 40, 5
-    scenario = Scenario.of(
-        **{"grid": 4, "zone": [1, 1, 1, 1], "nodes": [[1, 1]], "uavs": 1, "quota": 1000},
-        **{"slot_length": 1000, "edge_snr": 300, "arrival_rate": 100, "flying_time": 100},
-        **{"max_slots": slots, "communication_slots": m, "age.measured": True},
-    )
-    record, _ = flown(scenario, "")
-    assert record.slots == slots
-    area = (1 / m) ** 2 / 2 + (slots - 1) / 2 + (1 - 1 / m) ** 2 / 2
-    assert record.age == pytest.approx(area / slots)
-    assert record.peak_age == pytest.approx((1 / m + slots - 1) / slots)
-    # 39 of 41 teeth pass the highest ages.
-    assert record.age_p99 == pytest.approx(1 - 0.01 * slots / (slots - 1))

@@ -1,4 +1,4 @@
-"""Missions with packets: when they are served, what policies see of them, what is lost."""
+"""Missions with packets: what policies see of them, and who simulates them."""
 
 from typing import Any
 
@@ -31,16 +31,6 @@ def _above(policy: Any = HOVER, **values: Any) -> tuple[Buffers, Any]:
     return model.packets.buffers, record
 
 
-@pytest.mark.parametrize("m", [1, 3, 4, 7])
-def test_a_packet_is_served_in_the_next_communication_slot(m: int) -> None:
-    """Also where the node was empty before, and inside a group of communication slots."""
-    buffers, record = _above(communication_slots=m, arrival_rate=1.5)
-    done = buffers.packets[buffers.delivered]
-    assert len(done) > 50
-    assert done["left"] == pytest.approx(np.ceil(done["generated"] * m) / m)
-    assert record.latency == pytest.approx((done["left"] - done["generated"]).mean())
-
-
 def test_policies_see_the_age_of_the_newest_data() -> None:
     seen = []
 
@@ -57,18 +47,6 @@ def test_policies_see_the_age_of_the_newest_data() -> None:
     _, plain = _above(arrival_rate=0.3)
     last = record.slots - packets["generated"][packets["left"] <= record.slots].max()
     assert record.reward - plain.reward == pytest.approx(-2.0 * (sum(seen[1:]) + last))
-
-
-@pytest.mark.parametrize("node_data", ["kept", "lost"])
-def test_packets_of_silent_nodes_wait_or_are_lost(node_data: str) -> None:
-    """A node falls silent after slot 0 for good: no UAV gets the packets that arrive later."""
-    failures = {"node_rate": 1.0, "node_data": node_data}
-    buffers, record = _above(arrival_rate=1.0, failures=failures)
-    late = [n for n, packet in enumerate(buffers.all) if packet.generated > 1]
-    assert len(late) > 20 and not {*late} & {*buffers.delivered}
-    assert np.isnan(buffers.packets["left"][late]).all() == (node_data == "kept")
-    lost, residual = (len(late), 0) if node_data == "lost" else (0, len(late))
-    assert (record.lost, record.residual) == (lost, residual)
 
 
 def test_only_the_simpy_engine_has_continuous_arrivals() -> None:
