@@ -1,33 +1,19 @@
 """The rows of an event log, taken one after the other."""
 
 import math
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any
 
 
 class WrongLogError(Exception):
     """The log is not that of a mission of the model."""
 
 
-class Row(NamedTuple):
-    """A row of the log."""
-
-    time: float
-    event: str
-    uav: int
-    node: int
-    value: float
-    x: float
-    y: float
-    battery: int
-    other: int
-    snr: float
-    packet: int
-    generated: float
-
+Row = namedtuple("Row", "time event uav node value x y battery other snr packet generated")
 
 # What a row has in the columns that say nothing of its event; a value must always be expected.
-_NONE = {"uav": -1, "node": -1, "x": -1, "y": -1, "battery": -1, "other": -1}
-_NONE |= {"packet": -1, "generated": math.nan}
+_NONE = dict.fromkeys(("uav", "node", "x", "y", "battery", "other", "packet"), -1)
+_NONE |= {"generated": math.nan}
 
 
 class Log:
@@ -41,21 +27,18 @@ class Log:
             raise WrongLogError(f"row {self.place - 1}, slot {self.slot}: {problem}")
 
     @property
-    def next_row(self) -> Row:
+    def next_row(self) -> Any:
         self.require(self.place < len(self.rows), "the log ends too early")
         return self.rows[self.place]
 
     def next_is(self, time: float, *events: str, **values: Any) -> bool:
         """Whether the next row has this time, one of these events and these values."""
-        rows = self.rows[self.place : self.place + 1]
-        return any(
-            row.time == time
-            and row.event in events
-            and all(getattr(row, name) == value for name, value in values.items())
-            for row in rows
-        )
+        for row in self.rows[self.place : self.place + 1]:
+            is_event = row.time == time and row.event in events
+            return is_event and all(getattr(row, name) == values[name] for name in values)
+        return False
 
-    def take(self, event: str, time: float, **expected: Any) -> Row:
+    def take(self, event: str, time: float, **expected: Any) -> Any:
         """The next row, which must be this event and have the expected values.
 
         Any SNR is accepted of a communication; no other row has one.
@@ -63,7 +46,7 @@ class Log:
         is_next = self.next_is(time, event)
         self.place += 1
         self.require(is_next, f"{event} at {time} expected")
-        row = self.rows[self.place - 1]
+        row: Any = self.rows[self.place - 1]
         for name, value in (_NONE | expected).items():
             self.require(_same(getattr(row, name), value), f"{event}: {name} must be {value}")
         self.require(math.isnan(row.snr) == (event != "communication"), f"{event}: its snr")

@@ -3,11 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tests.dess.auditor import pads
 from tests.dess.auditor.failures import Failures
 from tests.dess.auditor.log import Log, Row
 from tests.dess.auditor.nodes import Nodes
-from tests.dess.auditor.pads import Pads
+from tests.dess.auditor.pads import EVENTS, Pads
 from tests.dess.auditor.uavs import Fleet, Uav
 
 PARAMETERS = ("seed", "replication", "flying_time", "charge_start", "charge_complete")
@@ -28,7 +27,10 @@ def audit(columns: Mapping[str, Sequence[Any]], constants: Mapping[str, Any]) ->
         WrongLogError: If a row is not what the model makes of the rows before it.
     """
     rows = [Row(*values) for values in zip(*(columns[n] for n in Row._fields), strict=True)]
-    return _Auditor(Log(rows), constants).report()
+    auditor = _Auditor(Log(rows), constants)
+    auditor.replay()
+    uavs = [vars(u) for u in auditor.fleet.uavs]
+    return {"metrics": auditor.metrics(), "measured": auditor.measured(), "uavs": uavs}
 
 
 class _Auditor:
@@ -40,23 +42,14 @@ class _Auditor:
         self.failures = Failures(log, constants, self.fleet, self.pads, self.nodes)
         self.parameters: dict[str, int] = {}
 
-    @property
-    def uavs(self) -> list[Uav]:
-        return self.fleet.uavs
-
-    def report(self) -> dict[str, Any]:
+    def replay(self) -> None:
         self._begin()
         while self.fleet.active:
             self._replay_slot()
-        for i in range(len(self.uavs)):
+        for i in range(len(self.fleet.uavs)):
             self.fleet.take("mission_end", self.log.slot, i)
         self.nodes.end()
         self.log.require(self.log.place == len(self.log.rows), "rows after the end")
-        return {
-            "metrics": self._metrics(),
-            "measured": self._measured(),
-            "uavs": [vars(u) for u in self.uavs],
-        }
 
     def _begin(self) -> None:
         self.fleet.begin()
@@ -68,12 +61,12 @@ class _Auditor:
         self.fleet.check_batteries(self.parameters["flying_time"])
         self.pads.start = self.parameters["charge_start"]
         self.pads.complete = self.parameters["charge_complete"]
-        for u in self.uavs:
+        for u in self.fleet.uavs:
             self.pads.update_latch(u)
 
     def _replay_slot(self) -> None:
         log, active, begin = self.log, self.fleet.active, self.log.place
-        while log.next_is(log.slot, *pads.EVENTS):  # they depend on the moves, which come after
+        while log.next_is(log.slot, *EVENTS):  # they depend on the moves, which come after
             log.place += 1
         self.fleet.read_moves()
         after, log.place = log.place, begin
@@ -82,8 +75,8 @@ class _Auditor:
         self.fleet.spend()
         self.fleet.take_moves()
         log.require(log.place == after, "the zone or the moves have other rows")
-        m = self.c["communication_slots"]
-        data = sum(self.nodes.communicate(n) for n in range(1, m + 1))
+        slots = range(1, self.c["communication_slots"] + 1)
+        data = sum(map(self.nodes.communicate, slots))
         log.slot += 1
         self.nodes.arrive()
         for i, u in active:
@@ -91,66 +84,61 @@ class _Auditor:
         self.failures.replay()
 
     def _settle(self, i: int, u: Uav, data: float) -> None:
-        c, charged = self.c, u.charging
+        c, charged, slot = self.c, u.charging, self.log.slot
         if u.communications >= u.quota:
             u.end = "quota"
         elif u.battery <= 0:
             u.end = "battery"
-        elif self.log.slot >= c["max_slots"]:
+        elif slot >= c["max_slots"]:
             u.end = "truncated"
         u.reward += c["reward_data"] * data + c["reward_step"]
         u.reward += c["reward_overruled"] * (u.other is not None) + c["reward_charging"] * charged
         u.reward += c["reward_quota"] * (u.end == "quota")
         u.reward += c["reward_depleted"] * (u.end == "battery")
-        u.reward += c.get("age", {}).get("reward", 0.0) * self.nodes.ages.mean_at(self.log.slot)
+        u.reward += c.get("age", {}).get("reward", 0.0) * self.nodes.ages.mean_at(slot)
         if charged and (u.battery >= self.pads.complete or u.end):
             u.charging, u.requested = False, -1
-            self.fleet.take("charge_end", self.log.slot, i)
+            self.fleet.take("charge_end", slot, i)
         if u.end == "quota":
-            self.fleet.take("quota_filled", self.log.slot, i, value=u.communications)
+            self.fleet.take("quota_filled", slot, i, value=u.communications)
         if u.end == "battery":
-            self.fleet.take("battery_empty", self.log.slot, i)
+            self.fleet.take("battery_empty", slot, i)
         self.pads.update_latch(u)
 
-    # --- the record ---
+    def _sum(self, name: str) -> Any:
+        return sum(getattr(u, name) for u in self.fleet.uavs)
 
-    def _metrics(self) -> dict[str, Any]:
-        total = self.nodes.initial + self.nodes.arrived
-        success = int(all(u.end == "quota" for u in self.uavs))
-        collected = sum(u.collected for u in self.uavs)
+    def metrics(self) -> dict[str, Any]:
+        """The paper's metrics."""
+        nodes, collected = self.nodes, self._sum("collected")
+        total = nodes.initial + nodes.arrived
+        success = int(all(u.end == "quota" for u in self.fleet.uavs))
         ratio = min(max(collected / total, 0.0), 1.0) if total > 0 else 1.0
         return self.parameters | {
-            "uavs": len(self.uavs),
-            "slots": self.log.slot,
-            "uav_slots": sum(u.slots_flying + u.slots_charging for u in self.uavs),
-            "success": success,
-            "initial": self.nodes.initial,
-            "arrived": self.nodes.arrived,
-            "collected": collected,
-            "residual": sum(self.nodes.residual),
+            **{"uavs": len(self.fleet.uavs), "slots": self.log.slot, "success": success},
+            "uav_slots": self._sum("slots_flying") + self._sum("slots_charging"),
+            **{"initial": nodes.initial, "arrived": nodes.arrived, "collected": collected},
+            **{"residual": sum(nodes.residual), "reward": self._sum("reward")},
             "collection_ratio": ratio,
             "collection_ratio_and_communication": ratio * success,
-            "reward": sum(u.reward for u in self.uavs),
         }
 
-    def _measured(self) -> dict[str, float]:
+    def measured(self) -> dict[str, float]:
         """What the record has beyond the paper's metrics, by the sections that are on."""
         found: dict[str, float] = {}
-        buffers, slots = self.nodes.buffers, self.log.slot
+        packets, slots = self.nodes.packets, self.log.slot
         if self.c.get("age", {}).get("measured"):
             found |= self.nodes.ages.metrics(slots)
-        if buffers is not None:
-            found |= buffers.metrics()
-        if buffers is not None or "failures" in self.c:
+        if packets is not None:
+            found |= packets.metrics()
+        if packets is not None or "failures" in self.c:
             found["lost"] = self.nodes.lost
         if "failures" in self.c:
-            found["failures"] = self.failures.of_uavs
-            found["slots_grounded"] = sum(u.slots_grounded for u in self.uavs)
+            grounded = self._sum("slots_grounded")
+            found |= {"failures": self.failures.of_uavs, "slots_grounded": grounded}
         if "charging" in self.c:
-            waited = sum(u.slots_waiting for u in self.uavs)
-            charged, requests = sum(u.slots_charging for u in self.uavs), self.pads.requests
-            found["queue"] = waited / slots
-            found["waiting"] = waited / requests if requests else 0.0
+            waited, requests = self._sum("slots_waiting"), self.pads.requests
+            found |= {"queue": waited / slots, "waiting": waited / requests if requests else 0.0}
             found["pad_requests"] = requests
-            found["utilisation"] = charged / (self.pads.number * slots)
+            found["utilisation"] = self._sum("slots_charging") / (self.pads.number * slots)
         return found

@@ -4,12 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from tests.dess.auditor.ages import Ages
-from tests.dess.auditor.buffers import Buffers
-from tests.dess.auditor.log import Log, Row
-from tests.dess.auditor.uavs import Fleet
-
-LARGEST_DEVIATE = 6.34  # of the shadowing, in standard deviations
+from tests.dess.auditor.log import Log
+from tests.dess.auditor.packets import Ages, Packets
+from tests.dess.auditor.uavs import LARGEST_DEVIATE, Fleet
 
 
 class Nodes:
@@ -31,9 +28,9 @@ class Nodes:
         self.loses = constants.get("failures", {}).get("node_data") == "lost"
         arrivals = constants.get("arrivals", {"process": "slotted"})
         is_continuous = arrivals["process"] == "continuous"
-        self.buffers = Buffers(log, arrivals, self.cells) if is_continuous else None
+        self.packets = Packets(log, arrivals, self.cells) if is_continuous else None
 
-    def take(self, event: str, time: float, k: int, **expected: Any) -> Row:
+    def take(self, event: str, time: float, k: int, **expected: Any) -> Any:
         """The next row, which must be of a node."""
         x, y = self.cells[k]
         return self.log.take(event, time, node=k, x=x, y=y, **expected)
@@ -42,11 +39,10 @@ class Nodes:
         """Take the initial data from the log."""
         low, high = self.c["initial_data"]
         for k in range(len(self.cells)):
-            amount = self.log.next_row.value
-            packet: dict[str, Any] = {}
-            if self.buffers is not None and amount > 0:
-                self.buffers.store(k, 0.0, amount)
-                packet = {"packet": len(self.buffers.packets) - 1, "generated": 0.0}
+            amount, packet = self.log.next_row.value, {}
+            if self.packets is not None and amount > 0:
+                packet = {"packet": len(self.packets.all), "generated": 0.0}
+                self.packets.store(k, 0.0, amount)
             self.take("mission_start", 0.0, k, value=amount, **packet)
             self.log.require(low <= amount <= high, "initial data out of range")
             self.residual.append(amount)
@@ -63,70 +59,69 @@ class Nodes:
     def communicate(self, n: int) -> float:
         """Replay a communication slot; return the data that all UAVs have collected in it."""
         time, served = self.log.slot + n / self.c["communication_slots"], []
-        if self.buffers is not None:
-            self._packets_arrive(time)
+        if self.packets is not None:
+            self._packets_arrive(self.packets, time)
         for i, u in enumerate(self.fleet.uavs):
             if u.flies and any(data > 0 for data in self.residual):
                 served.append((i, self._serve(i, n, time)))
-        if self.buffers is not None:
-            self._deliver(self.buffers, served)
+        if self.packets is not None:
+            self._deliver(self.packets, served)
         return sum(row.value for _, row in served)
 
-    def _serve(self, i: int, n: int, time: float) -> Row:
-        u, m = self.fleet.uavs[i], self.c["communication_slots"]
-        share = u.share_of_move(n, m)
+    def _serve(self, i: int, n: int, time: float) -> Any:
+        u, m, log = self.fleet.uavs[i], self.c["communication_slots"], self.log
+        slots = u.slots_per_cell
+        share = ((slots - 1 - u.slots_left) * m + n) / (slots * m)  # of its move, behind it
         x, y = u.from_x + (u.x - u.from_x) * share, u.from_y + (u.y - u.from_y) * share
-        chosen = {"node": self.log.next_row.node, "value": self.log.next_row.value}
-        row = self.fleet.take("communication", time, i, x=x, y=y, **chosen)
+        k, value = log.next_row.node, log.next_row.value
+        row = self.fleet.take("communication", time, i, x=x, y=y, node=k, value=value)
         self._check_snr(row)
         rate = self.c["slot_length"] / m * math.log1p(10 ** (row.snr / 10)) / math.log(2)
-        amount = min(rate * u.rate, self.residual[row.node])
-        self.log.require(math.isclose(row.value, amount, rel_tol=1e-9), "its SNR has another rate")
-        self.residual[row.node] -= row.value
-        self.log.require(self.residual[row.node] >= 0, "more data than the node has")
-        if self.residual[row.node] == 0 and self.buffers is None:
-            self.ages.fall(row.node, time, time)
-        u.collected += row.value
+        amount = min(rate * u.rate, self.residual[k])
+        log.require(math.isclose(value, amount, rel_tol=1e-9), "its SNR has another rate")
+        self.residual[k] -= value
+        log.require(self.residual[k] >= 0, "more data than the node has")
+        if self.residual[k] == 0 and self.packets is None:
+            self.ages.fall(k, time, time)
+        u.collected += value
         u.communications += 1
         return row
 
-    def _check_snr(self, row: Row) -> None:
+    def _check_snr(self, row: Any) -> None:
         """The node must have data and may have the highest SNR of all, given their shadowing."""
         reach = LARGEST_DEVIATE * math.sqrt(self.c["shadowing_variance"]) + 1e-9
-        with_data = [k for k, data in enumerate(self.residual) if data > 0]
-        self.log.require(row.node in with_data, "a node without data")
-        mean = {k: self._mean_snr(row.x, row.y, self.cells[k]) for k in with_data}
+        mean = {k: self._mean_snr(row, k) for k, data in enumerate(self.residual) if data > 0}
+        self.log.require(row.node in mean, "a node without data")
         self.log.require(abs(row.snr - mean[row.node]) <= reach, "an SNR that its node cannot have")
         self.log.require(row.snr >= max(mean.values()) - reach, "another node has a higher SNR")
 
-    def _mean_snr(self, x: float, y: float, node: tuple[int, int]) -> float:
-        c = self.c
-        horizontal = c["cell_size"] * math.hypot(x - node[0], y - node[1])
+    def _mean_snr(self, row: Any, k: int) -> float:
+        c, (x, y) = self.c, self.cells[k]
         edge = math.sqrt(2) / 2 * c["grid"] * c["cell_size"]
-        distance = math.hypot(horizontal, c["altitude"])
+        distance = math.hypot(c["cell_size"] * math.hypot(row.x - x, row.y - y), c["altitude"])
         return c["edge_snr"] - 10 * c["path_loss_exponent"] * math.log10(distance / edge)
 
-    def _deliver(self, buffers: Buffers, served: list[tuple[int, Row]]) -> None:
+    def _deliver(self, packets: Packets, served: list[tuple[int, Any]]) -> None:
         """Take what the UAVs have collected in a communication slot from the packets."""
         for i, row in served:
-            self._collect(buffers, i, row, row.value)
+            self._collect(packets, i, row, row.value)
         for i, row in served:  # the data of a node and of its packets are rounded in other orders
-            if not buffers.waiting[row.node]:
+            if not packets.waiting[row.node]:
                 self.residual[row.node] = 0.0
             elif self.residual[row.node] == 0.0:
-                self._collect(buffers, i, row, math.inf)
+                self._collect(packets, i, row, math.inf)
 
-    def _collect(self, buffers: Buffers, i: int, row: Row, amount: float) -> None:
+    def _collect(self, packets: Packets, i: int, row: Any, amount: float) -> None:
         battery = self.fleet.uavs[i].battery
-        for number in buffers.serve(row.node, row.time, amount, i, battery):
-            self.ages.fall(row.node, row.time, buffers.packets[number].generated)
+        for packet in packets.serve(row.node, row.time, amount, i, battery):
+            self.ages.fall(row.node, row.time, packet.generated)
 
     # --- new data ---
 
     def arrive(self) -> None:
         """Take the new data at the end of a slot from the log."""
         last = -1
-        while self.buffers is None and self.log.next_is(self.log.slot, "arrival"):
+        while self.packets is None and self.log.next_is(self.log.slot, "arrival"):
             amount, k = self.log.next_row.value, self.log.next_row.node
             self.log.require(last < k < len(self.cells), "an arrival out of order")
             self.take("arrival", self.log.slot, k, value=amount)
@@ -136,23 +131,20 @@ class Nodes:
             self.arrived += amount
             last = k
 
-    def _packets_arrive(self, until: float) -> None:
+    def _packets_arrive(self, packets: Packets, until: float) -> None:
         """Take the packets that arrive before a communication slot from the log."""
-        buffers, now = self.buffers, until - 1 / self.c["communication_slots"] - 1e-9
-        assert buffers is not None
-        while self.log.next_row.event == "arrival" and self.log.next_row.time < until:
-            time, k = self.log.next_row.time, self.log.next_row.node
+        now = until - 1 / self.c["communication_slots"] - 1e-9
+        while (row := self.log.next_row).event == "arrival" and row.time < until:
+            time, k, number = row.time, row.node, len(packets.all)
             self.log.require(now <= time and 0 <= k < len(self.cells), "an arrival out of order")
-            number, now = len(buffers.packets), time
             self.take("arrival", time, k, value=1.0, packet=number, generated=time)
-            buffers.check_rate(k, time, self.c["arrival_rate"])
+            packets.check_rate(k, time, self.c["arrival_rate"])
+            now, gained = time, 1.0
             self.arrived += 1.0
-            lost = buffers.store(k, time, 1.0)
-            if k in self.silent and self.loses:
-                lost = number
-            gained = 1.0
+            lost = packets.store(k, time, 1.0)
+            lost = number if k in self.silent and self.loses else lost
             if lost >= 0:
-                amount = buffers.lose(lost, time)
+                amount = packets.lose(lost, time)
                 self.lost += amount
                 gained -= amount
             (self.hidden if k in self.silent else self.residual)[k] += gained

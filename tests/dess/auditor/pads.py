@@ -45,18 +45,15 @@ class Pads:
         self.fleet.take("charge_request", self.log.slot, i)
 
     def _may_charge(self, u: Uav) -> bool:
-        zone_x, zone_y, width, height = self.c["zone"]
-        inside = 0 <= u.x - zone_x < width and 0 <= u.y - zone_y < height
-        return not u.end and not u.grounded and u.latch and u.asked == HOVER and inside
+        is_ready = not u.end and not u.grounded and u.latch and u.asked == HOVER
+        return is_ready and self.fleet.in_zone(*u.cell)
 
     def _in_order(self, indices: list[int]) -> list[int]:
         """UAVs in the order of the queue."""
 
-        def place(i: int) -> tuple[int, int, int]:
-            u = self.fleet.uavs[i]
-            return (u.battery if self.by_battery else 0), u.requested, i
-
-        return sorted(indices, key=place)
+        uavs = self.fleet.uavs
+        rank = {i: (uavs[i].battery * self.by_battery, uavs[i].requested, i) for i in indices}
+        return sorted(indices, key=rank.__getitem__)
 
     def charge(self) -> None:
         """Charge the UAVs on the pads."""
