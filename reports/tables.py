@@ -4,10 +4,12 @@ Every function turns rows of ``analysis.questions`` into text, with the same col
 both; ``reports.pages.html.table`` and ``reports.cli.study.tables.print_frame`` write them.
 """
 
+import numpy as np
 import pandas as pd
 
 from analysis import numbers
 from analysis.names import COST, METRICS, PRODUCT, metric_name
+from analysis.stats.verdict import MARKS, position_by_test
 
 
 def means(rows: pd.DataFrame) -> pd.DataFrame:
@@ -21,14 +23,26 @@ def means(rows: pd.DataFrame) -> pd.DataFrame:
 def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:
     """Rows of ``analysis.compare``: differences in every metric, and the p-value of the product.
 
+    The mark of a difference says whether it is significant, by its adjusted p-value.
+
     Args:
-        rows: The rows.
+        rows: The rows. Those of ``analysis.compare_learners`` have the prediction interval of the
+            product of one new training as well; a single training has none.
         of: The column that tells what is compared.
     """
-    estimates = rows.rename(columns={"difference": "mean"})
-    shown = numbers.wide(estimates, of, write=numbers.points).rename(columns=METRICS)
-    p = rows[rows["metric"] == PRODUCT].set_index(of)["p_adjusted"]
-    shown["p of the product"] = p.map(numbers.p_value)
+    sides = map(position_by_test, rows["difference"], rows["p_adjusted"])
+    ends = rows[["difference", "low", "high"]].to_numpy()
+    texts = [f"{numbers.points(*e)} {MARKS[s]}" for e, s in zip(ends, sides, strict=True)]
+    heads = rows["metric"].map(METRICS)
+    cells = rows.assign(text=texts, head=heads).pivot(index=of, columns="head", values="text")
+    product = rows[rows["metric"] == PRODUCT].set_index(of)
+    shown = cells.loc[product.index, heads.unique()].rename_axis(columns=None)
+    if "trainings" in rows:
+        new = product[["difference", "new_low", "new_high"]].to_numpy()
+        texts = [numbers.points(*e).partition(" ")[2] for e in new]
+        shown["One new training"] = np.where(product["trainings"] > 1, texts, "unknown")
+        shown["Trainings"] = product["trainings"]
+    shown["p of the product"] = product["p_adjusted"].map(numbers.p_value)
     return shown.reset_index(names=of.capitalize())
 
 

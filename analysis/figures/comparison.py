@@ -15,8 +15,9 @@ from matplotlib.figure import Figure
 from analysis import numbers
 from analysis.figures import drawings, style
 from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
-from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
+from analysis.questions.head_to_head import Pair
 from analysis.questions.optimality.gap import ALL, fleet
+from analysis.questions.regions import AHEAD, BEHIND
 from analysis.questions.what_if.question import SIDES
 from analysis.stats.intervals import LEVEL
 from analysis.stats.verdict import INCONCLUSIVE

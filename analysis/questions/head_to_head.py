@@ -5,31 +5,28 @@ policies meet the same random draws, so they are compared mission by mission:
 
     pair = pair_of(results)           # the best learned policy and the best baseline
     missions = duels(results, pair)   # a row per mission, with the difference of the two
-    overall(missions, pair)           # mean differences with intervals
+    overall(results, pair)            # mean differences with intervals
 
 ``questions.regions`` says where in the space of parameters a policy is ahead.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pandas as pd
 
 from analysis import numbers
 from analysis.names import METRICS, PARAMETERS, PRODUCT, RATIO, SUCCESS, parameter
-from analysis.questions.summary import learned_against_heuristic, learners, ranked_policies
+from analysis.questions.summary import learners, ranked_policies
 from analysis.results.tables import Results
 from analysis.stats.correction import for_choice
 from analysis.stats.intervals import wilson
 from analysis.stats.paired import compare
-from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, MARKS, position_by_test
 from dess.errors import InputError, one_of
 
-AHEAD, BEHIND = "ahead", "behind"
 OF_BASELINE = "_baseline"  # suffix of the names of the baseline's metrics
 
-_VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 _ROUNDING = 1e-12  # the largest difference between equal results
 
 
@@ -67,13 +64,15 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
         if given is not None and given not in results.policies:
             allowed = one_of(given, results.policies)
             raise InputError(f"{name}: {given!r} is not in the study{allowed}")
-    trained, baselines = _ranked(results)
+    means = results.missions.groupby("policy")[PRODUCT].mean()
+    trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
+    ranked, of_learners = ranked_policies(results.missions), {*sum(trained, [])}
     firsts = [trainings[0] for trainings in trained]
-    if not firsts or not baselines:
-        firsts = baselines = ranked_policies(results.missions)
-    firsts = [learned] if learned else firsts
-    baselines = [heuristic] if heuristic else baselines
-    pairs = [pair for pair in product(firsts, baselines) if pair[0] != pair[1]]
+    others = [policy for policy in ranked if policy not in of_learners]
+    if not firsts or not others:
+        firsts = others = ranked
+    asked = product([learned] if learned else firsts, [heuristic] if heuristic else others)
+    pairs = [pair for pair in asked if pair[0] != pair[1]]
     if not pairs:
         raise InputError(
             f"learned, heuristic: no two policies to compare among {', '.join(results.policies)}; "
@@ -82,26 +81,13 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
 
 
-def introduction(results: Results, pair: Pair, missions: pd.DataFrame) -> str:
+def introduction(pair: Pair, missions: int) -> str:
     """In words: the two policies of a pair, and the number of missions of ``duels``."""
-    policy, baseline, candidates = pair
     return (
-        f"**{policy}** is {role(results, policy)}, **{baseline}** is {role(results, baseline)}; "
-        f"these data chose them among {candidates} {'pair' if candidates == 1 else 'pairs'}. "
-        f"They are compared in the same {len(missions):,} missions. Differences are {policy} minus "
-        f"{baseline}; a positive difference means that {policy} is better."
-    )
-
-
-def role(results: Results, policy: str) -> str:
-    """The role of a policy in a study, such as ``training 1 of 3 of the best learner ...``."""
-    trained, baselines = _ranked(results)
-    for rank, trainings in enumerate(trained):
-        if policy in trainings:
-            number, article = trainings.index(policy) + 1, "a" if rank else "the best"
-            return f"training {number} of {len(trainings)} of {article} learner of the study"
-    article = "the best" if policy == baselines[0] else "a"
-    return f"{article} policy of the study that has not learned"
+        "**{0}** and **{1}** are compared in the same {3:,} missions. Differences are {0} minus "
+        "{1}; a positive difference means that {0} is better. These data chose the two among {2} "
+        "pairs."
+    ).format(*pair, missions)
 
 
 def duels(results: Results, pair: Pair) -> pd.DataFrame:
@@ -122,45 +108,23 @@ def duels(results: Results, pair: Pair) -> pd.DataFrame:
     table = results.missions.assign(
         initial_data=results.missions["initial"] / len(results.scenario().nodes)
     )
-    of_policy, of_baseline = (
-        table[table["policy"] == name] for name in (pair.policy, pair.baseline)
-    )
-    both = of_policy[["replication", *PARAMETERS, *METRICS]].merge(
-        of_baseline[["replication", *METRICS]], on="replication", suffixes=("", OF_BASELINE)
-    )
+    columns = ["replication", *PARAMETERS, *METRICS]
+    of_policy = table.loc[table["policy"] == pair.policy, columns]
+    of_baseline = table.loc[table["policy"] == pair.baseline, ["replication", *METRICS]]
+    both = of_policy.merge(of_baseline, on="replication", suffixes=("", OF_BASELINE))
     difference = both[PRODUCT] - both[PRODUCT + OF_BASELINE]
     return both.assign(difference=difference.where(difference.abs() > _ROUNDING, 0.0))
 
 
-def overall(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
-    """The policy compared with the baseline in every metric, over all missions of ``duels``.
+def overall(results: Results, pair: Pair) -> pd.DataFrame:
+    """The policy compared with the baseline in every metric, over all missions.
 
     Returns:
         A row per metric, as ``stats.paired.compare`` returns it; ``p_adjusted`` also corrects for
         the choice of the pair.
     """
-    parts = [
-        pd.DataFrame({metric: missions[metric + end] for metric in METRICS}).assign(
-            policy=policy, replication=missions["replication"]
-        )
-        for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE))
-    ]
-    return for_choice(compare(pd.concat(parts), pair.baseline, [*METRICS]), pair.candidates)
-
-
-def learners_against_baseline(results: Results) -> pd.DataFrame:
-    """``summary.learned_against_heuristic``, with ``learner`` as ``ddqn (3 trainings)``."""
-    table = learned_against_heuristic(results)
-    names = [
-        row.learner if row.trainings == 1 else f"{row.learner} ({row.trainings} trainings)"
-        for row in table.itertuples()
-    ]
-    return table.assign(learner=names)
-
-
-def verdict(difference: float, p_adjusted: float) -> str:
-    """Whether a policy is significantly ``AHEAD`` or ``BEHIND``, or this is ``INCONCLUSIVE``."""
-    return _VERDICTS[position_by_test(difference, p_adjusted)]
+    missions = results.missions[results.missions["policy"].isin(pair[:2])]
+    return for_choice(compare(missions, pair.baseline, [*METRICS]), pair.candidates)
 
 
 def pairing(comparison: pd.DataFrame) -> str:
@@ -173,53 +137,21 @@ def pairing(comparison: pd.DataFrame) -> str:
     return f"{1 / (1 - reduction):.0f} times as many" if reduction < 1 else "infinitely many"
 
 
-def by_metric(comparisons: pd.DataFrame, name: str = "policy") -> pd.DataFrame:
-    """Comparisons as a table to print: marked differences and p-values, a row per policy.
-
-    Args:
-        comparisons: A row per policy and metric, as in ``stats.paired.compare``, or per learner
-            and metric, as in ``stats.learners.compare_learners``: the product of these has the
-            prediction interval of one new training as well.
-        name: The column that tells the rows apart.
-    """
-    lines: list[dict[tuple[str, str], str]] = []
-    for policy, rows in comparisons.groupby(name, sort=False) if len(comparisons) else ():
-        line = {("", "Difference"): f"{policy} − {rows['baseline'].iloc[0]}"}
-        for row in rows.itertuples():
-            side = position_by_test(row.difference, row.p_adjusted)
-            points = numbers.points(row.difference, row.low, row.high)
-            line[METRICS[row.metric], "points"] = f"{points} {MARKS[side]}"
-            if row.metric == PRODUCT and "new_low" in rows:
-                line[METRICS[row.metric], "one new training"] = new_training(row)
-            line[METRICS[row.metric], "p, adjusted"] = numbers.p_value(row.p_adjusted)
-        lines.append(line)
-    return numbers.headed(lines)
-
-
-def new_training(comparison: Any) -> str:
-    """The prediction interval of a row of ``compare_learners`` [points]; a single one has none."""
-    if comparison.trainings == 1:
-        return "unknown"
-    ends = comparison.difference, comparison.new_low, comparison.new_high
-    return numbers.points(*ends).partition(" ")[2]
-
-
 def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
     """A table to print: in how many missions each policy is ahead, and fails alone."""
-    gap, n = missions["difference"], len(missions)
+    gap = missions["difference"]
     more = missions[SUCCESS] - missions[SUCCESS + OF_BASELINE]
-    counts = {
+    cases = {
         f"{pair.policy} ahead": gap > 0,
         "level": gap == 0,
         f"{pair.policy} behind": gap < 0,
         f"only {pair.policy} fails": more < 0,
         f"only {pair.baseline} fails": more > 0,
     }
-    rows = [
-        (outcome, f"{cases.sum():,}", numbers.interval(*wilson(int(cases.sum()), n)))
-        for outcome, cases in counts.items()
-    ]
-    return pd.DataFrame(rows, columns=["Outcome", "Missions", "Share"])
+    counts = pd.DataFrame(cases).sum()
+    shares = [numbers.interval(*wilson(count, len(missions))) for count in counts]
+    columns = {"Outcome": counts.index, "Missions": counts.map("{:,}".format), "Share": shares}
+    return pd.DataFrame(columns).reset_index(drop=True)
 
 
 def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
@@ -230,9 +162,9 @@ def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
     return missions.sort_values([PRODUCT, RATIO], kind="stable").head(count)
 
 
-def drawn(missions: pd.DataFrame, pair: Pair, count: int = 2) -> list[tuple[str, int]]:
-    """The missions to draw: the worst of ``duels``, each with both policies."""
-    replications = worst(missions, count)["replication"]
+def drawn(missions: pd.DataFrame, pair: Pair) -> list[tuple[str, int]]:
+    """The missions to draw: the worst two of ``duels``, each with both policies."""
+    replications = worst(missions, 2)["replication"]
     return [(policy, int(n)) for n in replications for policy in (pair.policy, pair.baseline)]
 
 
@@ -244,8 +176,7 @@ def most_lost(missions: pd.DataFrame, count: int) -> pd.DataFrame:
 
 def depleted(results: Results, policy: str, replications: Iterable[int]) -> int:
     """The number of UAVs of a policy whose battery is depleted before their quota is filled."""
-    uavs = _uavs(results, policy, replications)
-    return int((uavs["end"] == "battery").sum())
+    return int(_ends(results, policy, replications)["battery"].sum())
 
 
 def commands(results: Results, policy: str, replications: Iterable[int]) -> list[str]:
@@ -259,37 +190,22 @@ def commands(results: Results, policy: str, replications: Iterable[int]) -> list
 
 def listed(missions: pd.DataFrame, results: Results, pair: Pair) -> pd.DataFrame:
     """Missions of ``duels`` as a table to print: parameters, and the outcome of both policies."""
-    return numbers.headed(
-        {("", "Mission"): f"{row['replication']:.0f}"}
-        | {("", parameter(field).short): f"{row[field]:.3g}" for field in PARAMETERS}
-        | {("", "Points"): numbers.difference(row["difference"], 0)}
-        | _outcome(row, results, pair.policy, "")
-        | _outcome(row, results, pair.baseline, OF_BASELINE)
-        for _, row in missions.iterrows()
-    )
+    table = missions.reset_index(drop=True)
+    columns = {("", "Mission"): table["replication"].astype(str)}
+    for field in PARAMETERS:
+        columns["", parameter(field).short] = table[field].map("{:.3g}".format)
+    columns["", "Points"] = table["difference"].map(lambda gap: numbers.difference(gap, 0))
+    for policy, end in ((pair.policy, ""), (pair.baseline, OF_BASELINE)):
+        ends = _ends(results, policy, table["replication"])
+        filled = [f"{quota} of {n}" for quota, n in ends[["quota", "all"]].to_numpy()]
+        columns[policy, "Success"] = table[SUCCESS + end].map({1: "yes", 0: "no"})
+        columns[policy, "Quotas"] = pd.Series(filled, dtype=object)
+        columns[policy, "Collected"] = table[RATIO + end].map(numbers.percent)
+    return pd.DataFrame(columns)
 
 
-def _outcome(
-    mission: Mapping[str, Any], results: Results, policy: str, end: str
-) -> dict[tuple[str, str], str]:
-    """The outcome of a mission of ``duels`` for a policy, as cells of a row of ``listed``."""
-    ends = _uavs(results, policy, [mission["replication"]])["end"]
-    return {
-        (policy, "Success"): "yes" if mission[SUCCESS + end] else "no",
-        (policy, "Quotas"): f"{(ends == 'quota').sum()} of {len(ends)}",
-        (policy, "Collected"): numbers.percent(mission[RATIO + end]),
-    }
-
-
-def _uavs(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
-    uavs = results.uavs
-    return uavs[(uavs["policy"] == policy) & uavs["replication"].isin([*replications])]
-
-
-def _ranked(results: Results) -> tuple[list[list[str]], list[str]]:
-    """The trainings of every learner, and the policies that have not learned; the best first."""
-    means = results.missions.groupby("policy")[PRODUCT].mean()
-    trained = sorted(learners(results).values(), key=lambda trainings: -means[trainings].mean())
-    learned = {policy for trainings in trained for policy in trainings}
-    ranked = ranked_policies(results.missions)
-    return trained, [policy for policy in ranked if policy not in learned]
+def _ends(results: Results, policy: str, replications: Iterable[int]) -> pd.DataFrame:
+    """How the UAVs of missions end: a row per mission, and a column of counts per kind of end."""
+    uavs = results.uavs[results.uavs["policy"] == policy]
+    ends = pd.crosstab(uavs["replication"], uavs["end"], margins=True, margins_name="all")
+    return ends.reindex([*replications], columns=["quota", "battery", "all"], fill_value=0)

@@ -8,7 +8,6 @@ The missions of a design point that draws its parameters are a sample of the par
     rules(missions, pair.candidates)          # regions of a regression tree
 """
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,28 +17,23 @@ from sklearn.tree import DecisionTreeRegressor
 
 from analysis import numbers
 from analysis.names import PARAMETERS, PRODUCT, parameter, value_text
-from analysis.questions.head_to_head import AHEAD, BEHIND, OF_BASELINE, verdict
+from analysis.questions.head_to_head import OF_BASELINE
 from analysis.stats.correction import for_choice, with_adjusted
 from analysis.stats.intervals import wilson
 from analysis.stats.paired import paired
-from analysis.stats.verdict import INCONCLUSIVE
+from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 
 BINS = 5  # largest number of bins of a parameter
 # Of the regression tree: largest depth, and smallest number and share of missions in a leaf.
 DEPTH, LEAST, SHARE = 3, 20, 0.05
 
-Range = tuple[float, float]
+AHEAD, BEHIND = "ahead", "behind"
+VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
 
 
 def varied(missions: pd.DataFrame) -> list[str]:
     """The parameters that differ between the missions of ``duels``."""
     return [field for field in PARAMETERS if missions[field].nunique() > 1]
-
-
-def halves(missions: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The missions of even replications, for choosing regions, and of odd ones, for estimates."""
-    even = missions["replication"] % 2 == 0
-    return missions[even], missions[~even]
 
 
 def bins(values: pd.Series, most: int = BINS) -> tuple[np.ndarray, list[str]]:
@@ -72,11 +66,11 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
         ``behind``, the share of missions in which the policy is worse, with ``behind_low`` and
         ``behind_high``.
     """
-    parts = []
+    parts = [missions[:0].assign(field="", position=0, value="")]
     for field in varied(missions):
-        codes, names = bins(missions[field])
-        parts += [((field, code, name), missions[codes == code]) for code, name in enumerate(names)]
-    return _compared(parts, ["field", "position", "value"], candidates)
+        part = _binned(missions, field).assign(field=field)
+        parts.append(part.sort_values("position", kind="stable"))
+    return _compared(pd.concat(parts), ["field", "position", "value"], candidates)
 
 
 def across(missions: pd.DataFrame, first: str, second: str, candidates: int = 1) -> pd.DataFrame:
@@ -86,14 +80,9 @@ def across(missions: pd.DataFrame, first: str, second: str, candidates: int = 1)
         A row per pair of bins with missions: ``position``, ``value`` (of the first), ``position_2``
         and ``value_2`` (of the second), and the columns of a comparison, as in ``along``.
     """
-    (codes, names), (codes_2, names_2) = bins(missions[first]), bins(missions[second])
-    parts = [
-        ((code, name, code_2, name_2), missions[(codes == code) & (codes_2 == code_2)])
-        for code, name in enumerate(names)
-        for code_2, name_2 in enumerate(names_2)
-    ]
+    table = _binned(_binned(missions, second, "_2"), first)
     columns = ["position", "value", "position_2", "value_2"]
-    return _compared(parts, columns, candidates)
+    return _compared(table.sort_values(columns[::2], kind="stable"), columns, candidates)
 
 
 def dependence(missions: pd.DataFrame) -> pd.DataFrame:
@@ -128,8 +117,8 @@ def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame
         Up to two rows of ``dependence``, and rows of ``across``; both are empty if fewer than two
         parameters vary, or there are no missions of odd replications.
     """
-    chosen_on, judged_on = halves(missions)
-    chosen = dependence(chosen_on).head(2)
+    even = missions["replication"] % 2 == 0
+    chosen, judged_on = dependence(missions[even]).head(2), missions[~even]
     if len(chosen) < 2 or judged_on.empty:
         return chosen[:0], judged_on[:0]
     first, second = chosen["field"]
@@ -151,19 +140,19 @@ def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
         A row per region with missions of odd replications, the lowest mean first: ``rule`` in
         words, and the columns of a comparison, as in ``along``.
     """
-    fields = varied(missions) or [*PARAMETERS][:1]
-    grown_on, judged_on = halves(missions)
-    if grown_on.empty or judged_on.empty:
-        return _compared([], ["rule"], candidates)
-    least = max(LEAST, int(np.ceil(SHARE * len(grown_on))))
+    even, fields = missions["replication"] % 2 == 0, varied(missions) or [*PARAMETERS][:1]
+    if even.all() or not even.any():
+        return _compared(missions[:0].assign(rule=""), ["rule"], candidates)
+    least = max(LEAST, int(np.ceil(SHARE * even.sum())))
     tree = DecisionTreeRegressor(max_depth=DEPTH, min_samples_leaf=least, random_state=0)
-    tree.fit(grown_on[fields].to_numpy(float), grown_on["difference"])
-    leaves = tree.apply(judged_on[fields].to_numpy(float))
-    parts = [
-        ((_rule(missions, box),), judged_on[leaves == leaf])
-        for leaf, box in _leaves(tree.tree_, fields)
-    ]
-    table = _compared(parts, ["rule"], candidates)
+    values = missions[fields].to_numpy(float)
+    tree.fit(values[even], missions.loc[even, "difference"])
+    leaves = pd.Series(tree.apply(values), missions.index)
+    splits = {leaf: tree.decision_path(values[leaves == leaf])[0].indices for leaf in {*leaves}}
+    asked = tree.tree_.feature  # of every node; negative for a leaf
+    split_by = {leaf: {fields[asked[n]] for n in path[:-1]} for leaf, path in splits.items()}
+    rules = {leaf: _rule(missions[leaves == leaf], split_by[leaf]) for leaf in {*leaves}}
+    table = _compared(missions.assign(rule=leaves.map(rules))[~even], ["rule"], candidates)
     return table.sort_values("mean", kind="stable", ignore_index=True)
 
 
@@ -190,55 +179,45 @@ def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
     lines = []
     for row in dependences.itertuples():
         rows = lead[lead["field"] == row.field].sort_values("mean", kind="stable")
-        lowest, *_ = rows.itertuples()
-        *_, highest = rows.itertuples()
-        lines.append(
-            {
-                "Parameter": parameter(row.field).name,
-                "Lowest difference": f"{_points(lowest)} at {lowest.value}",
-                "Highest difference": f"{_points(highest)} at {highest.value}",
-                "Variance explained": numbers.percent(row.explained),
-                "p, adjusted": numbers.p_value(row.p_adjusted),
-            }
-        )
-    return pd.DataFrame(lines)
+        bins_ = [f"{_points(one)} at {one.value}" for one in rows.itertuples()]
+        shown = numbers.percent(row.explained), numbers.p_value(row.p_adjusted)
+        lines.append((parameter(row.field).name, bins_[0], bins_[-1], *shown))
+    heads = ["Parameter", "Lowest difference", "Highest difference", "Variance explained"]
+    return pd.DataFrame(lines, columns=[*heads, "p, adjusted"])
 
 
 def listed(regions: pd.DataFrame, policy: str) -> pd.DataFrame:
     """Rows of ``rules`` as a table to print, about a policy."""
-    lines = [
-        [
-            row.rule,
-            _points(row),
-            numbers.p_value(row.p_adjusted),
-            row.verdict,
-            numbers.interval(row.behind, row.behind_low, row.behind_high),
-            f"{row.n:,}",
-        ]
-        for row in regions.itertuples()
-    ]
-    columns = ["Region", "Points", "p, adjusted", f"{policy} is", "Missions lost", "n"]
-    return pd.DataFrame(lines, columns=columns)
+    columns = {
+        "Region": regions["rule"],
+        "Points": [_points(row) for row in regions.itertuples()],
+        "p, adjusted": regions["p_adjusted"].map(numbers.p_value),
+        f"{policy} is": regions["verdict"],
+        "Missions lost": numbers.estimates(regions, "behind"),
+        "n": regions["n"].map("{:,}".format),
+    }
+    return pd.DataFrame(columns)
 
 
-def _compared(
-    parts: Sequence[tuple[tuple[Hashable, ...], pd.DataFrame]],
-    columns: list[str],
-    candidates: int,
-) -> pd.DataFrame:
-    """A row for every part of the missions that is not empty: its labels and its comparison."""
+def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd.DataFrame:
+    """A row for every group of missions with the same labels: the labels and the comparison."""
     rows = []
-    for labels, missions in parts:
-        if missions.empty:
-            continue
-        of_policy, of_baseline = missions[PRODUCT], missions[PRODUCT + OF_BASELINE]
-        pair = paired(of_policy.to_numpy(), of_baseline.to_numpy(), metric=PRODUCT)
-        behind = wilson(int((missions["difference"] < 0).sum()), len(missions))
-        rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(missions), *behind))
+    for labels, part in missions.groupby(columns, sort=False):
+        of_policy, of_baseline = (part[PRODUCT + end].to_numpy() for end in ("", OF_BASELINE))
+        pair = paired(of_policy, of_baseline, metric=PRODUCT)
+        behind = wilson(int((part["difference"] < 0).sum()), len(part))
+        rows.append((*labels, pair.difference, pair.low, pair.high, pair.p, len(part), *behind))
     names = ["mean", "low", "high", "p", "n", "behind", "behind_low", "behind_high"]
     table = pd.DataFrame(rows, columns=[*columns, *names])
     table = for_choice(with_adjusted(table, "holm"), candidates)
-    return table.assign(verdict=[*map(verdict, table["mean"], table["p_adjusted"])])
+    sides = zip(table["mean"], table["p_adjusted"], strict=True)
+    return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
+
+
+def _binned(missions: pd.DataFrame, field: str, end: str = "") -> pd.DataFrame:
+    """The missions with ``position`` and ``value``, the number and the name of a field's bin."""
+    codes, names = bins(missions[field])
+    return missions.assign(**{f"position{end}": codes, f"value{end}": np.array(names)[codes]})
 
 
 def _equal_means(groups: Any) -> float:
@@ -247,29 +226,10 @@ def _equal_means(groups: Any) -> float:
     return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
 
 
-def _leaves(
-    tree: Any, fields: list[str], node: int = 0, box: Mapping[str, Range] | None = None
-) -> Iterator[tuple[int, Mapping[str, Range]]]:
-    """The leaves below a node of the tree, each with the range (low, high] of every split field."""
-    box = box or {}
-    left, right = tree.children_left[node], tree.children_right[node]
-    if left == right:  # a leaf
-        yield node, box
-        return
-    field, split = fields[tree.feature[node]], float(tree.threshold[node])
-    low, high = box.get(field, (-np.inf, np.inf))
-    yield from _leaves(tree, fields, left, {**box, field: (low, split)})
-    yield from _leaves(tree, fields, right, {**box, field: (split, high)})
-
-
-def _rule(missions: pd.DataFrame, box: Mapping[str, Range]) -> str:
-    """A box of parameter ranges in words, by the values of the missions in it."""
-    sides = []
-    for field in (field for field in PARAMETERS if field in box):
-        low, high = box[field]
-        values = missions[field].to_numpy()
-        inside = values[(values > low) & (values <= high)]
-        sides.append(f"{parameter(field).short} {_range_text(inside)}")
+def _rule(inside: pd.DataFrame, fields: set[str]) -> str:
+    """A region in words: the ranges of the fields that divide it from others."""
+    named = [field for field in PARAMETERS if field in fields]
+    sides = [f"{parameter(f).short} {_range_text(inside[f].to_numpy())}" for f in named]
     return ", ".join(sides) or "all missions"
 
 

@@ -29,6 +29,7 @@ from analysis.figures import comparison as figures
 from analysis.figures.missions import mission_figure
 from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import kept_missions
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -42,7 +43,7 @@ missions = head_to_head.duels(study, pair)
 # ## Differences in the same missions
 
 # %%
-html.say("{text}", text=html.composed(head_to_head.introduction(study, pair, missions)))
+html.say("{text}", text=html.composed(head_to_head.introduction(pair, len(missions))))
 
 # %% [markdown]
 # Unless another metric is named, differences are in collection ratio and communication (the product
@@ -53,17 +54,16 @@ html.say("{text}", text=html.composed(head_to_head.introduction(study, pair, mis
 # policies by these data by Bonferroni). Each 95 % interval is for a single difference.
 
 # %%
-learners = head_to_head.learners_against_baseline(study)
-comparison = head_to_head.overall(missions, pair)
-worth = head_to_head.pairing(comparison)
-display(
-    html.table(
-        head_to_head.by_metric(comparison),
-        f"With independent missions for each policy, equally narrow intervals would need {worth}",
-    ),
-    html.table(head_to_head.by_metric(learners, "learner"), "Every learner and the best heuristic"),
-    html.table(head_to_head.by_metric(summary.comparisons(study)), "Every policy and the best one"),
-)
+comparison = head_to_head.overall(study, pair)
+found = {
+    f"Worth {head_to_head.pairing(comparison)} independent missions": comparison,
+    "Every learner and the best heuristic": summary.learned_against_heuristic(study),
+    "Every policy and the best one": summary.comparisons(study),
+}
+for caption, rows in found.items():
+    if len(rows):
+        shown = tables.compared(rows, rows.columns[0])
+        display(html.table(shown, f"Minus {rows['baseline'].iloc[0]}. {caption}", data=rows))
 
 # %% [markdown]
 # For a learner with several trainings, the confidence interval is about the expected difference:

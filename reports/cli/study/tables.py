@@ -19,7 +19,6 @@ from analysis.names import (
     metric_name,
 )
 from analysis.questions import costs, summary
-from analysis.questions.head_to_head import new_training
 from analysis.questions.optimality import gap
 from analysis.questions.sensitivity import index_table
 from analysis.questions.summary import settings
@@ -205,8 +204,7 @@ def _print_comparisons(table: pd.DataFrame) -> None:
 def _print_learners(table: pd.DataFrame) -> None:
     """Differences of the learners from the best heuristic."""
     cells, product = differences(table, "learner")
-    cells["one new training"] = product.apply(new_training, axis=1)
-    cells = cells.assign(about=product["about"], trainings=product["trainings"])
+    cells = cells.assign(about=product["about"])
     print_frame(f"learned against {table['baseline'].iloc[0]} [points]", cells)
 
 

@@ -183,6 +183,9 @@ def _means(rows: pd.DataFrame, caption: str) -> HTML:
 
 
 def _compared(rows: pd.DataFrame, of: str, caption: str) -> HTML:
-    units = f"[percentage points], with {_LEVEL} intervals; p corrected for the number of"
-    caption = f"{caption} {units} comparisons and the choice of the best by these data"
+    units = f"[percentage points], with {_LEVEL} intervals (▲ better, ▼ worse, ≈ inconclusive);"
+    caption = (
+        f"{caption} {units} p corrected for the number of comparisons and the choice of the best "
+        "by these data"
+    )
     return html.table(tables.compared(rows, of), caption, data=rows)

@@ -8,7 +8,8 @@ from analysis.figures import comparison as drawings
 from analysis.figures.comparison import COLOURS
 from analysis.names import BOUND, GAP, METRICS, PARAMETERS, PRODUCT
 from analysis.questions import regions
-from analysis.questions.head_to_head import AHEAD, BEHIND, Pair
+from analysis.questions.head_to_head import Pair
+from analysis.questions.regions import AHEAD, BEHIND
 from analysis.questions.what_if import answer as what_if_answer
 from analysis.stats.verdict import INCONCLUSIVE
 from tests.analysis.questions.test_regions import missions_of

@@ -1,6 +1,5 @@
 """Two policies are compared in the same missions, and the sentences about it say what came out."""
 
-import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
@@ -99,7 +98,7 @@ def test_duels_of_several_design_points_are_refused(tmp_path):
 
 def test_overall_is_a_paired_t_test_that_allows_for_the_choice(results):
     pair = Pair("random", "greedy", 3)
-    table = head_to_head.overall(head_to_head.duels(results, pair), pair).set_index("metric")
+    table = head_to_head.overall(results, pair).set_index("metric")
     values = results.missions.pivot(index="replication", columns="policy", values=PRODUCT)
     test = stats.ttest_rel(values["random"], values["greedy"])
     ends = test.confidence_interval()
@@ -111,59 +110,11 @@ def test_overall_is_a_paired_t_test_that_allows_for_the_choice(results):
     assert table.loc[smallest, "p_adjusted"] == pytest.approx(min(1, 9 * table["p"].min()))
 
 
-def test_a_role_says_which_training_of_which_learner(results, taught):
-    first, second, third = ranked(results)
-    taught([third, first])
-    assert head_to_head.role(results, first) == "training 2 of 2 of the best learner of the study"
-    other = "the best policy of the study that has not learned"
-    assert head_to_head.role(results, second) == other
-    taught([first], [second])
-    assert head_to_head.role(results, second) == "training 1 of 1 of a learner of the study"
-    taught([first])
-    assert head_to_head.role(results, third) == "a policy of the study that has not learned"
-
-
-def comparison(*rows):
-    """Comparisons with ``theirs`` of (metric, difference, adjusted p), 1 point up and down."""
-    return pd.DataFrame(
-        [("ours", "theirs", m, d, d - 0.01, d + 0.01, p) for m, d, p in rows],
-        columns=["policy", "baseline", "metric", "difference", "low", "high", "p_adjusted"],
-    )
-
-
 def test_common_missions_are_worth_the_variance_that_they_save():
-    generator = np.random.default_rng(1)
-    ours, noise = generator.normal(0.5, 0.1, (2, 4000))
-    theirs = ours + 0.5 * (noise - 0.5)  # the difference has a quarter of the variance of ours
-    columns = {m: ours for m in METRICS} | {f"{m}_baseline": theirs for m in METRICS}
-    missions = pd.DataFrame(columns).clip(0, 1).assign(replication=range(4000))
-    comparison = head_to_head.overall(missions, Pair("ours", "theirs", 1))
+    comparison = pd.DataFrame({"metric": [*METRICS], "variance_reduction": [0.0, 0.5, 8 / 9]})
     assert head_to_head.pairing(comparison) == "9 times as many"
-
-
-def test_a_comparison_is_a_row_with_a_pair_of_columns_per_metric():
-    table = head_to_head.by_metric(comparison(("success", 0.02, 0.2), (PRODUCT, -0.04, 0)))
-    assert table.columns.tolist() == [
-        ("", "Difference"),
-        ("Successful communication", "points"),
-        ("Successful communication", "p, adjusted"),
-        ("Collection ratio and communication", "points"),
-        ("Collection ratio and communication", "p, adjusted"),
-    ]
-    assert table.to_numpy().tolist() == [
-        ["ours − theirs", "+2.0 [+1.0, +3.0] ≈", "0.200", "−4.0 [−5.0, −3.0] ▼", "< 0.001"]
-    ]
-    assert head_to_head.by_metric(pd.DataFrame()).empty
-
-
-def test_a_learner_has_the_prediction_interval_of_one_new_training():
-    row = comparison((PRODUCT, 0.02, 0.001)).rename(columns={"policy": "learner"})
-    row = row.assign(new_low=-0.03, new_high=0.07, trainings=3)
-    table = head_to_head.by_metric(row, "learner")
-    assert table[METRICS[PRODUCT], "points"].tolist() == ["+2.0 [+1.0, +3.0] ▲"]
-    assert table[METRICS[PRODUCT], "one new training"].tolist() == ["[−3.0, +7.0]"]
-    alone = head_to_head.by_metric(row.assign(trainings=1), "learner")
-    assert alone[METRICS[PRODUCT], "one new training"].tolist() == ["unknown"]
+    always = comparison.assign(variance_reduction=1.0)
+    assert head_to_head.pairing(always) == "infinitely many"
 
 
 def test_missions_are_won_tied_lost_and_failed():

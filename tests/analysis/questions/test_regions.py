@@ -6,7 +6,7 @@ import pytest
 
 from analysis.names import METRICS, PARAMETERS, PRODUCT
 from analysis.questions import regions
-from analysis.questions.head_to_head import AHEAD, BEHIND
+from analysis.questions.regions import AHEAD, BEHIND
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import mean_interval, wilson
 from analysis.stats.verdict import INCONCLUSIVE
@@ -128,12 +128,6 @@ def test_estimates_of_regions_do_not_depend_on_the_missions_that_chose_them():
     moved = {c: missions[c].where(~even, missions[c] + 0.5) for c in ("difference", PRODUCT)}
     same = regions.rules(missions.assign(**moved))
     assert same["mean"].tolist() == regions.rules(missions)["mean"].tolist()
-
-
-def test_halves_share_no_mission():
-    chosen_on, judged_on = regions.halves(missions_of(lambda t: 0, n=9))
-    assert chosen_on["replication"].tolist() == [0, 2, 4, 6, 8]
-    assert judged_on["replication"].tolist() == [1, 3, 5, 7]
 
 
 def test_the_strongest_two_are_chosen_on_the_half_that_is_not_shown():
