@@ -156,8 +156,8 @@ def _processor() -> str:
         lines = read_text(Path("/proc/cpuinfo")).splitlines()
     except (OSError, InputError):
         lines = []
-    models = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(models, "") or platform.processor() or platform.machine() or "unknown"
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return next(filter(None, [*models, platform.processor(), platform.machine()]), "unknown")
 
 
 def listed(times: Times, results: Results) -> pd.DataFrame:
@@ -181,10 +181,9 @@ def listed(times: Times, results: Results) -> pd.DataFrame:
 def remarks(times: Times, results: Results, pair: Pair) -> str:
     """On what decisions were timed, how a pair of policies compares, and what was not timed."""
     medians = {cost.policy: cost.median for cost in times.costs}
-    sentences = [f"Measured once, on one core of a processor {times.processor}."]
-    if pair.policy in medians and pair.baseline in medians:
+    text = f"Measured once, on one core of a processor {times.processor}."
+    if {pair.policy, pair.baseline} <= medians.keys():
         ratio = medians[pair.policy] / medians[pair.baseline]
-        sentences.append(f"{pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}.")
-    if missing := [policy for policy in results.policies if policy not in medians]:
-        sentences.append(f"Not timed: {numbers.words(missing)}.")
-    return " ".join(sentences)
+        text += f" {pair.policy} takes {ratio:,.3g} times as long as {pair.baseline}."
+    missing = [policy for policy in results.policies if policy not in medians]
+    return text + f" Not timed: {numbers.words(missing)}." * bool(missing)

@@ -9,17 +9,16 @@ of a parameter are simulated in the same replications, so they are compared miss
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from analysis import numbers
 from analysis.names import PRODUCT, parameter, value_text
 from analysis.questions import summary
 from analysis.results.tables import Results
-from analysis.stats.correction import adjust
+from analysis.stats.correction import with_adjusted
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import paired
 from dess import InputError
@@ -32,8 +31,7 @@ PEAK, VALLEY, IRREGULAR = "rises, then falls", "falls, then rises", "goes up and
 ByField = Mapping[str, Mapping[str, pd.DataFrame]]  # ``changes`` by parameter and policy
 
 
-@dataclass(frozen=True)
-class Shape:
+class Shape(NamedTuple):
     """How a metric changes along the values of a parameter.
 
     Two values differ significantly if their Holm-adjusted p-value is at most 1 - ``LEVEL``. If no
@@ -60,16 +58,14 @@ def effects(results: Results) -> pd.DataFrame:
     Raises:
         InputError: If a design point sets more or less than one field.
     """
-    points: list[tuple[int, str, str, int]] = []
-    positions: dict[str, int] = {}
-    for number, point in enumerate(results.store.manifest.points):
-        if len(point.values) != 1:
-            fields = ", ".join(point.values) or "no field"
+    design = [point.values for point in results.store.manifest.points]
+    for number, values in enumerate(design):
+        if len(values) != 1:
+            fields = ", ".join(values) or "no field"
             raise InputError(f"point {number}: sets {fields}; allowed: one field at a time")
-        ((field, value),) = point.values.items()
-        positions[field] = positions.get(field, -1) + 1
-        points.append((number, field, value_text(value), positions[field]))
-    table = pd.DataFrame(points, columns=["point", "field", "value", "position"])
+    rows = [(field, value_text(value)) for values in design for field, value in values.items()]
+    table = pd.DataFrame(rows, columns=["field", "value"]).rename_axis("point").reset_index()
+    table["position"] = table.groupby("field").cumcount()
     return table.merge(summary.means(results), on="point")
 
 
@@ -91,10 +87,9 @@ def changes(
         once, by Bonferroni), ``p``, ``p_adjusted`` (Holm, over the pairs) and ``n``, the number of
         replications.
     """
-    points = table[table["field"] == field].drop_duplicates("position")
-    positions = dict(zip(points["point"], points["position"], strict=True))
-    missions = results.missions[results.missions["point"].isin(positions)]
-    missions = missions[missions["policy"] == policy]
+    positions = table[table["field"] == field].groupby("point")["position"].first()
+    missions = results.missions[results.missions["policy"] == policy]
+    missions = missions[missions["point"].isin(positions.index)]
     values = missions.pivot(index="replication", columns="point", values=metric).dropna()
     values = values.rename(columns=positions).astype(float)
     couples = [*combinations(sorted(values), 2)]
@@ -103,11 +98,10 @@ def changes(
     for first, second in couples:
         samples = values[second].to_numpy(), values[first].to_numpy()
         pair, wide = (paired(*samples, level, metric) for level in (LEVEL, at_once))
-        ends = pair.low, pair.high, wide.low, wide.high
-        rows.append((first, second, pair.difference, *ends, pair.p, pair.n))
-    columns = ["first", "second", "difference", "low", "high", "wide_low", "wide_high", "p", "n"]
-    pairs = pd.DataFrame(rows, columns=columns)
-    return pairs.assign(p_adjusted=adjust(pairs["p"].to_numpy(float), "holm"))
+        ends = pair.difference, pair.low, pair.high, wide.low, wide.high
+        rows.append((first, second, *ends, pair.p, pair.n))
+    columns = ["first", "second", *_ENDS, "wide_low", "wide_high", "p", "n"]
+    return with_adjusted(pd.DataFrame(rows, columns=columns), "holm")
 
 
 def changes_by_field(results: Results, table: pd.DataFrame, metric: str = PRODUCT) -> ByField:
@@ -127,30 +121,22 @@ def changes_by_field(results: Results, table: pd.DataFrame, metric: str = PRODUC
 
 def shape(pairs: pd.DataFrame) -> Shape:
     """The shape of a metric that follows from the differences of ``changes``."""
-    ups, downs = _differing(pairs, 1), _differing(pairs, -1)
+    sure = pairs[pairs["p_adjusted"] <= 1 - LEVEL]
+    ups, downs = sure[sure["difference"] > 0], sure[sure["difference"] < 0]
     places = range(int(pairs["second"].max()) + 1)
-    peaks = tuple(p for p in places if _passes(p, ups, downs))
-    valleys = tuple(p for p in places if _passes(p, downs, ups))
-    if not ups and not downs:
-        words = LEVELS
-    elif not downs:
-        words = RISES
-    elif not ups:
-        words = FALLS
+    peaks = tuple(place for place in places if _passes(place, ups, downs))
+    if ups.empty or downs.empty:
+        words = LEVELS if sure.empty else RISES if downs.empty else FALLS
+    elif peaks:
+        words = PEAK
     else:
-        words = PEAK if peaks else VALLEY if valleys else IRREGULAR
+        words = VALLEY if any(_passes(place, downs, ups) for place in places) else IRREGULAR
     return Shape(words, peaks)
 
 
-def _differing(pairs: pd.DataFrame, sign: int) -> set[tuple[int, int]]:
-    """The pairs of positions with a significant rise (sign 1) or fall (sign -1)."""
-    rows = pairs[(pairs["p_adjusted"] <= 1 - LEVEL) & (np.sign(pairs["difference"]) == sign)]
-    return set(zip(rows["first"], rows["second"], strict=True))
-
-
-def _passes(peak: int, ups: set[tuple[int, int]], downs: set[tuple[int, int]]) -> bool:
+def _passes(peak: int, ups: pd.DataFrame, downs: pd.DataFrame) -> bool:
     """Whether there is no fall before the peak, and no rise after it."""
-    return all(b > peak for _, b in downs) and all(a < peak for a, _ in ups)
+    return bool((downs["second"] > peak).all() and (ups["first"] < peak).all())
 
 
 def leading_policies(
@@ -165,8 +151,9 @@ def leading_policies(
     """
     trained = {policy for names in summary.learners(results).values() for policy in names}
     ranked = summary.ranked_policies(results.missions)
-    best = [next((p for p in ranked if (p in trained) is kind), None) for kind in (True, False)]
-    return [policy for policy in (learned or best[0], heuristic or best[1]) if policy]
+    learned = learned or next((policy for policy in ranked if policy in trained), None)
+    heuristic = heuristic or next((policy for policy in ranked if policy not in trained), None)
+    return [policy for policy in (learned, heuristic) if policy]
 
 
 def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
@@ -180,29 +167,24 @@ def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFra
         changes: ``changes_by_field``.
         ratios: The same of the collection ratio.
     """
-    rows = table[table["metric"] == PRODUCT]
-    rows = rows.set_index(["policy", "field", "position"]).sort_index()
+    rows = table[table["metric"] == PRODUCT].set_index(["policy", "field", "position"]).sort_index()
     lines = []
     for field, pairs_of_field in changes.items():
         for policy, pairs in pairs_of_field.items():
-            values = rows.loc[(policy, field)]
-            first, last = values.iloc[0], values.iloc[-1]
-            change, of_ratio = (
-                of.set_index(["first", "second"]).loc[(0, len(values) - 1), _ENDS]
-                for of in (pairs, ratios[field][policy])
-            )
-            along = shape(pairs)
+            values, along = rows.loc[(policy, field)], shape(pairs)
+            ends = values.iloc[[0, -1]]
+            first, last = [
+                f"{numbers.percent(row.mean)} at {row.value}" for row in ends.itertuples()
+            ]
+            steps = [_points(of) for of in (pairs, ratios[field][policy])]
             peaks = values.loc[[*along.peaks], "value"] if along.words == PEAK else []
-            lines.append(
-                {
-                    "Parameter": parameter(field).name,
-                    "Policy": policy,
-                    "Along the values": along.words,
-                    "First": f"{numbers.percent(first['mean'])} at {first['value']}",
-                    "Last": f"{numbers.percent(last['mean'])} at {last['value']}",
-                    "Last − first": numbers.points(*change),
-                    "Of the ratio alone": numbers.points(*of_ratio),
-                    "Highest at": " or ".join(peaks),
-                }
-            )
-    return pd.DataFrame(lines)
+            named = (parameter(field).name, policy, along.words, first, last)
+            lines.append((*named, *steps, " or ".join(peaks)))
+    heads = ["Parameter", "Policy", "Along the values", "First", "Last", "Last − first"]
+    return pd.DataFrame(lines, columns=[*heads, "Of the ratio alone", "Highest at"])
+
+
+def _points(pairs: pd.DataFrame) -> str:
+    """The change from the first to the last value, in points."""
+    ends = pairs[pairs["first"] == 0].sort_values("second").iloc[-1]
+    return numbers.points(*ends[_ENDS])

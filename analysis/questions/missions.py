@@ -49,41 +49,22 @@ class LoggedMission:
     @property
     def collected(self) -> str:
         """How much data the mission collected, as a part of a sentence."""
-        collected, total, _ = self.data_units
-        return f"{collected} of {total} data units collected"
-
-    @property
-    def data_units(self) -> tuple[str, str, str]:
-        """What was collected, all data and what is left [data units], as text with one decimal.
-
-        The first and the last add up to the second as they are printed. So what is left is all data
-        less what is collected, after both are rounded.
-        """
-        total = round(float(self.row["initial"] + self.row["arrived"]), 1)
-        collected = round(float(self.row["collected"]), 1)
-        left = max(total - collected, 0.0)
-        return f"{collected:.1f}", f"{total:.1f}", f"{left:.1f}"
-
-    @property
-    def depletions(self) -> str:
-        """Which batteries were depleted, when and how far from the zone, as part of a sentence."""
-        left, top, width, height = self.scenario.zone
-        parts = []
-        depleted = self.log[self.log["event"] == "battery_empty"]
-        for row in depleted.astype({"time": int, "x": int, "y": int}).itertuples():
-            moves = max(left - row.x, 0, row.x - left - width + 1)
-            moves += max(top - row.y, 0, row.y - top - height + 1)
-            away = f"{moves} move{'s' * (moves != 1)} from" if moves else "in"
-            where = f"in slot {row.time} at ({row.x}, {row.y}), {away} the charging zone"
-            parts.append(f"the battery of UAV {row.uav + 1} is depleted {where}")
-        return "; ".join(parts) or "no battery is depleted"
+        total = self.row["initial"] + self.row["arrived"]
+        return f"{self.row['collected']:.1f} of {total:.1f} data units collected"
 
     @property
     def caption(self) -> str:
         """What happened in the mission, as the caption of a figure."""
         policy, replication = self.row["policy"], self.row["replication"]
+        depleted = self.log[self.log["event"] == "battery_empty"]
+        fates = [
+            f"the battery of UAV {row.uav + 1} is depleted in slot {row.time:.0f} at "
+            f"({row.x:.0f}, {row.y:.0f})"
+            for row in depleted.itertuples()
+        ]
         return (
-            f"{policy} in mission {replication}, a single one (n = 1): {self.depletions}. "
+            f"{policy} in mission {replication}, a single one (n = 1): "
+            f"{'; '.join(fates) or 'no battery is depleted'}. "
             f"{self.collected} in {self.row['slots']} mission slots."
         )
 
@@ -103,7 +84,7 @@ def keep_logs(
     results: Results,
     wanted: Sequence[tuple[str, int]],
     folder: str | Path,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None],
 ) -> None:
     """Simulate missions again whose event logs are not in ``FOLDER``, and store the logs there.
 
@@ -122,8 +103,7 @@ def keep_logs(
     for done, (policy, replication) in enumerate(wanted, 1):
         if _kept_log(results, policy, replication, folder) is None:
             _keep_log(results, policy, replication, folder)
-        if progress:
-            progress(done, len(wanted))
+        progress(done, len(wanted))
 
 
 def kept_missions(
@@ -178,8 +158,7 @@ def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | 
     missions = results.missions[results.missions["policy"] == policy]
     if point is not None:
         missions = missions[missions["point"] == point]
-    rows = summary(missions, by=["policy"])
-    return rows[rows["metric"] == metric].iloc[0]
+    return summary(missions, by=["policy"]).query("metric == @metric").iloc[0]
 
 
 def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
@@ -197,6 +176,7 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
     served = log.loc[log["event"] == "communication", "node"].nunique()
     left = log[(log["event"] == "mission_end") & (log["node"] >= 0)]
     fullest = left.loc[left["value"].idxmax()]
+    collected, _, total, *_ = mission.collected.split()
     return {
         "UAVs": row["uavs"],
         "Success": "yes" if row["success"] else "no",
@@ -204,21 +184,19 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
         "Mission slots": row["slots"],
         "Charging sessions": (log["event"] == "charge_start").sum(),
         "Nodes never served": f"{len(left) - served} of {len(left)}",
-        "Data collected": f"{mission.data_units[0]} of {mission.data_units[1]}",
-        "Data left": mission.data_units[2],
+        "Data collected": f"{collected} of {total}",
+        "Data left": f"{max(float(total) - float(collected), 0.0):.1f}",  # as they are printed
         "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
     }
 
 
 def _uavs(mission: LoggedMission) -> pd.DataFrame:
     uavs, scenario = mission.uavs, mission.scenario
-    quotas = [type_of(scenario.fleet, i).quota or scenario.quota for i in uavs["uav"]]
+    quotas = [type_of(scenario.fleet, uav).quota or scenario.quota for uav in uavs["uav"]]
     columns = {
         "UAVs": scenario.uavs,
         "UAV": uavs["uav"] + 1,
-        "Communications": [
-            f"{n} of {quota}" for n, quota in zip(uavs["quota"], quotas, strict=True)
-        ],
+        "Communications": uavs["quota"].astype(str) + [f" of {quota}" for quota in quotas],
         "Data collected": uavs["collected"].map("{:.1f}".format),
         "Slots flying": uavs["slots_flying"],
         "Slots charging": uavs["slots_charging"],

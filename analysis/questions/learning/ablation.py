@@ -6,7 +6,6 @@ Curves are those of ``learning.curves``; trainings of a variant differ in their 
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,8 +16,6 @@ from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import LEVEL, Interval, mean_interval
 from analysis.stats.verdict import MARKS, position
-
-_UNKNOWN = Interval(np.nan, np.nan, np.nan)
 
 BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
 
@@ -45,19 +42,17 @@ def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVE
         nan for the baseline.
     """
     values = {v: part[metric].to_numpy() for v, part in last.groupby("variant", sort=False)}
+    limits = (0.0, 1.0) if metric.removeprefix("final_") in METRICS else (-np.inf, np.inf)
     rows = []
     for variant, sample in values.items():
-        mean = mean_interval(sample, level)
-        half = np.sqrt(len(sample) + 1) * (mean.high - mean.mean)
-        new = Interval(mean.mean, mean.mean - half, mean.mean + half)
-        if metric.removeprefix("final_") in METRICS:
-            mean, new = within(mean), within(new)
-        if len(sample) == 1:
-            mean = new = Interval(mean.mean, np.nan, np.nan)
-        gap, p = _UNKNOWN, np.nan
+        mean, _, high = mean_interval(sample, level)
+        alone, half = len(sample) == 1, high - mean
+        room = np.array([-half, half, *(np.sqrt(len(sample) + 1) * np.array([-half, half]))])
+        ends = np.full(4, np.nan) if alone else np.clip(mean + room, *limits)
+        gap, p = Interval(np.nan, np.nan, np.nan), np.nan
         if variant != baseline:
             gap, p = difference(sample, values[baseline], level)
-        rows.append((variant, len(sample), *mean, *new[1:], *gap, p))
+        rows.append((variant, len(sample), mean, *ends, *gap, p))
     columns = ["variant", "n", "mean", "low", "high", "new_low", "new_high"]
     columns += ["difference", "difference_low", "difference_high", "p"]
     table = pd.DataFrame(rows, columns=columns)
@@ -108,12 +103,19 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
     """
     means = last.groupby("variant")[[f"final_{SUCCESS}", f"final_{RATIO}"]].mean()
     others = means.loc[table["variant"]].map(numbers.percent).to_numpy()
+    gaps = table[["difference", "difference_low", "difference_high"]].to_numpy()
     columns = {
         "Variant": table["variant"],
         "n": table["n"],
-        METRICS[PRODUCT]: [_mean(row) for row in table.itertuples()],
-        "One new training": [_new(row) for row in table.itertuples()],
-        f"Difference from {baseline} [points]": [_gap(row) for row in table.itertuples()],
+        METRICS[PRODUCT]: [*map(_interval, table["mean"], table["low"], table["high"])],
+        "One new training": [
+            _interval(*ends).partition(" % ")[2]
+            for ends in table[["mean", "new_low", "new_high"]].to_numpy()
+        ],
+        f"Difference from {baseline} [points]": [
+            f"{numbers.points(*gap)} {MARKS[position(Interval(*gap))]}" if gap[0] == gap[0] else ""
+            for gap in gaps
+        ],
         "p (Holm)": table["p_adjusted"].map(numbers.p_value, na_action="ignore"),
         METRICS[SUCCESS]: others[:, 0],
         METRICS[RATIO]: others[:, 1],
@@ -121,20 +123,6 @@ def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd
     return pd.DataFrame(columns)
 
 
-def _mean(row: Any) -> str:
-    if row.low < row.high:
-        return numbers.interval(row.mean, row.low, row.high)
-    return numbers.percent(row.mean)
-
-
-def _new(row: Any) -> str:
-    if row.new_low < row.new_high:
-        return numbers.interval(row.mean, row.new_low, row.new_high).partition(" % ")[2]
-    return ""
-
-
-def _gap(row: Any) -> str:
-    if np.isnan(row.p):
-        return ""
-    gap = Interval(row.difference, row.difference_low, row.difference_high)
-    return f"{numbers.points(*gap)} {MARKS[position(gap)]}"
+def _interval(mean: float, low: float, high: float) -> str:
+    """A mean with its interval, if it has one with a length."""
+    return numbers.interval(mean, low, high) if low < high else numbers.percent(mean)

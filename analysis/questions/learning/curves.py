@@ -174,31 +174,23 @@ def transfer_table(
         transfers: The result of ``transfers``, by the name of the pair and the metric.
         verdicts: The verdict on each.
     """
-    rows = [
-        (
-            name[0].upper() + name[1:],
-            f"{compared.trainings[0]} and {compared.trainings[1]}",
-            "Reward" if metric == REWARD else "Product",
-            verdicts[name, metric],
-            compared.course,
-            _last_difference(compared, metric),
-        )
-        for (name, metric), compared in transfers.items()
-    ]
+    rows = []
+    for (name, metric), compared in transfers.items():
+        last, named = compared.last, "Reward" if metric == REWARD else "Product"
+        write = numbers.points if metric == PRODUCT else _rewards
+        difference_at_end = write(*last)
+        if last.low == last.high:
+            difference_at_end = f"{difference_at_end.split()[0]}, the same in all trainings"
+        n = "{} and {}".format(*compared.trainings)
+        found = named, verdicts[name, metric], compared.course, difference_at_end
+        rows.append((name[0].upper() + name[1:], n, *found))
     head = ["Trainings with", "n", "Metric", "Verdict", "With transfer, the mean curve"]
     return pd.DataFrame(rows, columns=[*head, "Difference at the end"])
 
 
-def _last_difference(compared: Transfer, metric: str) -> str:
-    """The last difference with its interval: of the product in percentage points."""
-    last = compared.last
-    if metric == REWARD:
-        mean, low, high = (numbers.minus(f"{value:+.0f}") for value in last)
-        text = f"{mean} [{low}, {high}]"
-    else:
-        text = numbers.points(*last)
-    same = last.low == last.high
-    return f"{text.split()[0]}, the same in all trainings" if same else text
+def _rewards(*ends: float) -> str:
+    mean, low, high = (numbers.minus(f"{value:+.0f}") for value in ends)
+    return f"{mean} [{low}, {high}]"
 
 
 def _average(values: pd.Series) -> pd.Series:
