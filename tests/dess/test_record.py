@@ -8,7 +8,7 @@ from hypothesis import given
 
 from dess.mission import simulate
 from dess.record import MISSION_RECORD, measures_of
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from tests.drawn import (
     Commuter,
     continuous_spaces,
@@ -36,13 +36,6 @@ def test_metrics_and_the_columns_of_a_log_are_attributes() -> None:
     copy = pickle.loads(pickle.dumps(record))
     assert copy.metrics.tobytes() == record.metrics.tobytes()
     assert copy.uavs.tobytes() == record.uavs.tobytes()
-
-
-def test_the_collection_ratio_without_data_is_one() -> None:
-    scenario = Scenario.of(initial_data=0, arrival_rate=0, uavs=1)
-    record = simulate(scenario, Commuter(), 0, 0)
-    assert (record.initial, record.arrived, record.collected, record.residual) == (0, 0, 0, 0)
-    assert (record.collection_ratio, record.success) == (1.0, 0)
 
 
 @given(extended_spaces() | continuous_spaces(), policies, seeds, replications)

@@ -10,31 +10,16 @@ EDGES = [0, 1, 2, 3, 2**31 - 1, 2**31, 2**31 + 1, 2**32 - 3, 2**32 - 2, 2**32 - 
 
 # Random123, kat_vectors: philox4x32 with 10 rounds; counter, key, words.
 KNOWN_ANSWERS = [
-    (
-        "00000000 00000000 00000000 00000000",
-        "00000000 00000000",
-        "6627e8d5 e169c58d bc57ac4c 9b00dbd8",
-    ),
-    (
-        "ffffffff ffffffff ffffffff ffffffff",
-        "ffffffff ffffffff",
-        "408f276d 41c83b0e a20bc7c6 6d5451fd",
-    ),
-    (
-        "243f6a88 85a308d3 13198a2e 03707344",
-        "a4093822 299f31d0",
-        "d16cfe09 94fdcceb 5001e420 24126ea1",
-    ),
+    "00000000 00000000 00000000 00000000 00000000 00000000 6627e8d5 e169c58d bc57ac4c 9b00dbd8",
+    "ffffffff ffffffff ffffffff ffffffff ffffffff ffffffff 408f276d 41c83b0e a20bc7c6 6d5451fd",
+    "243f6a88 85a308d3 13198a2e 03707344 a4093822 299f31d0 d16cfe09 94fdcceb 5001e420 24126ea1",
 ]
 
 
-def _hex(text: str) -> list[np.uint64]:
-    return [np.uint64(int(word, 16)) for word in text.split()]
-
-
-@pytest.mark.parametrize(("counter", "key", "words"), KNOWN_ANSWERS)
-def test_philox_gives_the_published_answers(counter: str, key: str, words: str) -> None:
-    assert list(streams.philox(*_hex(counter), *_hex(key))) == _hex(words)
+@pytest.mark.parametrize("answer", KNOWN_ANSWERS)
+def test_philox_gives_the_published_answers(answer: str) -> None:
+    words = [np.uint64(int(word, 16)) for word in answer.split()]
+    assert list(streams.philox(*words[:6])) == words[6:]
 
 
 def test_a_block_is_philox_of_its_coordinates() -> None:
@@ -43,11 +28,6 @@ def test_a_block_is_philox_of_its_coordinates() -> None:
     key = [seed % 2**32, seed // 2**32]
     expected = streams.philox(*(np.uint64(word) for word in counter + key))
     assert streams.block(np.uint64(seed), replication, stream, substream, slot, index) == expected
-
-
-def test_uniform_lies_strictly_between_0_and_1() -> None:
-    assert streams.uniform(np.uint64(0)) == 2.0**-33
-    assert streams.uniform(np.uint64(2**32 - 1)) == 1.0 - 2.0**-33
 
 
 def test_integer_reaches_both_ends_and_is_uniform() -> None:

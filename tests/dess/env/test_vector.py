@@ -179,22 +179,39 @@ def test_the_next_mission_can_start_in_the_next_step() -> None:
     assert not info["acted"][own].any() and info["active"][own].any()
 
 
-def test_bad_input_is_refused_with_one_line() -> None:
-    env: Any = dess.vector_env(small(), 2)
-    with pytest.raises(InputError, match=r"allowed: reset\(\) first"):
-        env.step(np.zeros(2, int))
-    env.reset()
-    for action in (5, -1):
-        with pytest.raises(InputError, match="allowed: 0..4"):
-            env.step(np.array([0, action]))
-    for actions in (np.zeros(2), np.zeros(3, int), np.zeros((2, 1), int), ["north", "east"]):
-        with pytest.raises(InputError, match=r"integers of shape \(2,\)"):
-            env.step(actions)
-    wrong: list[dict[str, Any]] = [{"num_envs": number} for number in (0, -1, 2.0)]
-    wrong += [{"autoreset_mode": mode} for mode in ("Disabled", AutoresetMode.DISABLED)]
-    for options in (*wrong, {"observation": "pixels"}):
-        (name,) = options
-        with pytest.raises(InputError, match=f"{name}: .*; allowed: "):
-            dess.vector_env(PAPER, **({"num_envs": 2} | options))
-    with pytest.raises(InputError, match="seed"):
-        env.reset(seed=-1)
+REFUSED: dict[str, Any] = {
+    "num_envs: 0": lambda: dess.vector_env(PAPER, 0),
+    "num_envs: 2.0": lambda: dess.vector_env(PAPER, 2.0),  # type: ignore[arg-type]
+    "autoreset_mode": lambda: dess.vector_env(PAPER, 2, autoreset_mode="Disabled"),
+    "observation: 'pixels' is unknown": lambda: dess.vector_env(PAPER, 2, observation="pixels"),
+    "observation: 'x' is unknown": lambda: dess.parallel_env(PAPER, observation="x"),
+    "mask: 'x' is unknown": lambda: dess.parallel_env(PAPER, mask="x"),
+    "ended: 'x' is unknown": lambda: dess.parallel_env(PAPER, ended="x"),
+    "render_mode: 'x' is unknown": lambda: dess.parallel_env(PAPER, render_mode="x"),
+    "step: no episode": lambda: dess.parallel_env(PAPER).step({"uav_0": 0}),
+    "step: no mission": lambda: dess.vector_env(PAPER, 1).step(np.zeros(FLEET, int)),
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_bad_arguments_are_refused(line: str) -> None:
+    with pytest.raises(InputError, match=f"^{line}.*; allowed: .*$"):
+        REFUSED[line]()
+
+
+def test_bad_actions_and_seeds_are_refused() -> None:
+    batch, single = dess.vector_env(small(), 2), dess.parallel_env(small())
+    batch.reset(), single.reset()
+    shapes: list[Any] = [np.zeros(2), np.zeros(3, int), np.zeros((2, 1), int), ["north", "east"]]
+    for actions in (*shapes, np.array([0, 5]), np.array([0, -1])):
+        with pytest.raises(InputError, match="allowed: (0..4|integers of shape)"):
+            batch.step(actions)
+    wrong: list[dict[str, int]] = [{}, {"uav_1": 0}, {"uav_0": 0, "uav_1": 0}, {"uav_0": 5}]
+    for asked in wrong:
+        with pytest.raises(InputError, match="^actions: "):
+            single.step(asked)
+    for reset in ({"seed": -1}, {"options": {"replication": 2**32}}):
+        for env in (batch, single):
+            with pytest.raises(InputError, match="seed|replication"):
+                env.reset(**reset)  # type: ignore[arg-type]
+    single.step({"uav_0": HOVER})  # the episode goes on

@@ -23,13 +23,6 @@ QUEUES: dict[str, tuple[dict[str, Any], str, list[list[int]], list[int], int]] =
         [0, 2, 5],
         3,
     ),
-    "UAV 2 has the least battery, then UAV 1": (
-        {"charging": {"order": "lowest-battery"}},
-        "",
-        [[10, 9, 8, 7, 6, 5, 10], [9, 8, 7, 12, 17, 20, 19], [14, 19, 20, 19, 18, 17, 16]],
-        [6, 3, 0],
-        3,
-    ),
     "UAV 0 leaves the queue and asks again: the earlier request of UAV 1 comes first": (
         {"charging": {"order": "lowest-battery"}, "fleet": EQUAL},
         ".NS....",
@@ -41,13 +34,6 @@ QUEUES: dict[str, tuple[dict[str, Any], str, list[list[int]], list[int], int]] =
         {"charging": {"power": 7}, "pads": 3, "max_slots": 5},
         "",
         [[16, 20, 19, 18, 17], [12, 15, 20, 19, 18], [9, 9, 11, 16, 20]],
-        [0, 0, 0],
-        3,
-    ),
-    "they share it in the order of their batteries": (
-        {"charging": {"order": "lowest-battery", "power": 7}, "pads": 3, "max_slots": 5},
-        "",
-        [[11, 16, 16, 20, 19], [12, 14, 19, 19, 20], [14, 14, 16, 19, 20]],
         [0, 0, 0],
         3,
     ),

@@ -60,12 +60,6 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
     assert ((north == 0) | (south == 0)).all() and ((east == 0) | (west == 0)).all()
 
 
-def test_a_battery_that_does_not_suffice_is_empty_and_not_negative() -> None:
-    fields = {"flying_time": 4, "charge_start": 10, "wind": {"strength": 8}}
-    record, _ = flown(ScenarioSpace.of(**OPEN | fields), "N..")
-    assert (record.uavs["battery"], record.uavs["end"]) == (0, BATTERY)
-
-
 @given(spaces(), winds)
 def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
     space: ScenarioSpace, wind: Wind
