@@ -107,7 +107,6 @@ class MissionModel:
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
         self._log_state("mission_start")
-        self._log_parameters()
         if self.packets is not None:
             self.env.process(self._arrivals(self.packets))
         self.env.run(self.env.process(self._clock()))
@@ -166,10 +165,10 @@ class MissionModel:
                     self.zone.ask(i)
                     u["pad_request"] = slot
                     self.mission["pad_requests"] += 1
-                    self._log_charging("charge_request", slot, i)
+                    self._log_uav("charge_request", slot, i)
             elif has_asked:
                 if not self.zone.holds_pad(i):
-                    self._log_charging("charge_withdrawal", slot, i)
+                    self._log_uav("charge_withdrawal", slot, i)
                 self.zone.leave(i)
                 u["pad_request"] = -1
 
@@ -177,7 +176,7 @@ class MissionModel:
         """Grant the free pads; return the UAVs that charge from this slot on, in their order."""
         granted = self.zone.grant()
         for i in granted:
-            self._log_charging("charge_start", slot, i)
+            self._log_uav("charge_start", slot, i)
         return np.array(granted, np.int64)
 
     def _fail(self, slot: int) -> int:
@@ -188,45 +187,40 @@ class MissionModel:
             log_failures(self.log, float(slot), before, self.state, self.world.nodes)
         for i in self.fleet:
             if before.uavs[0, i]["charging"] and not self.uavs[i]["charging"]:  # its pad has failed
-                self._log_charging("charge_end", slot, i)
-                self._log_charging("charge_request", slot, i)
+                self._log_uav("charge_end", slot, i)
+                self._log_uav("charge_request", slot, i)
                 self.zone.ask(i)
         if self.packets is not None:
             self.packets.fall_silent(float(slot))
         return int(self.mission["active"])
-
-    def _log_charging(self, event: str, slot: int, i: int) -> None:
-        if self.log is not None:
-            u = self._team()[i]
-            self._log_uav(event, slot, i, u, u.battery)
 
     def _team(self) -> list[Any]:
         """The UAVs as plain values, which Python reads faster than the fields of a record."""
         return [_Uav(*values) for values in self.uavs[: len(self.fleet)].tolist()]
 
     def _log_uav(
-        self, event: str, time: int, i: int, u: Any, value: float, other: int = -1
+        self, event: str, time: int, i: int, value: float | None = None, other: int = -1
     ) -> None:
-        assert self.log is not None
-        self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
+        """Log an event of a UAV; its value is by default the battery."""
+        if self.log is not None:
+            u = _Uav(*self.uavs[i].item())
+            value = u.battery if value is None else value
+            self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
 
     def _log_state(self, event: str) -> None:
         if self.log is None:
             return
         time, is_start = int(self.mission["slot"]), event == "mission_start"
-        for i, u in enumerate(self._team()):
-            self._log_uav(event, time, i, u, u.battery)
+        for i in self.fleet:
+            self._log_uav(event, time, i)
         for k, (x, y) in enumerate(self.world.nodes):
             waiting = self.packets.buffers.queues[k] if is_start and self.packets else ()
             packet, born = (waiting[0], 0.0) if waiting else (-1, nan)
             self.log.add(
                 float(time), event, -1, k, self.residual[k], x, y, packet=packet, generated=born
             )
-
-    def _log_parameters(self) -> None:
-        if self.log is not None:
-            for event in PARAMETER_EVENTS:
-                self.log.add(0.0, event, -1, -1, self.mission[event.removeprefix("mission_")])
+        for name in PARAMETER_EVENTS if is_start else ():
+            self.log.add(0.0, name, -1, -1, self.mission[name.removeprefix("mission_")])
 
     def _log_moves(self, slot: int) -> None:
         if self.log is None:
@@ -234,8 +228,8 @@ class MissionModel:
         for i, u in enumerate(self._team()):
             if u.active:
                 if u.overruled:
-                    self._log_uav("collision", slot, i, u, u.action, u.overruled_by)
-                self._log_uav("move", slot, i, u, u.battery)
+                    self._log_uav("collision", slot, i, u.action, u.overruled_by)
+                self._log_uav("move", slot, i)
 
     def _log_communications(self, slot: int, n: int, m: int) -> None:
         if self.log is None:
@@ -259,11 +253,11 @@ class MissionModel:
                 self.log.add(float(time), "arrival", -1, k, self.arrivals[k], x, y)
         for i, (was, u) in enumerate(zip(before, self._team(), strict=True)):
             if was.charging and not u.charging:
-                self._log_uav("charge_end", time, i, u, u.battery)
+                self._log_uav("charge_end", time, i)
             if was.active and u.end == QUOTA:
-                self._log_uav("quota_filled", time, i, u, u.communications)
+                self._log_uav("quota_filled", time, i, u.communications)
             if was.active and u.end == BATTERY:
-                self._log_uav("battery_empty", time, i, u, u.battery)
+                self._log_uav("battery_empty", time, i)
 
 
 @kernel

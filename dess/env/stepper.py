@@ -42,6 +42,8 @@ class MissionStepper:
 
     Attributes:
         space: The space from which each mission draws its parameters.
+        seed: Seed of the missions to be launched.
+        replication: The next replication to be launched.
         state: The arrays of the missions.
         world: The nodes and the tables of the channel.
         indices: (N,) the indices 0 to N - 1 of the environments.
@@ -56,16 +58,6 @@ class MissionStepper:
         self._scratch = empty_scratch(self.space.uavs[1], len(self.space.nodes))
         self.start_at(seed, 0)
 
-    @property
-    def seed(self) -> int:
-        """Seed of the missions to be launched."""
-        return int(self._starts.constants["seed"][0])
-
-    @property
-    def replication(self) -> int:
-        """The next replication to be launched."""
-        return self._next
-
     def start_at(self, seed: int, replication: int) -> None:
         """Make this replication of this seed the next mission to be launched.
 
@@ -73,7 +65,7 @@ class MissionStepper:
             InputError: If one of them is out of range.
         """
         check_seed(seed, replication)
-        self._starts.constants["seed"], self._next = seed, replication
+        self.seed, self.replication = seed, replication
 
     def start(self, seed: int | None, options: dict[str, Any] | None) -> None:
         """Launch a mission in every environment, as ``reset`` of an environment is asked to.
@@ -92,9 +84,10 @@ class MissionStepper:
 
     def launch(self, environments: np.ndarray) -> None:
         """Start the next replications in these environments, in this order."""
-        check_seed(self.seed, self._next + len(environments) - 1)
-        _launch(self.state, environments, self._starts, self._next)
-        self._next += len(environments)
+        check_seed(self.seed, self.replication + len(environments) - 1)
+        self._starts.constants["seed"] = self.seed
+        _launch(self.state, environments, self._starts, self.replication)
+        self.replication += len(environments)
 
     def step(self, actions: np.ndarray) -> np.ndarray:
         """Run one slot of every environment.
