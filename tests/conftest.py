@@ -23,7 +23,6 @@ HERE = Path(__file__).parent
 # Files and folders whose tests take less than half a minute together.
 QUICK = (
     *("dess/test_scenario.py", "dess/sections/test_age.py", "dess/sections/test_arrivals.py"),
-    *("dess/sections/test_charging.py"),
     *("dess/sections/test_failures.py", "dess/sections/test_fleet.py", "dess/test_errors.py"),
     *("dess/test_files.py", "dess/test_missions.py"),
     *("dess/test_paper_records.py", "dess/test_rules.py", "dess/test_sea.py"),

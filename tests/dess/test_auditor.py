@@ -144,17 +144,3 @@ def test_every_column_of_every_event_counts(name: str, every: int) -> None:
         if str(rows) != str(log) and not _is_wrong(rows, scenario):  # it was nan
             accepted.add((event, column))
     assert accepted <= FREE
-
-
-OTHERS: list[tuple[str, dict[str, Any]]] = [
-    ("paper", {"pads": 2, "charge_rate": 9, "quota": 120, "slot_length": 1.1}),
-    ("beyond", {"charging.order": "first-come", "charging.power": 9, "wind.direction": 120}),
-    ("beyond", {"failures.pad_rate": 0, "failures.node_data": "lost", "fleet": []}),
-    ("packets", {"arrivals.buffer": 1, "arrivals.service": "oldest", "arrivals.rates": [0.5, 0]}),
-]
-
-
-@pytest.mark.parametrize(("name", "changes"), OTHERS)
-def test_an_auditor_of_another_scenario_objects(name: str, changes: dict[str, Any]) -> None:
-    for field, value in changes.items():
-        assert _is_wrong(_log_of(name), ScenarioSpace.of(SCENARIOS[name], **{field: value})), field

@@ -5,7 +5,7 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dess.errors import form_of, one_of, validation_line
+from dess.errors import one_of, validation_line
 
 MANY = [f"field_{number:02}" for number in range(20)] + ["uavs"]
 FIRST = ", ".join(MANY[:18])
@@ -74,9 +74,3 @@ def test_an_error_is_a_line_about_the_innermost_field(values: dict, line: str) -
         Whole.model_validate({"name": "x"} | values if values else {})
     found = validation_line(error.value, "plan", Whole)
     assert found.startswith(f"plan: {line}") and "\n" not in found
-
-
-def test_the_form_of_a_field_is_told_in_words() -> None:
-    forms = {name: form_of(field) for name, field in Part.model_fields.items()}
-    assert forms == {"price": "a number from 0", "kind": "small, large"}
-    assert form_of(Whole.model_fields["size"]) == "[an integer, an integer] (width and height)"

@@ -1,37 +1,14 @@
-"""The safety controller, which every mission asks once a slot, and the start of a mission."""
+"""The safety controller, which every mission asks once a slot."""
 
-from collections import Counter
-from typing import Any
-
-import numpy as np
 import pytest
 
 from dess import rules
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import HOVER, STEP_X, STEP_Y, State, starts_of, state_of
+from dess.state import HOVER, STEP_X, STEP_Y, starts_of, state_of
 from tests import compiled
 from tests.drawn import EAST, NORTH, SOUTH, WEST
 
 STEPS = list(zip(STEP_X.tolist(), STEP_Y.tolist(), strict=True))
-
-
-def _launched(space: ScenarioSpace, replication: int = 2) -> State:
-    """A mission at the start of slot 0."""
-    state = state_of([space], 1)
-    rules.launch(state, 0, starts_of([space], 3), 0, replication)
-    return state
-
-
-def test_start_cells_are_uniform() -> None:
-    space, pairs = ScenarioSpace.of(zone=[3, 4, 3, 2], uavs=2, nodes=[[0, 0]]), Counter[Any]()
-    for replication in range(1500):
-        uavs = _launched(space, replication).uavs[0]
-        pairs[tuple(uavs[["x", "y"]].tolist())] += 1
-    assert len(pairs) == 6 * 5
-    assert abs(np.array([*pairs.values()]) - 50).max() < 5 * np.sqrt(50)  # 5 standard deviations
-
-
-# --- safety controller ---
 
 
 def _resolve(
@@ -43,7 +20,9 @@ def _resolve(
         uavs=len(uavs),
         forbid_swaps=forbid_swaps,
     )
-    state = _launched(ScenarioSpace.of(scenario))
+    space = ScenarioSpace.of(scenario)
+    state = state_of([space], 1)
+    rules.launch(state, 0, starts_of([space]), 0, 0)
     team = state.uavs[0]
     for i, ((x, y), action) in enumerate(uavs):
         team[i]["x"], team[i]["y"], team[i]["action"] = x, y, action

@@ -30,15 +30,6 @@ def test_a_block_is_philox_of_its_coordinates() -> None:
     assert streams.block(np.uint64(seed), replication, stream, substream, slot, index) == expected
 
 
-def test_integer_reaches_both_ends_and_is_uniform() -> None:
-    assert streams.integer(np.uint64(0), 10, 50) == 10
-    assert streams.integer(np.uint64(2**32 - 1), 10, 50) == 50
-    words = np.linspace(0, 2**32 - 1, 41_000).astype(np.uint64)
-    counts = np.bincount([streams.integer(word, 10, 50) for word in words])[10:]
-    assert len(counts) == 41
-    assert abs(counts - 1000).max() <= 1
-
-
 def test_normal_in_the_tails_is_exact_bounded_and_symmetric() -> None:
     # Both sides of the switch between the approximations, |q| = 0.425, and the outermost words.
     switches = [int(p * 2**32) + step for p in (0.075, 0.925) for step in (-1, 0, 1)]

@@ -1,7 +1,5 @@
 """The environment of one mission equals ``simulate``, and repeats its episodes."""
 
-import runpy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -101,8 +99,3 @@ def test_who_stays_observes_zeros_and_changes_nothing(
     cut = [END_NAMES[end] == "truncated" for end in ends[:fleet]]
     assert [*truncated.values()][:fleet] == cut
     assert [*rewards.values()] == [*record.uavs["reward"], *[0.0] * (len(rewards) - fleet)]
-
-
-def test_the_example_runs(capsys: pytest.CaptureFixture) -> None:
-    runpy.run_path(str(Path(__file__).parents[3] / "examples" / "random_actions.py"))
-    assert "data units collected" in capsys.readouterr().out

@@ -28,28 +28,6 @@ def _failing(route: str, expected: dict[str, Any], fields: Any = (), **values: A
     return Case(ALONE | dict(fields) | {"failures": values}, (route,), expected)
 
 
-def _lost(data: str, collected: float, lost: float) -> Case:
-    expected = {
-        "uavs quota battery end collected": [(1, 39, LOST, collected)],
-        "record slots success failures collected lost": [1, 0, 1, collected, lost],
-        "record residual collection_ratio": [92, collected / 100],
-        "data_lost value": [lost] * (data == "lost"),
-    }
-    return _failing("......", expected, uav_rate=1, uav_data=data)
-
-
-def _silent(data: str, served: list[int], residual: float, lost: float) -> Case:
-    """A node is silent in slots 1, 3 and 5; what it holds then is kept or lost."""
-    expected = {
-        "communication time": served,
-        "node_failure time": [1, 3, 5],
-        "node_repair time": [2, 4, 6],
-        "record residual lost": [residual, lost],
-        "uavs quota": [len(served)],
-    }
-    return _failing("......", expected, node_rate=1, node_repair=1, node_data=data)
-
-
 FLOWN = {
     "move time x value": [(0, 2, 39), (1, 2, 39), (2, 1, 38), (3, 1, 38), (4, 1, 37), (5, 1, 37)],
     "communication time": [1, 3, 5],
@@ -72,16 +50,12 @@ CHARGING |= {"max_slots": 7, "charging": {"measured": True}}
 CASES = {
     "a UAV is grounded in slots 1, 3 and 5": _failing("EEW...", FLOWN, uav_rate=1, uav_repair=1),
     "a pad is out of order in 1, 3, 5": _failing("", CHARGED, CHARGING, pad_rate=1, pad_repair=1),
-    "the data of a lost UAV are kept": _lost("kept", 8, 0),
-    "or lost": _lost("lost", 0, 8),
     "a quota filled comes before a failure": _failing(
         "", {"uavs end": [QUOTA], "record failures": [0]}, {"quota": 1}, uav_rate=1
     ),
     "and so does an empty battery": _failing(
         "E", {"uavs end": [BATTERY], "record failures": [0]}, {"flying_time": 1}, uav_rate=1
     ),
-    "the data of a silent node wait": _silent("kept", [1, 3, 5], 76, 0),
-    "or are lost, too": _silent("lost", [1], 0, 92),
 }
 
 
