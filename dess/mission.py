@@ -203,7 +203,7 @@ class MissionModel:
     ) -> None:
         """Log an event of a UAV; its value is by default the battery."""
         if self.log is not None:
-            u = _Uav(*self.uavs[i].item())
+            u: Any = _Uav(*self.uavs[i].item())
             value = u.battery if value is None else value
             self.log.add(float(time), event, i, -1, value, u.x, u.y, u.battery, other)
 
