@@ -1,9 +1,8 @@
 """Questions on costs: hand-worked tables and sentences, and a study of a small sea."""
 
-import pandas as pd
 import pytest
 
-from analysis import load_results, run_study
+from analysis import run_study
 from analysis.questions import costs, summary
 from analysis.stats.front import on_front
 from analysis.stats.intervals import mean_interval
@@ -39,38 +38,6 @@ def searched(tmp_path_factory):
     folder = tmp_path_factory.mktemp("searched")
     study = small_study(folder, selection=RULE, design=DESIGN, costs=PRICES)
     return run_study(study, folder / "out")
-
-
-def test_missions_have_the_cost_of_their_records(fixed):
-    pads = fixed.missions["point"].map(lambda p: fixed.scenario(p).charging_pads)
-    uavs = fixed.uavs.assign(lost=fixed.uavs["end"] == "battery")
-    sums = uavs.groupby(["policy", "point", "replication"])[["slots_charging", "lost"]].sum()
-    keys = pd.MultiIndex.from_frame(fixed.missions[["policy", "point", "replication"]])
-    sums = sums.loc[keys]
-    rate = fixed.scenario(0).charge_rate
-    running = 2 * sums["slots_charging"].to_numpy() * rate / 100 + 1000 * sums["lost"].to_numpy()
-    running += 6 * fixed.missions["slots"].to_numpy() / 60
-    expected = 1000 * fixed.missions["uavs"] + 100 * pads + 5 * running
-    assert fixed.missions["cost"].to_numpy() == pytest.approx(expected.to_numpy())
-    assert sums["lost"].any()
-
-
-def test_settings_are_priced_condition_by_condition(fixed):
-    table = costs.priced(fixed)
-    assert [*dict.fromkeys(table["condition"])] == [
-        "communication quota 60",
-        "communication quota 120",
-    ]
-    assert {"1 UAV and 1 pad", "1 UAV and 2 pads", "2 UAVs and 1 pad", "2 UAVs and 2 pads"} == {
-        *table["fleet"]
-    }
-    for _, rows in table.groupby("condition"):
-        assert rows["cost"].is_monotonic_increasing
-    row = table.iloc[3]
-    missions = fixed.missions.query(f"policy == '{row['policy']}' and point == {row['point']}")
-    assert row[["cost", "cost_low", "cost_high"]].tolist() == pytest.approx(
-        mean_interval(missions["cost"])
-    )
 
 
 def test_parts_add_up(fixed):
@@ -158,25 +125,6 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert "All conditions, `greedy`" in "\n".join(costs.answers(searched, table))
 
 
-def test_an_interrupted_search_ends_with_the_same_missions(tmp_path):
-    class StopError(Exception):
-        pass
-
-    def stop(announced):
-        if announced.number == 2:
-            raise StopError
-
-    design = {"kind": "grid", "values": {"uavs": [1, 2]}}
-    changes = {"selection": RULE, "design": design, "costs": PRICES, "policies": ["greedy"]}
-    study = small_study(tmp_path, **changes)
-    with pytest.raises(StopError):
-        run_study(study, tmp_path / "out", announce=stop)
-    again, whole = (run_study(study, tmp_path / name) for name in ("out", "whole"))
-    assert again.manifest["missions"] == whole.manifest["missions"]
-    assert again.manifest["selected"] == whole.manifest["selected"]
-    assert load_results(tmp_path / "out").cheapest("greedy") == whole.cheapest("greedy")
-
-
 def test_bad_questions_get_one_line(fixed, tmp_path):
     free = run_study(small_study(tmp_path, missions=5), tmp_path / "free")
     for ask in (costs.priced, costs.parts, costs.front, costs.judged):
@@ -195,3 +143,17 @@ def test_prices_of_zero_leave_what_is_paid_for(tmp_path):
     table = costs.front(results)
     assert table["fleet"].tolist() == ["the fleet of the scenario"] * 2
     assert table["condition"].tolist() == ["", ""]
+
+
+def test_settings_are_priced_condition_by_condition(fixed):
+    table = costs.priced(fixed)
+    conditions = ["communication quota 60", "communication quota 120"]
+    assert [*dict.fromkeys(table["condition"])] == conditions
+    fleets = {f"{uavs} and {pads}" for uavs in ("1 UAV", "2 UAVs") for pads in ("1 pad", "2 pads")}
+    assert {*table["fleet"]} == fleets
+    for _, rows in table.groupby("condition"):
+        assert rows["cost"].is_monotonic_increasing
+    row = table.iloc[3]
+    missions = fixed.missions.query(f"policy == '{row['policy']}' and point == {row['point']}")
+    ends = row[["cost", "cost_low", "cost_high"]].tolist()
+    assert ends == pytest.approx(mean_interval(missions["cost"]))

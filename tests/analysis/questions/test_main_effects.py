@@ -10,7 +10,6 @@ from analysis.questions import main_effects
 from analysis.questions.main_effects import FALLS, IRREGULAR, LEVELS, PEAK, RISES, VALLEY
 from analysis.stats.correction import adjust
 from analysis.stats.intervals import mean_interval
-from analysis.stats.paired import paired
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -63,37 +62,6 @@ def test_a_design_of_several_fields_is_refused(tmp_path):
         main_effects.effects(run_study(study, tmp_path / "out"))
 
 
-def test_changes_are_paired_by_replication(results, table):
-    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
-    assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
-    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
-    ends = mean_interval(gaps)
-    assert pairs.loc[2, ["difference", "low", "high"]].tolist() == pytest.approx(list(ends))
-    assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
-    assert set(pairs["n"]) == {20}
-
-
-def test_intervals_that_hold_at_once_are_wider(results, table):
-    """By Bonferroni: three pairs, each at 1 - 0.05 / 3."""
-    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
-    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
-    _, low, high = mean_interval(gaps, 1 - 0.05 / 3)
-    assert pairs.loc[2, ["wide_low", "wide_high"]].tolist() == pytest.approx([low, high])
-    assert (pairs["wide_low"] < pairs["low"]).all() and (pairs["high"] < pairs["wide_high"]).all()
-
-
-def test_successes_are_compared_as_shares(results, table):
-    """So that equal outcomes still have an interval."""
-    pairs = main_effects.changes(results, table, "greedy", "uavs", "success")
-    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
-    of = (missions.loc[point, "success"].to_numpy(float) for point in (1, 0))
-    expected = paired(*of, metric="success")
-    assert pairs.loc[0, ["low", "high"]].tolist() == pytest.approx([expected.low, expected.high])
-    assert expected.low < pairs.loc[0, "difference"] < expected.high
-
-
 @pytest.mark.parametrize(
     ("steps", "words", "peaks"),
     [
@@ -112,57 +80,47 @@ def test_shapes(steps, words, peaks):
     assert main_effects.shape(pairs_of(steps, sure=False)).words == LEVELS
 
 
-def test_many_small_steps_make_a_rise():
-    """No two neighbours differ, but the ends do."""
-    pairs = pairs_of([0.4, 0.4, 0.4], half=1.0)
-    assert pairs.loc[pairs["second"] - pairs["first"] == 1, "p_adjusted"].eq(1).all()
-    assert main_effects.shape(pairs).words == RISES
-
-
-def effects_of(means, field="uavs", policy="mine"):
-    """Effects with these means of collection ratio and communication at the values 1, 2, ..."""
-    rows = [(field, str(n + 1), n, policy, PRODUCT, mean, 300) for n, mean in enumerate(means)]
-    columns = ["field", "value", "position", "policy", "metric", "mean", "n"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def test_the_table_has_a_row_per_parameter_and_policy():
-    policies = {"mine": [0.1, 0.2, 0.1], "other": [0.1, 0.3, 0.4]}
-    effects = pd.concat(effects_of(means, policy=policy) for policy, means in policies.items())
-    changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
-    ratios = {"uavs": {"mine": pairs_of([0.2, 0.1]), "other": pairs_of([0.1, 0.1])}}
-    table = main_effects.listed(effects, changes, ratios).set_index("Policy")
-    assert table.loc["other"].tolist() == [
-        "Number of UAVs",
-        RISES,
-        "10.0 % at 1",
-        "40.0 % at 3",
-        "+30.0 [+29.9, +30.1]",
-        "+20.0 [+19.9, +20.1]",
-        "",
-    ]
-    assert table.loc["mine", "Highest at"] == "2"
-    assert table.loc["mine", "Last − first"] == "0.0 [−0.1, +0.1]"
-
-
-@pytest.mark.parametrize(("steps", "top"), [((0.2, -0.1), "2"), ((0.2, 0, -0.1), "2 or 3")])
-def test_the_table_says_where_a_peak_may_be(steps, top):
-    means = np.cumsum([0.1, *steps])
-    changes = {"uavs": {"mine": pairs_of([*steps])}}
-    table = main_effects.listed(effects_of(means), changes, changes)
-    assert table.loc[0, ["Along the values", "Highest at"]].tolist() == [PEAK, top]
-
-
-def test_a_parameter_with_one_value_has_no_changes(tmp_path):
-    values = {"uavs": [1, 2], "quota": [20]}
-    study = small_study(tmp_path, design={"kind": "one-at-a-time", "values": values}, missions=2)
-    results = run_study(study, tmp_path / "out")
-    changes = main_effects.changes_by_field(results, main_effects.effects(results))
-    assert {field: [*pairs] for field, pairs in changes.items()} == {"uavs": ["greedy", "random"]}
-
-
 def test_the_best_policies_are_shown_unless_others_are_asked_for(results):
     means = results.missions.groupby("policy")[PRODUCT].mean()
     assert main_effects.leading_policies(results) == [means.idxmax()]
     named = main_effects.leading_policies(results, "learned", means.idxmin())
     assert named == ["learned", means.idxmin()]
+
+
+def test_changes_are_paired_by_replication(results, table):
+    """Intervals that hold for all three pairs at once are wider, by Bonferroni."""
+    pairs = main_effects.changes(results, table, "greedy", "initial_data", "collection_ratio")
+    assert pairs[["first", "second"]].to_numpy().tolist() == [[0, 1], [0, 2], [1, 2]]
+    missions = results.missions.query("policy == 'greedy'").set_index(["point", "replication"])
+    gaps = missions.loc[4, "collection_ratio"] - missions.loc[3, "collection_ratio"]
+    expected = [*mean_interval(gaps), *mean_interval(gaps, 1 - 0.05 / 3)[1:]]
+    columns = ["difference", "low", "high", "wide_low", "wide_high"]
+    assert pairs.loc[2, columns].tolist() == pytest.approx(expected)
+    assert pairs["p_adjusted"].tolist() == adjust(pairs["p"].to_numpy(), "holm").tolist()
+    assert set(pairs["n"]) == {20}
+
+
+def test_the_table_has_a_row_per_parameter_and_policy():
+    policies = {"mine": [0.1, 0.2, 0.2, 0.1], "other": [0.1, 0.3, 0.3, 0.4]}
+    rows = [
+        ("uavs", str(n + 1), n, policy, PRODUCT, mean)
+        for policy, means in policies.items()
+        for n, mean in enumerate(means)
+    ]
+    columns = ["field", "value", "position", "policy", "metric", "mean"]
+    changes = {"uavs": {policy: pairs_of(np.diff(means)) for policy, means in policies.items()}}
+    ratios = {"uavs": dict.fromkeys(policies, pairs_of([0.2, 0.1, -0.1]))}
+    table = main_effects.listed(pd.DataFrame(rows, columns=columns), changes, ratios)
+    mine = [
+        PEAK,
+        "10.0 % at 1",
+        "10.0 % at 4",
+        "0.0 [−0.1, +0.1]",
+        "+20.0 [+19.9, +20.1]",
+        "2 or 3",
+    ]
+    other = [RISES, "10.0 % at 1", "40.0 % at 4", "+30.0 [+29.9, +30.1]", mine[4], ""]
+    assert table.to_numpy().tolist() == [
+        ["Number of UAVs", "mine", *mine],
+        ["Number of UAVs", "other", *other],
+    ]

@@ -3,17 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from analysis import run_study
-from analysis.names import PRODUCT, RATIO
 from analysis.questions import missions
 from analysis.results.tables import Results
-from analysis.stats.intervals import bounded_interval
-from dess import InputError
-from dess.state import sample_scenario
 from tests.analysis.small import grid, small_study
 
 
@@ -27,19 +22,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Results:
 @pytest.fixture(scope="module")
 def shown(results: Results) -> list[missions.LoggedMission]:
     return [missions.logged_mission(results, "greedy", point, 1) for point in (0, 1)]
-
-
-def test_a_mission_has_the_scenario_of_its_replication(
-    results: Results, shown: list[missions.LoggedMission]
-) -> None:
-    for point, mission in enumerate(shown):
-        assert mission.scenario == sample_scenario(results.scenario(point), 7, 1)
-        assert len(mission.uavs) == mission.row["uavs"] == (1, 3)[point]
-
-
-def test_a_mission_without_a_log_is_refused(results: Results) -> None:
-    with pytest.raises(InputError, match="no event log of greedy, point 0, replication 5"):
-        missions.logged_mission(results, "greedy", 0, 5)
 
 
 # --- missions simulated again ---
@@ -76,14 +58,6 @@ def test_logs_of_other_results_and_of_other_records_are_not_shown(
     other.missions["slots"] += 1  # as of other code
     missions.keep_logs(other, WANTED[:1], tmp_path, print)
     assert missions.kept_missions(other, WANTED[:1], tmp_path) == []
-
-
-def test_a_folder_that_cannot_be_written_is_named(results: Results, tmp_path: Path) -> None:
-    (tmp_path / missions.FOLDER).write_text("a file")
-    with pytest.raises(
-        InputError, match="cross-check: cannot be written: Not a directory; allowed"
-    ):
-        missions.keep_logs(results, WANTED, tmp_path, print)
 
 
 def test_a_caption_says_where_batteries_are_depleted(shown: list[missions.LoggedMission]) -> None:
@@ -124,13 +98,3 @@ def test_uavs_have_a_row_each(results: Results, shown: list[missions.LoggedMissi
     assert table[["UAVs", "UAV"]].to_numpy().tolist() == [[1, 1], [3, 1], [3, 2], [3, 3]]
     assert table["Communications"].tolist() == [f"{n} of 60" for n in kept["quota"]]
     assert table["Battery at the end"].tolist() == [f"{n} %" for n in kept["battery"]]
-
-
-def test_means_are_of_a_policy_at_a_point_or_at_all(results: Results) -> None:
-    greedy = results.missions.query("policy == 'greedy'")
-    at_point = missions.estimate(results, "greedy", RATIO, 1)
-    expected = bounded_interval(greedy.query("point == 1")[RATIO])
-    assert tuple(at_point[["mean", "low", "high"]]) == pytest.approx(tuple(expected))
-    assert at_point["n"] == 6
-    everywhere = missions.estimate(results, "greedy")
-    assert everywhere["mean"] == pytest.approx(np.mean(greedy[PRODUCT]))

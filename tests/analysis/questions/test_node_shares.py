@@ -76,25 +76,9 @@ def test_sectors_of_no_data_and_of_one_node() -> None:
     assert node_shares.sectors(np.array([[3.0], [1.0]]), SQUARE[:1]) == 0.75
 
 
-def test_rings_are_no_sectors() -> None:
-    inner = (np.abs(PAPER - (13, 16)) < 10).all(axis=1)
-    data = np.array([inner, ~inner], float)
-    assert node_shares.division(data) == 1
-    assert node_shares.sectors(data, PAPER) < 0.8
-
-
 @given(st.floats(0, 2 * np.pi), st.floats(-12, 12))
 def test_any_straight_line_makes_sectors(angle: float, offset: float) -> None:
     """Whatever way it runs, also beside the rows and columns of the paper's grid."""
     one = (PAPER - (13, 16)) @ (np.cos(angle), np.sin(angle)) < offset
     data = np.array([one, ~one], float)
     assert node_shares.sectors(data, PAPER) == pytest.approx(1)
-
-
-@given(st.lists(st.booleans(), min_size=4, max_size=4), st.integers(1, 7), st.integers(-9, 9))
-def test_sectors_do_not_depend_on_place_and_scale(
-    first: list[bool], scale: int, shift: int
-) -> None:
-    data = np.array([first, [not one for one in first]], float)
-    moved = node_shares.sectors(data, SQUARE * scale + shift)
-    assert moved == pytest.approx(node_shares.sectors(data, SQUARE))

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.names import METRICS, PARAMETERS, PRODUCT
+from analysis.names import METRICS, PARAMETERS
 from analysis.questions import regions
 from analysis.questions.regions import AHEAD, BEHIND
 from analysis.stats.correction import adjust
@@ -122,14 +122,6 @@ def test_regions_that_chance_finds_are_inconclusive():
     assert false <= 3  # of 20, each with a chance of at most 1 in 20
 
 
-def test_estimates_of_regions_do_not_depend_on_the_missions_that_chose_them():
-    missions = missions_of(lambda t: 0.1 * (t["uavs"] == 3))
-    even = missions["replication"] % 2 == 0
-    moved = {c: missions[c].where(~even, missions[c] + 0.5) for c in ("difference", PRODUCT)}
-    same = regions.rules(missions.assign(**moved))
-    assert same["mean"].tolist() == regions.rules(missions)["mean"].tolist()
-
-
 def test_the_strongest_two_are_chosen_on_the_half_that_is_not_shown():
     missions = missions_of(lambda t: 0.05 * t["uavs"] + 0.01 * (t["flying_time"] > 75))
     odd = missions["replication"] % 2 == 1
@@ -141,34 +133,20 @@ def test_the_strongest_two_are_chosen_on_the_half_that_is_not_shown():
     assert all(part.empty for part in regions.strongest(missions.head(1)))
 
 
-def test_the_lowest_cell_has_its_place_and_its_missions():
-    columns = ["value", "value_2", "mean", "low", "high", "n"]
-    rows = [("1", "70–72", 0.05, 0.04, 0.06, 90), ("3", "70–72", 0.033, 0.014, 0.052, 1155)]
-    cells = pd.DataFrame(rows, columns=columns)
-    assert regions.lowest(cells) == "+3.3 [+1.4, +5.2] at 3 and 70–72 (n = 1,155)"
-
-
-def test_verdicts_are_counted():
-    table = pd.DataFrame({"verdict": [AHEAD, INCONCLUSIVE, AHEAD]})
-    assert regions.tally(table) == "ahead in 2, behind in 0 and inconclusive in 1 of 3"
-
-
-def test_the_spread_names_the_bins_with_the_least_and_the_most():
-    columns = ["field", "value", "mean", "low", "high"]
+def test_tables_of_text_name_the_bins_and_count_the_verdicts():
+    columns = ["field", "value", "value_2", "mean", "low", "high", "n", "verdict"]
     rows = [
-        ("uavs", "1", 0.02, 0.01, 0.03),
-        ("uavs", "2", -0.01, -0.02, 0.0),
-        ("uavs", "3", 0, 0, 0),
+        ("uavs", "1", "70–72", 0.02, 0.01, 0.03, 90, AHEAD),
+        ("uavs", "2", "70–72", -0.01, -0.02, 0.0, 1155, INCONCLUSIVE),
+        ("uavs", "3", "70–72", 0.0, 0.0, 0.0, 8, AHEAD),
     ]
     lead = pd.DataFrame(rows, columns=columns)
     dependences = pd.DataFrame({"field": ["uavs"], "explained": [0.25], "p_adjusted": [0.0312]})
-    assert regions.spread(lead, dependences).iloc[0].tolist() == [
-        "Number of UAVs",
-        "−1.0 [−2.0, 0.0] at 2",
-        "+2.0 [+1.0, +3.0] at 1",
-        "25.0 %",
-        "0.031",
-    ]
+    ends = ["−1.0 [−2.0, 0.0] at 2", "+2.0 [+1.0, +3.0] at 1"]
+    shown = regions.spread(lead, dependences).iloc[0].tolist()
+    assert shown == ["Number of UAVs", *ends, "25.0 %", "0.031"]
+    assert regions.lowest(lead) == "−1.0 [−2.0, 0.0] at 2 and 70–72 (n = 1,155)"
+    assert regions.tally(lead) == "ahead in 2, behind in 0 and inconclusive in 1 of 3"
 
 
 def test_few_missions_make_few_rules():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis import compare, run_study, summary
-from analysis.names import METRICS, PRODUCT, SUCCESS
+from analysis.names import METRICS, PRODUCT
 from analysis.questions import settings
-from analysis.stats.intervals import bounded_interval, wilson
+from analysis.stats.intervals import bounded_interval
 from dess import InputError
 from tests.analysis.small import grid, small_study
 
@@ -35,12 +35,6 @@ def planted(results, metric):
 # --- fields ---
 
 
-def test_varied_fields_have_their_values_in_order(results):
-    assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
-    assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
-    assert settings.in_words(results)[1] == "number of UAVs 3, initial data per node 10–20"
-
-
 def test_long_and_unset_values_are_short_texts(tmp_path):
     rows = [
         {"pads": 2},
@@ -62,14 +56,6 @@ def test_long_and_unset_values_are_short_texts(tmp_path):
     assert table["initial_data"].tolist() == [*["5–20"] * 4, "4"]
 
 
-def test_a_study_of_one_point_varies_nothing(tmp_path):
-    results = run(tmp_path)
-    assert settings.varied(results) == {}
-    assert settings.in_words(results) == [settings.AS_IT_IS]
-    assert settings.main_effects(results).empty
-    assert len(settings.ranked(results)) == 2
-
-
 # --- ranks ---
 
 
@@ -81,15 +67,6 @@ def test_ranked_settings_have_the_estimates_of_the_summary(results):
         ours = table.loc[(row.policy, row.point)]
         found = ours[[row.metric, f"{row.metric}_low", f"{row.metric}_high", "n"]].tolist()
         assert found == pytest.approx([row.mean, row.low, row.high, row.n], abs=1e-12)
-
-
-def test_ranks_follow_the_metric_and_fields_stand_beside_them(results):
-    table = settings.ranked(results, "reward")
-    assert table["rank"].tolist() == [*range(1, 13)]
-    assert table["reward"].is_monotonic_decreasing
-    assert table["tied"].iloc[0]
-    points = settings.points(results)
-    assert table["uavs"].tolist() == points["uavs"].loc[table["point"]].tolist()
 
 
 def test_a_planted_best_is_found_and_those_that_equal_it_are_tied(results):
@@ -118,15 +95,6 @@ def test_of_costs_the_lowest_is_the_best(results):
     assert settings.averaged(priced, ["uavs"], "cost").query("tied")["uavs"].tolist() == [3, 3]
 
 
-def test_missions_of_the_best_settings(results):
-    table = settings.ranked(results)
-    missions = settings.at_best(results, table)
-    for policy in results.policies:
-        own = missions[missions["policy"] == policy]
-        best = table[table["policy"] == policy].iloc[0]
-        assert {*own["point"]} == {best["point"]} and len(own) == 12
-
-
 # --- averages ---
 
 
@@ -148,21 +116,6 @@ def test_the_partial_dependence_of_an_additive_metric_is_exact(results):
     assert settings.by_influence(effects) == ["uavs", "initial_data"]
     interval = bounded_interval(0.001 * np.arange(12) + 0.115)
     assert of_uavs.iloc[0][["mean", "low", "high"]].tolist() == pytest.approx([*interval])
-
-
-def test_a_cell_of_one_point_has_the_estimates_of_its_missions(results):
-    table = settings.averaged(results, ["uavs", "initial_data"], SUCCESS, "random")
-    row = table.query("uavs == 3 and initial_data == '10–20'").iloc[0]
-    missions = results.missions.query("policy == 'random' and point == 1")
-    expected = wilson(missions["success"].sum(), 12)
-    assert row[["mean", "low", "high"]].tolist() == pytest.approx([*expected])
-    assert row[["n", "points"]].tolist() == [12, 1]
-
-
-def test_shares_without_spread_are_not_certain(results):
-    missions = results.missions.assign(success=1)
-    table = settings.averaged(replace(results, missions=missions), ["uavs"], SUCCESS)
-    assert table["low"].tolist() == pytest.approx([bounded_interval([1] * 12).low] * 6)
 
 
 def test_cells_count_the_replications_that_all_their_points_have(results):
@@ -212,17 +165,6 @@ def test_differences_to_a_baseline_are_those_of_compare(results):
         assert (rows["p_adjusted"] >= rows["p"]).all()
 
 
-def test_a_point_is_compared_on_the_pairs_that_it_has(results):
-    missions = results.missions
-    shorter = missions[(missions["point"] != 3) | (missions["replication"] > 6)]
-    table = settings.against(replace(results, missions=shorter), 0, [PRODUCT])
-    assert table.set_index(["policy", "point"])["n"].to_dict() == {
-        (policy, point): 5 if point == 3 else 12
-        for policy in results.policies
-        for point in range(1, 6)
-    }
-
-
 @pytest.mark.parametrize(
     ("ask", "message"),
     [
@@ -238,3 +180,12 @@ def test_a_point_is_compared_on_the_pairs_that_it_has(results):
 def test_what_the_study_has_not_is_refused(results, ask, message):
     with pytest.raises(InputError, match=message):
         ask(results)
+
+
+def test_varied_fields_have_their_values_in_order(results, tmp_path):
+    assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
+    assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
+    assert settings.in_words(results)[1] == "number of UAVs 3, initial data per node 10–20"
+    single = run(tmp_path)
+    assert settings.varied(single) == {} and settings.main_effects(single).empty
+    assert settings.in_words(single) == [settings.AS_IT_IS]

@@ -12,9 +12,7 @@ import pytest
 from analysis import compare, run_study
 from analysis.names import PRODUCT
 from analysis.questions import summary
-from analysis.stats.intervals import mean_interval
-from dess import simulate
-from policies import load, load_team
+from policies import load
 from policies.ddqn.trained import save_policy
 from policies.ddqn.training import Training
 from reports import cli
@@ -27,14 +25,6 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     study = small_study(folder, design=grid(uavs=[1, 2], quota=[20, 60]), missions=20)
     return run_study(study, folder / "out")
-
-
-def test_means_are_of_a_policy_at_a_point(results):
-    table = summary.means(results).set_index(["policy", "point", "metric"])
-    cell = results.missions.query("policy == 'random' and point == 2")
-    ends = ["mean", "low", "high"]
-    assert tuple(table.loc[("random", 2, "reward"), ends]) == mean_interval(cell["reward"])
-    assert len(table) == 2 * 4 * 4
 
 
 def stub(**policies):
@@ -73,27 +63,6 @@ def test_targets_are_met_by_the_lower_end():
     assert summary.meeting(table, {}).equals(table)
 
 
-def test_settings_are_in_words(results, tmp_path):
-    assert summary.settings(results)[1:3] == ["uavs 1, quota 60", "uavs 2, quota 20"]
-    design = grid(initial_data=[5, [5, 7.5]])
-    study = small_study(tmp_path, missions=1, design=design)
-    words = summary.settings(run_study(study, tmp_path / "out"))
-    assert words == ["initial_data 5", "initial_data 5–7.5"]
-
-
-def test_the_worst_missions_come_with_commands_that_simulate_them_again(results, tmp_path, capsys):
-    table = summary.worst(results, "random", 3)
-    random_missions = results.missions.query("policy == 'random'")
-    assert table[PRODUCT].tolist() == sorted(random_missions[PRODUCT])[:3]
-    for row in table.itertuples():
-        space = results.scenario(row.point)
-        alone = simulate(space, load_team("random"), 7, row.replication)
-        assert alone.metrics["reward"] == row.reward
-        words = row.command.split()
-        assert words[:2] == ["dess", "simulate"]
-        assert words[-2:] == ["--replication", str(row.replication)]
-
-
 def test_the_command_of_a_mission_gives_its_row(results, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     worst = summary.worst(results, "random", 1, folder=results.store.folder).iloc[0]
@@ -129,14 +98,6 @@ def test_the_best_policy_is_compared_with_the_others(results):
     alone = compare(results.missions, "greedy", table.index.tolist())
     either = np.minimum(1, 2 * alone["p_adjusted"])  # random might have been the best
     assert table["p_adjusted"].tolist() == pytest.approx(either.tolist())
-
-
-def test_with_one_policy_there_is_no_comparison(tmp_path):
-    study = small_study(tmp_path, policies=["greedy"])
-    results = run_study(study, tmp_path / "out")
-    assert summary.comparisons(results).empty
-    assert summary.learned_against_heuristic(results).empty
-    assert summary.selections(results).empty
 
 
 @pytest.fixture
@@ -189,15 +150,6 @@ def test_the_selected_point_and_its_check(tmp_path):
     assert summary.comparisons(results).empty  # each policy has missions of its own
 
 
-def test_the_guard_is_named_with_what_success_is_without_it():
-    ends = {"mean": [0.998, 0.0], "low": [0.993, 0.0], "high": [0.999, 0.004]}
-    means = pd.DataFrame({"policy": ["random", "random-unguarded"], "metric": "success", **ends})
-    text = summary.guard_in_words(means)
-    assert "under the guard have a success of 99.8 % [99.3, 99.9]." in text
-    assert text.endswith("without the guard have a success of 0.0 % [0.0, 0.4].")
-    assert summary.guard_in_words(means.iloc[:0]).endswith("in time.")
-
-
 def test_estimates_stand_beside_the_papers_numbers():
     rows = [
         ("tour", 1, "success", 0.95, 0.94, 0.96),
@@ -216,3 +168,13 @@ def test_estimates_stand_beside_the_papers_numbers():
     fleets = summary.beside_paper(both, {1: printed, 2: {"success": 0.5, "collection_ratio": 1}})
     assert [fleet for _, fleet in fleets.columns[1:]] == ["I = 1", "I = 2"] * 2
     assert fleets.iloc[1, 2] == "96.0 % [94.0, 96.0] +46.0 ▲"
+
+
+def test_with_one_policy_there_is_no_comparison(tmp_path):
+    design = grid(initial_data=[5, [5, 7.5]])
+    study = small_study(tmp_path, policies=["greedy"], missions=1, design=design)
+    results = run_study(study, tmp_path / "out")
+    assert summary.comparisons(results).empty
+    assert summary.learned_against_heuristic(results).empty
+    assert summary.selections(results).empty
+    assert summary.settings(results) == ["initial_data 5", "initial_data 5–7.5"]

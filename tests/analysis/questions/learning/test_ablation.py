@@ -9,9 +9,7 @@ from analysis.questions.learning.ablation import (
     ablation,
     ablation_table,
     difference,
-    finals,
 )
-from tests.analysis.questions.learning.test_curves import several
 
 
 def test_the_difference_of_means_is_welchs():
@@ -30,25 +28,6 @@ def test_a_single_training_is_held_against_the_spread_of_the_others():
     half = stats.t.ppf(0.975, 2) * 1.0 * np.sqrt(1 + 1 / 3)
     assert (ends.low, ends.high) == pytest.approx((3.0 - half, 3.0 + half))
     assert p == pytest.approx(2 * stats.t.sf(3.0 / np.sqrt(4 / 3), 2))
-
-
-def test_two_single_trainings_tell_nothing_of_the_spread():
-    ends, p = difference([5.0], [3.0])
-    assert ends.mean == 2.0 and np.isnan([ends.low, ends.high]).all() and p == 1.0
-
-
-def test_the_ablation_compares_what_trainings_end_with():
-    ends = {"base": [1.0, 2.0, 3.0], "much": [9.0, 9.5, 9.7], "once": [2.5]}
-    last = finals(pd.concat(several(name, values) for name, values in ends.items()))
-    table = ablation(last, "final_product", "base").set_index("variant")
-    assert table["n"].to_dict() == {"base": 3, "much": 3, "once": 1}
-    assert table["mean"].to_dict() == pytest.approx({n: np.mean(v) for n, v in ends.items()})
-    assert table.loc["base", ["difference", "p", "p_adjusted"]].isna().all()
-    assert table.loc["once", ["low", "high"]].isna().all()
-    assert table.loc["once", "difference_low"] < 0 < table.loc["once", "difference_high"]
-    p = table.loc["much", "p"]
-    assert table.loc["much", "p_adjusted"] == pytest.approx(2 * p)  # Holm, of two
-    assert p == difference(ends["much"], ends["base"])[1]
 
 
 @pytest.fixture

@@ -1,8 +1,5 @@
 """Learning curves that anybody may have sent: read as tables, or refused in one line."""
 
-import json
-import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +8,6 @@ import pandas as pd
 import pytest
 
 from analysis.questions.learning.files import CURVE, CURVES, read_curve, read_curves
-from analysis.questions.learning.trained import trained_policies
 from dess.errors import InputError
 from policies.registry import TRAINED
 
@@ -49,43 +45,9 @@ def test_forged_curves_are_a_line(problem: str, tmp_path: Path) -> None:
         read_curves(path)
 
 
-@pytest.mark.parametrize("content", [b"", b"PAR1", b"x" * 100])
-def test_what_is_no_table_is_a_line(content: bytes, tmp_path: Path) -> None:
-    path = tmp_path / "curves.parquet"
-    with pytest.raises(InputError, match=f"^{path}: no such file"):
-        read_curves(path)
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=f"^{path}: damaged"):
-        read_curves(path)
-
-
 @pytest.mark.parametrize("wrong", [{"is_best": False}, {"updates": range(75, 0, -1)}])
 def test_a_forged_curve_is_a_line(wrong: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "training.parquet"
     pd.read_parquet(TRAINED / "ddqn" / "training.parquet").assign(**wrong).to_parquet(path)
     with pytest.raises(InputError, match=f"^{path}: {next(iter(wrong))}: .*; allowed: "):
         read_curve(path)
-
-
-@pytest.mark.parametrize("name", ["training.parquet", "config.json"])
-@pytest.mark.parametrize("kind", ["pipe", "zero", "folder"])
-def test_a_trained_policy_without_files_is_a_line(kind: str, name: str, tmp_path: Path) -> None:
-    folder = shutil.copytree(TRAINED / "ddqn", tmp_path / "ddqn")
-    path = folder / name
-    path.unlink()
-    if kind == "zero":
-        path.symlink_to("/dev/zero")
-    else:
-        os.mkfifo(path) if kind == "pipe" else path.mkdir()
-    with pytest.raises(InputError, match=f"^{path}: "):
-        trained_policies(tmp_path)
-
-
-@pytest.mark.parametrize("key", ["training", "name", "layout", "observation_version"])
-def test_a_forged_description_is_a_line_that_names_the_key(key: str, tmp_path: Path) -> None:
-    folder = shutil.copytree(TRAINED / "ddqn", tmp_path / "ddqn")
-    description = json.loads((folder / "config.json").read_text())
-    del description[key]
-    (folder / "config.json").write_text(json.dumps(description))
-    with pytest.raises(InputError, match=rf"config\.json: {key}: is missing; allowed: "):
-        trained_policies(tmp_path)

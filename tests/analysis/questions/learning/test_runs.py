@@ -69,12 +69,6 @@ def test_marl_eval_has_the_same_scores_at_every_level(results, monkeypatch) -> N
                 assert [*values] == ["success", METRIC]
 
 
-def test_a_study_without_a_design_is_one_task(tmp_path) -> None:
-    results = run_study(small_study(tmp_path), tmp_path / "out")
-    assert rliable_scores(results)["greedy"].shape == (10, 1)
-    assert [*marl_eval_data(results)["trial"]] == ["trial"]
-
-
 def test_what_has_no_scores_is_refused(results, tmp_path, monkeypatch) -> None:
     with pytest.raises(InputError, match="metric: 'sucess' is unknown"):
         rliable_scores(results, "sucess")

@@ -59,13 +59,6 @@ def test_rows_are_by_number_of_uavs_then_over_all(results):
     assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
 
 
-def test_a_table_of_text(results):
-    listed = gap.listed(gap.by_fleet(results))
-    assert listed.iloc[3].tolist()[:3] == ["high", "2", "2"]
-    assert listed["Gap [points]"][1].startswith("15.0 [")
-    assert listed["Upper bound"][3].startswith("100.0 % [")
-
-
 def test_the_closest_policy_is_first_and_far_is_the_upper_end(results):
     table = gap.by_fleet(results)
     far = gap.at_most(table)
@@ -79,12 +72,6 @@ def test_the_sentence_names_the_best_policy(results):
     assert text.startswith("**`high` is at most 39.8 points with 1 UAV (mean gap 15.0 [")
     assert "points with 2 UAVs (mean gap 5.0 [" in text
     assert gap.in_words(results, "low").startswith("**`low` is at most 44.8 points")
-
-
-def test_fleets_of_one_size_have_no_rows_over_all(results):
-    results.missions = results.missions[results.missions["uavs"] == 1]
-    assert gap.by_fleet(results)["uavs"].tolist() == [1, 1]
-    assert [*gap.at_most(gap.by_fleet(results))] == ["Policy", "1 UAV"]
 
 
 def test_results_without_bounds_have_no_gap(tmp_path, monkeypatch):

@@ -7,8 +7,7 @@ import pytest
 from analysis import run_study
 from analysis.bound import Bound
 from analysis.execution import jobs
-from analysis.names import PRODUCT, SUCCESS
-from analysis.questions import decision_times
+from analysis.names import PRODUCT
 from analysis.questions.optimality import planner
 from analysis.questions.optimality.gap import ALL
 from analysis.results.event_log import uav_slots
@@ -64,22 +63,6 @@ def test_the_answer_says_which_is_better_and_by_how_much(results):
     assert planner.answer(open_, "greedy").startswith("**The missions do not tell which is better")
 
 
-def test_a_table_of_text_has_product_and_success(results):
-    listed = planner.listed(planner.differences(results, ["greedy"], "random"))
-    assert [*listed] == ["Policy", "UAVs", "Pairs", "Product [points]", "Success [points]"]
-    assert len(listed) == 4
-
-
-def test_the_front_has_the_policies_that_were_timed(results):
-    times = decision_times.measure(results)
-    table = planner.front(results, times)
-    assert {*table["policy"]} == {"greedy", "tour", "random"}
-    assert table["seconds"].is_monotonic_increasing
-    assert table.loc[table["mean"].idxmax(), "on_front"]
-    seconds = {cost.policy: cost.median for cost in times.costs}
-    assert table.set_index("policy")["seconds"].to_dict() == seconds
-
-
 def test_coverage_is_what_the_logs_say_was_collected(results):
     shares = []
     for replication in range(LOGGED):
@@ -124,10 +107,6 @@ def test_the_price_of_a_node_is_the_sum_over_cuts(results):
     assert planner.mean_bound(results) == 1.0
 
 
-def test_only_planners_have_a_plan(results):
-    assert planner.plan(results, "greedy", 0) == []
-
-
 def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
     monkeypatch.setattr(Planner, "budget", Budget(500, 0, 0))
     for replication in range(LOGGED):
@@ -137,8 +116,3 @@ def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
         assert [course.path[0].tolist() for course in courses] == starts[["x", "y"]].values.tolist()
         cells = np.concatenate([course.waypoints for course in courses])
         assert len(cells) and cells.min() >= 0 and cells.max() < 8
-
-
-def test_success_is_compared_too(results):
-    table = planner.differences(results, ["greedy"], "tour")
-    assert {*table["metric"]} == {PRODUCT, SUCCESS}
