@@ -6,6 +6,7 @@ scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table II
 """
 
 from collections.abc import Iterator
+from functools import cache
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -49,7 +50,7 @@ class _Sampled(Constants):
         yield from super()._problems()
         ends = {name: self._ends(name) for name in SAMPLED}
         for name, (low, high) in ends.items():
-            least, most = self.limits(name)
+            least, most = self._limits(name)
             if not least <= low <= high <= most:
                 given = low if low == high else [low, high]
                 reason = f" (cells of the zone, at most {MOST_UAVS})" if name == "uavs" else ""
@@ -82,14 +83,17 @@ class _Sampled(Constants):
         Raises:
             InputError: If the field does not exist, or holds no numbers.
         """
+        if field not in self.numeric:
+            raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
+        return self._limits(field)
+
+    def _limits(self, field: str) -> tuple[float, float]:
         cells = self.zone_cells
         between = {
             "uavs": (1, min(cells, MOST_UAVS)),
             "pads": (1, cells),
             "initial_data": (0, MOST_DATA),
         }
-        if field not in self.numeric:
-            raise InputError(f"field: {field!r} is not a number{one_of(field, self.numeric)}")
         limits = fields_of(Scenario)[field].metadata
         least = [m.ge for m in limits if hasattr(m, "ge")]
         most = [m.le for m in limits if hasattr(m, "le")]
@@ -140,6 +144,7 @@ class ScenarioSpace(_Sampled):
         return Scenario.of(self, **parameters)
 
 
+@cache
 def fields_of(model: type[Constants]) -> dict[str, FieldInfo]:
     """The fields of a kind of scenario; those of sections are named as ``failures.uav_rate``."""
     found: dict[str, FieldInfo] = {}

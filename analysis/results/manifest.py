@@ -184,16 +184,18 @@ class Manifest(Origin):
         if self.study == new.study and self.points == new.points:
             progress = ("missions", "selected", "complete")
             update |= {name: getattr(self, name) for name in progress}
-        # This is not a copy of ``new``, whose cached properties would be wrong with other keys.
-        fields = {name: getattr(new, name) for name in Manifest.model_fields}
-        return Manifest(**fields | update)
+        extended = new.model_copy(update=update)
+        for keyed in ("cells", "bound_cells"):  # the cached values have the keys of ``new``
+            extended.__dict__.pop(keyed, None)
+        return extended
 
     def _check_extended_by(self, new: "Manifest", path: Path) -> None:
         name, held = new.study["name"], self.study["name"]
         teams = {team.policy: team.weights for team in new.policies}
         dropped = [team.policy for team in self.policies if team.policy not in teams]
         changed = [t.policy for t in self.policies if teams.get(t.policy) != t.weights]
-        foreign = not set(self._point_keys) <= set(new._point_keys)
+        is_same = (self.scenario, self.points) == (new.scenario, new.points)
+        foreign = not is_same and not set(self._point_keys) <= set(new._point_keys)
         complaints = {
             f"holds study {held}, not {name}": held != name,
             f"holds seed {self.seed}, not {new.seed}": self.seed != new.seed,
