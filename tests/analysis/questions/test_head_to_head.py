@@ -1,7 +1,5 @@
 """Two policies are compared in the same missions, and the sentences about it say what came out."""
 
-from dataclasses import replace
-
 import pandas as pd
 import pytest
 from scipy import stats
@@ -51,14 +49,6 @@ def test_the_first_training_stands_for_its_learner(results, taught):
     first, second, third = ranked(results)
     taught([third, second])
     assert head_to_head.pair_of(results) == Pair(third, first, 1)
-
-
-def test_a_learner_is_ranked_by_the_mean_of_its_trainings(results, taught):
-    first, second, third = ranked(results)
-    means = dict(zip((first, second, third), (0.9, 0.5, 0.0), strict=True))
-    missions = results.missions.assign(**{PRODUCT: results.missions["policy"].map(means)})
-    taught([first, third], [second])  # 0.45 and 0.5
-    assert head_to_head.pair_of(replace(results, missions=missions), heuristic=third)[0] == second
 
 
 def test_without_a_learned_policy_the_best_two_are_the_pair(results):
