@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from reports.cli import completion, console
+from reports.cli.documented import command
 from reports.cli.running import YesOption
 from reports.cli.settings import (
     JsonOption,
@@ -19,34 +20,28 @@ from reports.cli.settings import (
 app = typer.Typer()
 
 
-@app.command()
+@command(app)
 def evaluate(
     policy: Annotated[
-        list[str],
-        typer.Option(
-            metavar="P[,P...]",
-            autocompletion=completion.policies,
-            help="A policy, or several that the UAVs follow in turn; repeatable.",
-        ),
+        list[str], typer.Option(metavar="P[,P...]", autocompletion=completion.policies)
     ],
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
-    missions: Annotated[
-        int, typer.Option(min=1, help="Number of missions (replications 0, 1, ...).")
-    ] = 1000,
+    missions: Annotated[int, typer.Option(min=1)] = 1000,
     seed: SeedOption = 0,
-    engine: Annotated[
-        Literal["batch", "events"] | None,
-        typer.Option(
-            help="batch is faster, and both engines give the same records; continuous arrivals "
-            "need events.  [default: batch, or events where it is needed]"
-        ),
-    ] = None,
+    engine: Literal["batch", "events"] | None = None,
     workers: WorkersOption = 1,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate many missions and print the means of their metrics with 95 % intervals."""
+    """Simulate many missions and print the means of their metrics with 95 % intervals.
+
+    Args:
+        policy: A policy, or several that the UAVs follow in turn; repeatable.
+        missions: Number of missions (replications 0, 1, ...).
+        engine: batch is faster, and both engines give the same records; continuous arrivals
+            need events.  [default: batch, or events where it is needed]
+    """
     from analysis.execution.evaluation import Asked, check_evaluation, means
     from analysis.study.engine import engine_of
     from policies.registry import typed

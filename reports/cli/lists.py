@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.cli import completion, console
+from reports.cli.documented import command
 from reports.cli.settings import JsonOption, SetOption, load_space
 
 policies = typer.Typer(invoke_without_command=True)
@@ -22,19 +23,18 @@ def list_policies(context: typer.Context) -> None:
         console.print_list(descriptions().items())
 
 
-@policies.command("show")
+@command(policies, "show")
 def show_policy(
     name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|DIR|FILE.py:CLASS",
-            autocompletion=completion.policies,
-            help="A policy, by name, folder of a training or file.",
-        ),
+        str, typer.Argument(metavar="NAME|DIR|FILE.py:CLASS", autocompletion=completion.policies)
     ],
     as_json: JsonOption = False,
 ) -> None:
-    """Show a policy: its origin, the scenarios that it can simulate, its card."""
+    """Show a policy: its origin, the scenarios that it can simulate, its card.
+
+    Args:
+        name: A policy, by name, folder of a training or file.
+    """
     from policies.about import about
 
     found = about(name)
@@ -60,20 +60,17 @@ def list_scenarios(context: typer.Context) -> None:
         console.print_list((name, scenario_description(name)) for name in scenario_names())
 
 
-@scenarios.command("show")
+@command(scenarios, "show")
 def show_scenario(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|FILE",
-            help="A shipped scenario or a TOML file.",
-            autocompletion=completion.scenarios,
-        ),
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.scenarios)],
     settings: SetOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Show every field of a scenario: its value, its default, what is allowed, what it is."""
+    """Show every field of a scenario: its value, its default, what is allowed, what it is.
+
+    Args:
+        name: A shipped scenario or a TOML file.
+    """
     from analysis.names import fields
     from dess.scenario import scenario_description
 
@@ -101,17 +98,16 @@ def list_studies(context: typer.Context) -> None:
         console.print_list(study_descriptions().items())
 
 
-@studies.command("show")
+@command(studies, "show")
 def show_study(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|FILE", help="A study or a TOML file.", autocompletion=completion.studies
-        ),
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.studies)],
     as_json: JsonOption = False,
 ) -> None:
-    """Show a study: every field, as its file would set it."""
+    """Show a study: every field, as its file would set it.
+
+    Args:
+        name: A study or a TOML file.
+    """
     import tomli_w
 
     from analysis.study.study import load_study

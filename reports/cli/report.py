@@ -12,6 +12,7 @@ import typer
 
 from dess import InputError
 from reports.cli import console
+from reports.cli.documented import command
 from reports.cli.running import YesOption
 from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
 
@@ -24,42 +25,29 @@ WHAT_IF = "what-if"  # the only report that has --set
 app = typer.Typer()
 
 
-@app.command()
+@command(app)
 def report(
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME|DIR]...",
-            help="Reports, and results folders of any studies; all reports by default.",
-        ),
-    ] = None,
-    results: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder that contains a results folder per study.")
-    ] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the pages.")] = PAGES,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="A change that the report what-if asks about: a field of the scenario, the value "
-            "in TOML syntax; repeatable.",
-        ),
-    ] = None,
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME|DIR]...")] = None,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
+    settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")] = None,
     parameters: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--parameter",
-            metavar="NAME=VALUE",
-            help="A parameter of the notebooks, such as missions or policies of what-if, the "
-            "value in TOML syntax; repeatable.",
-        ),
+        list[str] | None, typer.Option("--parameter", metavar="NAME=VALUE")
     ] = None,
     yes: YesOption = False,
 ) -> None:
     """Render results as HTML pages with an index: reports on the paper, and pages of any study.
 
     If a results folder has the same name as a report, write it with a path separator: ./learning.
+
+    Args:
+        names: Reports, and results folders of any studies; all reports by default.
+        results: Folder that contains a results folder per study.
+        out: Folder of the pages.
+        settings: A change that the report what-if asks about: a field of the scenario, the
+            value in TOML syntax; repeatable.
+        parameters: A parameter of the notebooks, such as missions or policies of what-if, the
+            value in TOML syntax; repeatable.
     """
     values = dict(setting(text, "--parameter", PARAMETER) for text in parameters or [])
     if settings:
@@ -93,35 +81,24 @@ def rendering() -> "Iterator[Progress]":
         raise typer.Exit(console.fail(f"dess: error: {error}", 1)) from error
 
 
-@app.command()
+@command(app)
 def verify(
-    path: Annotated[
-        Path, typer.Argument(metavar="PAGE|DIR", help="A page of dess report, or results.")
-    ],
-    missions: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=10_000,
-            help="Largest number of missions to simulate again, for every study.",
-        ),
-    ] = 20,
-    seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Seed of the random sample.  [default: a random number]"),
-    ] = None,
-    policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="FILE.py:CLASS",
-            help="A policy of a Python file that the results name. It is not run without this "
-            "option, since anybody may have made the results; repeatable.",
-        ),
-    ] = None,
+    path: Annotated[Path, typer.Argument(metavar="PAGE|DIR")],
+    missions: Annotated[int, typer.Option(min=1, max=10000)] = 20,
+    seed: Annotated[int | None, typer.Option(min=0)] = None,
+    policy: Annotated[list[str] | None, typer.Option(metavar="FILE.py:CLASS")] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Check a page or results: simulate a random sample of the missions again, and compare."""
+    """Check a page or results: simulate a random sample of the missions again, and compare.
+
+    Args:
+        path: A page of dess report, or results.
+        missions: Largest number of missions to simulate again, for every study.
+        seed: Seed of the random sample.  [default: a random number]
+        policy: A policy of a Python file that the results name. It is not run without this
+            option, since anybody may have made the results; repeatable.
+    """
     import secrets
 
     from reports.pages.verify import verify_page, verify_results

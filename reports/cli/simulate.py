@@ -11,6 +11,7 @@ import typer
 
 from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
+from reports.cli.documented import command
 from reports.cli.running import YesOption
 from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
 
@@ -39,60 +40,38 @@ T = TypeVar("T")
 app = typer.Typer()
 
 
-@app.command()
+@command(app)
 def simulate(
     context: typer.Context,
     scenario: ScenarioOption = "paper",
     settings: SetOption = None,
     policy: Annotated[
-        str | None,
-        typer.Option(
-            metavar="P[,P...]",
-            autocompletion=completion.policies,
-            help="A policy, or several that the UAVs follow in turn.  [default: greedy, or that "
-            "of the study]",
-        ),
+        str | None, typer.Option(metavar="P[,P...]", autocompletion=completion.policies)
     ] = None,
     seed: SeedOption = 0,
-    replication: Annotated[
-        int | None,
-        typer.Option(
-            help="Number of the replication, which selects the random draws.  [default: 0, or "
-            "the first of the design point]"
-        ),
-    ] = None,
-    of: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Simulate a mission of this results folder again, with its scenario and seed.",
-        ),
-    ] = None,
-    point: Annotated[
-        int | None, typer.Option(help="With --of: number of the design point, from 0.")
-    ] = None,
-    events: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.parquet",
-            help="Write the event log of the mission into this file; - for standard output.",
-        ),
-    ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(metavar="FILE.png", help="Draw the mission into this file.")
-    ] = None,
-    animation: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.gif",
-            help="Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a page "
-            "with its player.",
-        ),
-    ] = None,
+    replication: int | None = None,
+    of: Annotated[Path | None, typer.Option(metavar="DIR")] = None,
+    point: int | None = None,
+    events: Annotated[Path | None, typer.Option(metavar="FILE.parquet")] = None,
+    figure: Annotated[Path | None, typer.Option(metavar="FILE.png")] = None,
+    animation: Annotated[Path | None, typer.Option(metavar="FILE.gif")] = None,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate one mission with the SimPy model."""
+    """Simulate one mission with the SimPy model.
+
+    Args:
+        policy: A policy, or several that the UAVs follow in turn.  [default: greedy, or that of
+            the study]
+        replication: Number of the replication, which selects the random draws.  [default: 0, or
+            the first of the design point]
+        of: Simulate a mission of this results folder again, with its scenario and seed.
+        point: With --of: number of the design point, from 0.
+        events: Write the event log of the mission into this file; - for standard output.
+        figure: Draw the mission into this file.
+        animation: Write the mission as an animation: .gif, .mp4 (needs ffmpeg), or .html, a
+            page with its player.
+    """
     from analysis.execution.effort import check_missions
     from dess import simulate
     from dess.files.writing import writable

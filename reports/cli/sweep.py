@@ -10,6 +10,7 @@ import typer
 from dess.code.libraries import missing
 from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
+from reports.cli.documented import command
 from reports.cli.ranges import all_settings, all_values
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
@@ -33,72 +34,46 @@ SHARE = "a metric and its least mean, e.g. success=0.99"
 app = typer.Typer()
 
 
-@app.command()
+@command(app)
 def sweep(
     settings: Annotated[
         list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUES",
-            autocompletion=completion.fields,
-            help="The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with "
-            "one value is fixed; repeatable.",
-        ),
+        typer.Option("--set", metavar="KEY=VALUES", autocompletion=completion.fields),
     ] = None,
     policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="P,P,...",
-            autocompletion=completion.policies,
-            help="Policies to compare; repeatable.  [default: greedy]",
-        ),
+        list[str] | None, typer.Option(metavar="P,P,...", autocompletion=completion.policies)
     ] = None,
-    metric: Annotated[
-        str | None,
-        typer.Option(
-            help="The metric that ranks the settings: success, ratio, product, reward, cost, or "
-            "what the scenario measures, such as age.  [default: product]"
-        ),
-    ] = None,
-    missions: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            help="Missions per setting; with --require, additional missions that check each "
-            "selected setting.",
-        ),
-    ] = 300,
+    metric: str | None = None,
+    missions: Annotated[int, typer.Option(min=1)] = 300,
     scenario: ScenarioOption = "paper",
     seed: SeedOption = 0,
     workers: WorkersOption = 1,
-    price: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=AMOUNT",
-            help="A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned "
-            "for the fleet) and slot_seconds; repeatable.",
-        ),
-    ] = None,
-    require: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="METRIC=SHARE",
-            help="Search for the cheapest setting whose mean of a metric (success, ratio, product) "
-            "is at least this; repeatable.",
-        ),
-    ] = None,
-    name: Annotated[
-        str | None, typer.Option(help="Name of the sweep.  [default: its fields and a hash]")
-    ] = None,
-    results: Annotated[
-        Path,
-        typer.Option(metavar="DIR", help="Folder in which the results are stored, as sweeps/NAME."),
-    ] = RESULTS,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the page.")] = PAGES,
+    price: Annotated[list[str] | None, typer.Option(metavar="KEY=AMOUNT")] = None,
+    require: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    name: str | None = None,
+    results: Annotated[Path, typer.Option(metavar="DIR")] = RESULTS,
+    out: Annotated[Path, typer.Option(metavar="DIR")] = PAGES,
     yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Simulate every combination of values, write a page, and print the ranked settings."""
+    """Simulate every combination of values, write a page, and print the ranked settings.
+
+    Args:
+        settings: The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with
+            one value is fixed; repeatable.
+        policy: Policies to compare; repeatable.  [default: greedy]
+        metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
+            what the scenario measures, such as age.  [default: product]
+        missions: Missions per setting; with --require, additional missions that check each
+            selected setting.
+        price: A price: uav, pad, charge, hour or lost_uav; also currency, missions (planned for
+            the fleet) and slot_seconds; repeatable.
+        require: Search for the cheapest setting whose mean of a metric (success, ratio,
+            product) is at least this; repeatable.
+        name: Name of the sweep.  [default: its fields and a hash]
+        results: Folder in which the results are stored, as sweeps/NAME.
+        out: Folder of the page.
+    """
     from analysis.names import ALIASES, PRODUCT
     from analysis.sweeps import question
     from analysis.sweeps.sweep import Sweep

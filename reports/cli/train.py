@@ -10,6 +10,7 @@ import typer
 
 from dess.code.libraries import missing, needs
 from reports.cli import completion, console
+from reports.cli.documented import command
 from reports.cli.settings import SetOption, setting
 
 if TYPE_CHECKING:
@@ -18,33 +19,26 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 
-@app.command()
+@command(app)
 def train(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME|FILE",
-            help="The name of a shipped config, or a TOML file.",
-            autocompletion=completion.configs,
-        ),
-    ],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder of the training.")],
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue the training in the folder.")
-    ] = False,
-    device: Annotated[
-        Literal["auto", "cpu", "cuda"],
-        typer.Option(help="auto uses CUDA if a device is available."),
-    ] = "auto",
-    seed: Annotated[
-        int | None, typer.Option(help="Seed in place of the seed of the config.")
-    ] = None,
+    name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.configs)],
+    out: Annotated[Path, typer.Option(metavar="DIR")],
+    resume: Annotated[bool, typer.Option("--resume")] = False,
+    device: Literal["auto", "cpu", "cuda"] = "auto",
+    seed: int | None = None,
     settings: SetOption = None,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Train even if it takes more memory than is available.")
-    ] = False,
+    yes: Annotated[bool, typer.Option("--yes")] = False,
 ) -> None:
-    """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly."""
+    """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly.
+
+    Args:
+        name: The name of a shipped config, or a TOML file.
+        out: Folder of the training.
+        resume: Continue the training in the folder.
+        device: auto uses CUDA if a device is available.
+        seed: Seed in place of the seed of the config.
+        yes: Train even if it takes more memory than is available.
+    """
     from policies.ddqn.config import CHECKPOINT, load_config, resume_command
 
     fields = dict(setting(text) for text in settings or [])

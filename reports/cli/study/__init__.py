@@ -2,12 +2,13 @@
 
 import typer
 
+from reports.cli.documented import command
 from reports.cli.study import diff, export, run, show
 
 app = typer.Typer(
     help="Run studies (policies x design points x replications), show and compare results."
 )
-app.command("run")(run.run)
-app.command("show")(show.show)
-app.command("diff")(diff.diff)
-app.command("export")(export.export)
+command(app, "run")(run.run)
+command(app, "show")(show.show)
+command(app, "diff")(diff.diff)
+command(app, "export")(export.export)

@@ -13,12 +13,18 @@ if TYPE_CHECKING:
 
 
 def diff(
-    a: Annotated[Path, typer.Argument(metavar="A", help="A results folder.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="Another results folder.")],
-    most: Annotated[int, typer.Option(min=0, help="Number of most changed missions to show.")] = 5,
+    a: Annotated[Path, typer.Argument(metavar="A")],
+    b: Annotated[Path, typer.Argument(metavar="B")],
+    most: Annotated[int, typer.Option(min=0)] = 5,
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two results folders mission by mission, with the same random draws."""
+    """Compare two results folders mission by mission, with the same random draws.
+
+    Args:
+        a: A results folder.
+        b: Another results folder.
+        most: Number of most changed missions to show.
+    """
     from analysis.questions import diff
     from analysis.results.tables import load_results
     from reports.cli.study.diff_tables import print_diff

@@ -12,24 +12,19 @@ from reports.cli.report import rendering
 
 
 def export(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A results folder.")],
-    crate: Annotated[
-        Path, typer.Option(metavar="FILE.zip", help="The RO-Crate to write; - for standard output.")
-    ],
-    page: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="The page of the results.  [default: it is rendered for the crate]"
-        ),
-    ] = None,
-    licence: Annotated[
-        str,
-        typer.Option(
-            "--license", metavar="ID", help="Licence of the results, by its SPDX identifier."
-        ),
-    ] = "MIT",
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    crate: Annotated[Path, typer.Option(metavar="FILE.zip")],
+    page: Annotated[Path | None, typer.Option(metavar="FILE")] = None,
+    licence: Annotated[str, typer.Option("--license", metavar="ID")] = "MIT",
 ) -> None:
-    """Write results, page, study and scenario into one file, a research object (RO-Crate)."""
+    """Write results, page, study and scenario into one file, a research object (RO-Crate).
+
+    Args:
+        folder: A results folder.
+        crate: The RO-Crate to write; - for standard output.
+        page: The page of the results.  [default: it is rendered for the crate]
+        licence: Licence of the results, by its SPDX identifier.
+    """
     from analysis.results.tables import load_results
     from reports.crate import check_page, licence_of, write_crate
     from reports.pages.render import render_study

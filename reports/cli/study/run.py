@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 def run(
     names: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="NAME|FILE...",
-            help="The names of shipped studies, or TOML files.",
-            autocompletion=completion.studies,
-        ),
+        list[str], typer.Argument(metavar="NAME|FILE...", autocompletion=completion.studies)
     ],
     out: Annotated[
         Path | None,
@@ -35,38 +30,28 @@ def run(
         ),
     ] = None,
     workers: WorkersOption = 1,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="Run on the cluster of this dask.distributed scheduler."
-        ),
-    ] = None,
-    missions: Annotated[
-        int | None, typer.Option(min=1, help="Missions per design point and policy.")
-    ] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS")] = None,
+    missions: Annotated[int | None, typer.Option(min=1)] = None,
     policy: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="P[,P...]",
-            autocompletion=completion.policies,
-            help="Policies in place of those of the study; repeatable.",
-        ),
+        list[str] | None, typer.Option(metavar="P[,P...]", autocompletion=completion.policies)
     ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only print the plan and the estimated time.")
-    ] = False,
-    accept_code: Annotated[
-        bool,
-        typer.Option(
-            "--accept-code", help="Keep missions that other code has simulated; the results say so."
-        ),
-    ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run")] = False,
+    accept_code: Annotated[bool, typer.Option("--accept-code")] = False,
     page: Annotated[
         bool, typer.Option("--report", help=f"Also render the page of the study into {PAGES}.")
     ] = False,
     yes: YesOption = False,
 ) -> None:
-    """Run a study into a results folder; run it again to resume it or to add missions."""
+    """Run a study into a results folder; run it again to resume it or to add missions.
+
+    Args:
+        names: The names of shipped studies, or TOML files.
+        scheduler: Run on the cluster of this dask.distributed scheduler.
+        missions: Missions per design point and policy.
+        policy: Policies in place of those of the study; repeatable.
+        dry_run: Only print the plan and the estimated time.
+        accept_code: Keep missions that other code has simulated; the results say so.
+    """
     from analysis.execution.dry_run import check_run, plan_study
     from analysis.study.study import load_study
 

@@ -21,31 +21,23 @@ TARGET = "a metric and its least mean, such as success=0.99, or its largest, suc
 
 
 def show(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A results folder.")],
-    policy: Annotated[
-        str | None,
-        typer.Option(
-            metavar="P[,P...]", help="Policy of the worst missions.  [default: the best policy]"
-        ),
-    ] = None,
-    worst: Annotated[int, typer.Option(min=0, help="How many of the worst missions.")] = 5,
-    target: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="METRIC=SHARE",
-            help="Show the policies and design points whose mean of a metric (success, ratio, "
-            "product) is at least this, by the lower end of its interval; repeatable.",
-        ),
-    ] = None,
-    as_csv: Annotated[
-        bool,
-        typer.Option(
-            "--csv", help="Print the means as CSV: a row per policy, design point and metric."
-        ),
-    ] = False,
+    folder: Annotated[Path, typer.Argument(metavar="DIR")],
+    policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
+    worst: Annotated[int, typer.Option(min=0)] = 5,
+    target: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    as_csv: Annotated[bool, typer.Option("--csv")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the results of a study: means, comparisons, selections, the worst missions."""
+    """Show the results of a study: means, comparisons, selections, the worst missions.
+
+    Args:
+        folder: A results folder.
+        policy: Policy of the worst missions.  [default: the best policy]
+        worst: How many of the worst missions.
+        target: Show the policies and design points whose mean of a metric (success, ratio,
+            product) is at least this, by the lower end of its interval; repeatable.
+        as_csv: Print the means as CSV: a row per policy, design point and metric.
+    """
     from analysis import numbers
     from analysis.questions import summary
     from analysis.results.tables import load_results
