@@ -1,6 +1,6 @@
 """The record of a mission: a row of metrics, a row per UAV and, on demand, the event log."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any, NamedTuple
 
@@ -191,27 +191,21 @@ def empty_records(missions: int, uavs: int, is_extended: bool = False) -> Record
     )
 
 
-@dataclass
-class EventLog:
+class EventLog(list[Event]):
     """The events of one mission, in the order in which they happened.
 
     Every column is also an attribute, as in ``log.time``.
     """
 
-    rows: list[Event] = field(default_factory=list)
-
     def add(self, *values: Any, **others: Any) -> None:
         """Append one event; the arguments are those of ``Event``."""
-        self.rows.append(Event(*values, **others))
-
-    def __len__(self) -> int:
-        return len(self.rows)
+        self.append(Event(*values, **others))
 
     def __getattr__(self, name: str) -> list:
         """A column as a list, as in ``log.event``."""
         if name not in EVENT_COLUMNS:
             raise AttributeError(name)
-        return [getattr(row, name) for row in self.rows]
+        return [getattr(row, name) for row in self]
 
     def columns(self) -> dict[str, np.ndarray]:
         """The log as named columns."""

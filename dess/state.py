@@ -144,27 +144,16 @@ class State(NamedTuple):
     teeth: np.ndarray
 
 
-def empty_state(
-    missions: int, uavs: int, nodes: int, lengths: int = 0, kind: np.dtype = MISSION
-) -> State:
-    """A state filled with zeros, for that many missions, UAVs per mission and nodes.
-
-    ``lengths`` is the number of lengths that the teeth of ages can have (``teeth_lengths``), and
-    ``kind`` is ``MISSION``, or ``PLAIN_MISSION`` for scenarios without sections.
-    """
-    return State(
-        np.zeros(missions, kind),
-        np.zeros((missions, uavs), UAV),
-        np.zeros((missions, nodes)),
-        np.zeros((missions, nodes), SENSOR),
-        np.zeros((missions, lengths), np.int32),
-    )
-
-
 def state_of(spaces: Sequence[ScenarioSpace], missions: int) -> State:
     """A state filled with zeros, for that many missions of scenarios with the same nodes."""
-    fleet, kind = max(space.uavs[1] for space in spaces), _constants_of(spaces[0]).dtype
-    return empty_state(missions, fleet, len(spaces[0].nodes), teeth_lengths(spaces), kind)
+    fleet, nodes = max(space.uavs[1] for space in spaces), len(spaces[0].nodes)
+    return State(
+        np.zeros(missions, _constants_of(spaces[0]).dtype),
+        np.zeros((missions, fleet), UAV),
+        np.zeros((missions, nodes)),
+        np.zeros((missions, nodes), SENSOR),
+        np.zeros((missions, teeth_lengths(spaces)), np.int32),
+    )
 
 
 def teeth_lengths(spaces: Iterable[ScenarioSpace]) -> int:

@@ -17,23 +17,9 @@ from functools import lru_cache
 from hashlib import sha256
 from importlib.machinery import PathFinder
 from pathlib import Path
-from typing import NamedTuple
 
 # Imports of other distributions are not followed: their versions identify their code.
 OURS = {"dess", "policies"}
-
-
-class Source(NamedTuple):
-    """What is read from the source of a module.
-
-    Attributes:
-        code: A hash of its syntax tree.
-        imports: The names of all modules that it may import. Names of functions and classes are
-            among them, since the source alone does not tell these from modules.
-    """
-
-    code: str
-    imports: tuple[str, ...]
 
 
 def code_of(*modules: str) -> dict[str, str]:
@@ -64,12 +50,16 @@ def combined(hashes: Mapping[str, str]) -> str:
 
 
 @lru_cache
-def read(path: Path, module: str) -> Source:
-    """Read the source of a module."""
+def read(path: Path, module: str) -> tuple[str, tuple[str, ...]]:
+    """A hash of the syntax tree of a module, and the names of all modules that it may import.
+
+    Names of functions and classes are among them, since the source alone does not tell these from
+    modules.
+    """
     tree = ast.parse(path.read_bytes())
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     imports = tuple(dict.fromkeys(_imports(tree, package)))
-    return Source(sha256(_outline(tree).encode()).hexdigest(), imports)
+    return sha256(_outline(tree).encode()).hexdigest(), imports
 
 
 def _imports(tree: ast.Module, package: str) -> Iterator[str]:

@@ -25,7 +25,8 @@ from dess.record import MissionRecord
 from dess.scenario import Scenario, ScenarioSpace
 from dess.state import ACTION_NAMES, HOVER, TRUNCATED
 
-_MASKS, _ENDED, _MODES = ("observation", "info"), ("leave", "stay"), ("rgb_array", "human")
+_MODES = ("rgb_array", "human")
+_CHOICES = {"render_mode": _MODES, "mask": ("observation", "info"), "ended": ("leave", "stay")}
 
 
 class HarvestEnv(ParallelEnv[str, Any, int]):
@@ -85,10 +86,10 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
         Raises:
             InputError: If one of the arguments is not allowed.
         """
-        if render_mode is not None:
-            _check("render_mode", render_mode, _MODES)
-        _check("mask", mask, _MASKS)
-        _check("ended", ended, _ENDED)
+        given = {"render_mode": render_mode or _MODES[0], "mask": mask, "ended": ended}
+        for name, value in given.items():
+            if value not in (known := _CHOICES[name]):
+                raise InputError(f"{name}: {quoted(value)} is unknown{one_of(value, known)}")
         self.render_mode = render_mode
         self._mask_in_info, self._stay = mask == "info", ended == "stay"
         self._stepper = MissionStepper(scenario, 1, seed)
@@ -240,11 +241,6 @@ class HarvestEnv(ParallelEnv[str, Any, int]):
 
 
 parallel_env = HarvestEnv
-
-
-def _check(name: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise InputError(f"{name}: {quoted(value)} is unknown{one_of(value, allowed)}")
 
 
 def _infos(outcome: np.ndarray, active: np.ndarray) -> Iterator[dict[str, Any]]:

@@ -113,7 +113,7 @@ def _log_of(name: str) -> Rows:
         events = simulate(SCENARIOS[name], Fidget(), 5, replication, events=True).events
         assert events is not None
         if LOGGED[name] <= {*events.event}:
-            return [row._asdict() for row in events.rows]
+            return [row._asdict() for row in events]
     raise AssertionError("no mission in which everything happens")
 
 

@@ -202,7 +202,7 @@ def test_two_policies_have_common_random_numbers(
     until, kept = min(record.slots for record in records), []
     for record in records:
         assert record.events is not None
-        rows = [row for row in record.events.rows if row.event in FATE and row.time < until]
+        rows = [row for row in record.events if row.event in FATE and row.time < until]
         held = [0.0 if row.event in FATE[2:4] else row.value for row in rows]
         places = [(row.time, row.event, row.uav, row.node, row.x, row.y) for row in rows]
         kept.append([*zip(places, held, strict=True)])

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from dess.mission import simulate
-from dess.scenario import Scenario, ScenarioSpace
+from dess.scenario import ScenarioSpace
 from dess.sections.failures import strike
-from dess.state import BATTERY, LOST, QUOTA, TRUNCATED, constants_of, empty_state
+from dess.state import BATTERY, LOST, QUOTA, TRUNCATED, constants_of, state_of
 from dess.view import View
 from tests.dess.flights import CHANNEL, Case, check
 from tests.drawn import Commuter, extended_spaces, failures, replications, seeds
@@ -89,10 +89,9 @@ def test_policies_see_what_has_failed(data: st.DataObject, seed: int, replicatio
 def test_the_times_to_failure_and_to_repair_are_geometric() -> None:
     """Of 1000 nodes: chi-square of the first failure and of the first repair; fixed seed."""
     nodes = [[x, y] for x in range(40) for y in range(25)]
-    values = {"node_rate": 0.1, "node_repair": 5.0}
-    scenario = Scenario.of(grid=40, nodes=nodes, failures=values)
-    state = empty_state(1, scenario.uavs, len(nodes))
-    state.missions[:] = constants_of(ScenarioSpace.of(scenario))
+    space = ScenarioSpace.of(grid=40, nodes=nodes, failures={"node_rate": 0.1, "node_repair": 5.0})
+    state = state_of([space], 1)
+    state.missions[:] = constants_of(space)
     state.missions["seed"], state.missions["active"] = 5, 1
     failed, repaired = np.zeros(1000, int), np.zeros(1000, int)
     for slot in range(1, 400):
