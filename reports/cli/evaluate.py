@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 import typer
 
 from reports.cli import completion, console
-from reports.cli.documented import command
 from reports.cli.running import YesOption
 from reports.cli.settings import (
     JsonOption,
@@ -14,6 +13,7 @@ from reports.cli.settings import (
     SeedOption,
     SetOption,
     WorkersOption,
+    command,
     load_space,
 )
 

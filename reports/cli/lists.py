@@ -6,8 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from reports.cli import completion, console
-from reports.cli.documented import command
-from reports.cli.settings import JsonOption, SetOption, load_space
+from reports.cli.settings import JsonOption, SetOption, command, load_space
 
 policies = typer.Typer(invoke_without_command=True)
 scenarios = typer.Typer(invoke_without_command=True)

@@ -12,9 +12,8 @@ import typer
 
 from dess import InputError
 from reports.cli import console
-from reports.cli.documented import command
 from reports.cli.running import YesOption
-from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, setting
+from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
 
 if TYPE_CHECKING:
     from reports.pages.kernels import Progress

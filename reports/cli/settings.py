@@ -1,11 +1,14 @@
-"""Options that commands share, and the ``KEY=VALUE`` of ``--set`` and ``--parameter``.
+"""Options that commands share and how they are described; ``KEY=VALUE`` as ``--set`` takes it.
 
 Values are in TOML syntax: ``setting("initial_data=[5, 20]")`` is ``("initial_data", [5, 20])``.
 """
 
 import math
+import re
+from collections.abc import Callable
+from inspect import getdoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -45,6 +48,22 @@ SetOption = Annotated[
 SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random draws.")]
 WorkersOption = Annotated[int, typer.Option("--workers", min=1, help="Number of processes.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON document.")]
+
+
+def command(app: typer.Typer, name: str | None = None) -> Callable[[Callable], Callable]:
+    """Make a command of a function; the part ``Args`` of its docstring describes the options."""
+
+    def register(function: Callable) -> Callable:
+        summary, _, described = (getdoc(function) or "").partition("\n\nArgs:\n")
+        hints = get_type_hints(function, include_extras=True)
+        for parameter, text in re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", described, re.M):
+            if not hasattr(hints[parameter], "__metadata__"):
+                hints[parameter] = Annotated[hints[parameter], typer.Option()]
+            hints[parameter].__metadata__[0].help = re.sub(r"\n {8}", " ", text)
+        function.__annotations__ = hints
+        return app.command(name, help=summary)(function)
+
+    return register
 
 
 def load_space(name: str, settings: list[str] | None) -> "ScenarioSpace":

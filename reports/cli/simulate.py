@@ -11,9 +11,15 @@ import typer
 
 from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
-from reports.cli.documented import command
 from reports.cli.running import YesOption
-from reports.cli.settings import JsonOption, ScenarioOption, SeedOption, SetOption, load_space
+from reports.cli.settings import (
+    JsonOption,
+    ScenarioOption,
+    SeedOption,
+    SetOption,
+    command,
+    load_space,
+)
 
 if TYPE_CHECKING:
     import numpy as np

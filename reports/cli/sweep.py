@@ -10,7 +10,6 @@ import typer
 from dess.code.libraries import missing
 from dess.errors import InputError, one_of, shown
 from reports.cli import completion, console
-from reports.cli.documented import command
 from reports.cli.ranges import all_settings, all_values
 from reports.cli.report import rendering
 from reports.cli.running import YesOption, complete
@@ -21,6 +20,7 @@ from reports.cli.settings import (
     ScenarioOption,
     SeedOption,
     WorkersOption,
+    command,
 )
 from reports.folders import PREFIX, check_pages
 

@@ -10,8 +10,7 @@ import typer
 
 from dess.code.libraries import missing, needs
 from reports.cli import completion, console
-from reports.cli.documented import command
-from reports.cli.settings import SetOption, setting
+from reports.cli.settings import SetOption, command, setting
 
 if TYPE_CHECKING:
     from policies.ddqn.training import Training

@@ -2,7 +2,7 @@
 
 import typer
 
-from reports.cli.documented import command
+from reports.cli.settings import command
 from reports.cli.study import diff, export, run, show
 
 app = typer.Typer(
