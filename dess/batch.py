@@ -89,17 +89,22 @@ def simulate_batch(
         for part in np.array_split(jobs, min(workers, len(jobs))):
             source = (starts_of(group, seed), which, numbers, part)
             tasks.append((group, team, source, batch_size, records, progress, stopped))
+    _run_all(tasks, workers, stopped)
+    return records
+
+
+def _run_all(tasks: list[tuple], workers: int, stopped: Event) -> None:
+    """Run tasks here or in threads; after an error or Ctrl-C, no thread begins a further slot."""
     if workers == 1:
         for task in tasks:
             _run(*task)
-        return records
+        return
     with ThreadPoolExecutor(workers) as pool:
         try:
             for future in as_completed([pool.submit(_run, *task) for task in tasks]):
                 future.result()
-        finally:  # after an error or Ctrl-C, no thread begins a further slot
+        finally:
             stopped.set()
-    return records
 
 
 def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
