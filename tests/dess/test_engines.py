@@ -165,8 +165,9 @@ def test_a_batch_is_small_where_a_mission_is_large(monkeypatch: pytest.MonkeyPat
 def test_scenarios_of_different_worlds_fly_in_one_batch(
     worlds: list[ScenarioSpace], data: st.DataObject, seed: int, workers: int
 ) -> None:
-    # The same worlds again with other fleets, so that some missions share a world.
+    # The same worlds again with other fleets, which share a world, and with nodes in another order.
     again = [ScenarioSpace.of(space, uavs=1) for space in worlds]
+    again += [ScenarioSpace.of(space, nodes=space.nodes[::-1]) for space in worlds]
     mixed = data.draw(st.permutations(worlds + again))
     numbers = range(len(mixed))
     records = simulate_batch(mixed, Fidget(), seed, numbers, workers=workers, batch_size=2)
