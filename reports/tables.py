@@ -4,20 +4,46 @@ Every function turns rows of ``analysis.questions`` into text, with the same col
 both; ``reports.pages.html.table`` and ``reports.cli.study.tables.print_frame`` write them.
 """
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, METRICS, PRODUCT, metric_name
+from analysis.names import COST, METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.stats.verdict import MARKS, position_by_test
+
+_HEADS = {"policy": "Policy", "n": "Missions", **METRICS}
+
+
+def estimates(
+    rows: pd.DataFrame,
+    index: Sequence[str],
+    columns: str = "metric",
+    write: Callable[[float, float, float], str] = numbers.interval,
+) -> pd.DataFrame:
+    """Rows with ``mean``, ``low`` and ``high``: a cell per estimate, empty where there is none.
+
+    Args:
+        rows: The rows.
+        index: The columns that name a row.
+        columns: The column whose values name the columns.
+        write: Writes a mean and the ends of its interval.
+    """
+
+    def cell(mean: float, low: float, high: float) -> str:
+        return "" if np.isnan(mean) else write(mean, low, high)
+
+    table = numbers.wide(rows, [*index], columns, cell).fillna("").reset_index()
+    for name in index:
+        table[name] = table[name].map("{:,}".format if name == "n" else value_text)
+    heads = {field: parameter(field).name for field in index} | _HEADS
+    return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 
 
 def means(rows: pd.DataFrame) -> pd.DataFrame:
     """Rows of ``analysis.summary`` by policy: a column per metric of the paper."""
-    of_metrics = rows[rows["metric"].isin(METRICS)]
-    shown = numbers.wide(of_metrics, ["policy", "n"]).reset_index()
-    shown["n"] = shown["n"].map("{:,}".format)
-    return shown.rename(columns={"policy": "Policy", "n": "Missions", **METRICS})
+    return estimates(rows[rows["metric"].isin(METRICS)], ["policy", "n"])
 
 
 def compared(rows: pd.DataFrame, of: str) -> pd.DataFrame:

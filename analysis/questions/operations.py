@@ -4,14 +4,14 @@ table = changes(results, "pads", 4, PRODUCT)  # of the study ``pads``
 pads(results, margin=0.01)  # the answer in words
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import AGE, PRODUCT, parameter, value_text
+from analysis.names import AGE, PRODUCT, value_text
 from analysis.questions import settings
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
@@ -88,30 +88,6 @@ def changes(
                 change = tests[["difference", "low", "high"]].iloc[0]
             rows.append((policy, *table.to_dict("records")[point].values(), *change, len(both)))
     return pd.DataFrame(rows, columns=["policy", *table, *_ENDS, "n"])
-
-
-def listed(
-    rows: pd.DataFrame,
-    index: Sequence[str],
-    columns: str,
-    write: Callable[[float, float, float], str],
-) -> pd.DataFrame:
-    """Estimates of one metric as a table of text; nothing stands where there is no estimate.
-
-    Args:
-        rows: Rows of ``means`` or ``changes``.
-        index: The columns that name a row.
-        columns: The column whose values name the columns.
-        write: Writes a mean and the ends of its interval.
-    """
-
-    def cell(mean: float, low: float, high: float) -> str:
-        return "" if np.isnan(mean) else write(mean, low, high)
-
-    table = numbers.wide(rows, [*index], columns, cell).fillna("").reset_index()
-    table[[*index]] = table[[*index]].map(value_text)
-    heads = {field: parameter(field).name for field in index} | {"policy": "Policy"}
-    return table.rename(columns=lambda name: heads.get(name) or value_text(name))
 
 
 def enough_pads(results: Results, margin: float) -> pd.DataFrame:

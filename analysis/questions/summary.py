@@ -110,14 +110,6 @@ def by_fleet(missions: pd.DataFrame) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def fleet_table(fleets: pd.DataFrame) -> pd.DataFrame:
-    """The rows of ``by_fleet`` as a table of text: a row per policy and number of UAVs."""
-    rows = fleets[fleets["metric"].isin(METRICS)]
-    table = numbers.wide(rows, ["policy", "uavs", "n"]).reset_index()
-    table["n"] = table["n"].map("{:,}".format)
-    return table.rename(columns={"policy": "Policy", "uavs": "UAVs", "n": "Missions", **METRICS})
-
-
 def beside_paper(
     estimates: pd.DataFrame, printed: Mapping[Any, Mapping[str, float]]
 ) -> pd.DataFrame:
@@ -196,7 +188,10 @@ def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> s
 def settings(results: Results) -> list[str]:
     """Every design point in words: the fields that the design sets, with their values."""
     return [
-        ", ".join(f"{field} {value_text(value)}" for field, value in point.values.items())
+        ", ".join(
+            f"{field} {value_text(value).replace('–', '..')}"
+            for field, value in point.values.items()
+        )
         for point in results.store.manifest.points
     ]
 

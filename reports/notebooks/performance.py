@@ -30,6 +30,7 @@ from analysis.names import METRICS, PRODUCT, SUCCESS
 from analysis.questions import summary as questions
 from analysis.questions.optimality import gap
 from analysis.replication import paper
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -108,7 +109,8 @@ html.gallery(
 )
 
 # %%
-html.table(questions.fleet_table(fleets), "Means with 95 % intervals")
+rows = fleets[fleets["metric"].isin(METRICS)]
+html.table(tables.estimates(rows, ["policy", "uavs", "n"]), "Means with 95 % intervals")
 
 # %% [markdown]
 # ## <a id="fig-4"></a>One setting: the paper's Fig. 4

@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from analysis import numbers
 from analysis.names import METRICS, PRODUCT
 from reports import tables
 
@@ -27,3 +28,15 @@ def test_a_comparison_has_marks_and_a_learner_the_interval_of_one_new_training()
     ]
     of_policies = frame.drop(columns=["trainings", "new_low", "new_high"])
     assert [*tables.compared(of_policies, "learner")] == ["Learner", *names, more[-1]]
+
+
+def test_estimates_have_a_row_per_setting_and_nothing_where_nothing_is_known():
+    rows = [("mine", 3000 + uavs, uavs, pads, 10.0 * pads) for uavs in (2, 4) for pads in (1, 2)]
+    table = pd.DataFrame(rows, columns=["policy", "n", "uavs", "pads", "mean"])
+    table["low"] = table["high"] = table["mean"] = table["mean"].where(table["pads"] != 2)
+    shown = tables.estimates(table, ["policy", "uavs", "n"], "pads", numbers.quantities)
+    assert shown.columns.tolist() == ["Policy", "Number of UAVs", "Missions", "1", "2"]
+    assert shown.to_numpy().tolist() == [
+        ["mine", "2", "3,002", "10 [10, 10]", ""],
+        ["mine", "4", "3,004", "10 [10, 10]", ""],
+    ]

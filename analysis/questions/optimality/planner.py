@@ -73,14 +73,6 @@ def answer(table: pd.DataFrame, planner: str) -> str:
     )
 
 
-def listed(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of ``differences`` as a table of text."""
-    heads = {PRODUCT: "Product [points]", SUCCESS: "Success [points]"}
-    rows = table.assign(mean=table["difference"], metric=table["metric"].map(heads))
-    wide = numbers.wide(rows, ["policy", "uavs", "n"], write=numbers.points)
-    return wide.reset_index(names=["Policy", "UAVs", "Pairs"])
-
-
 def front(results: Results, times: Times) -> pd.DataFrame:
     """The product and the decision time of every policy whose decisions were timed.
 

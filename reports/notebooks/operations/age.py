@@ -24,6 +24,7 @@ from analysis import load_results, names, numbers
 from analysis.figures.settings import lines
 from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -74,7 +75,7 @@ html.gallery(
 # %%
 change = operations.age_changes(study)
 html.table(
-    operations.listed(change, ["policy", "uavs"], rates, operations.relative),
+    tables.estimates(change, ["policy", "uavs"], rates, operations.relative),
     f"Change of the average age of information from one UAV, with {level} intervals of the ratio "
     "of means over common replications, by arrival rate",
     data=change,
@@ -85,7 +86,7 @@ html.table(
 
 # %%
 html.table(
-    operations.listed(
+    tables.estimates(
         means[means["metric"] == names.AGE], ["policy", "uavs"], rates, numbers.quantities
     ),
     f"{names.metric_label(names.AGE)}: means with {level} intervals, by arrival rate",

@@ -26,6 +26,7 @@ from analysis import load_results, names, numbers
 from analysis.figures.settings import lines
 from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -70,7 +71,7 @@ html.gallery(
 display(
     *(
         html.table(
-            operations.listed(change, ["policy", "uavs", repair], rate, numbers.points),
+            tables.estimates(change, ["policy", "uavs", repair], rate, numbers.points),
             f"{names.metric_name(metric)} minus that without failures: paired differences in "
             f"percentage points with {level} intervals, by failure rate per mission slot",
             data=change,
@@ -87,7 +88,7 @@ display(
 display(
     *(
         html.table(
-            operations.listed(rows, ["policy", "uavs", repair], rate, numbers.quantities),
+            tables.estimates(rows, ["policy", "uavs", repair], rate, numbers.quantities),
             f"{names.metric_label(metric)} per mission: means with {level} intervals, by failure "
             "rate per mission slot; nothing where nothing can fail",
         )

@@ -28,6 +28,7 @@ from analysis.figures.learning import courses
 from analysis.figures.settings import lines
 from analysis.questions import operations
 from analysis.stats.intervals import LEVEL
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -68,7 +69,7 @@ html.gallery(drawn[:2])
 # %%
 lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
 html.table(
-    operations.listed(lost, ["policy", "pads"], "uavs", numbers.points),
+    tables.estimates(lost, ["policy", "pads"], "uavs", numbers.points),
     "Collection ratio and communication with fewer pads, minus that with the most pads: paired "
     f"differences in percentage points with {level} intervals, by number of UAVs",
     data=lost,
@@ -107,7 +108,7 @@ html.figure(
 display(
     *(
         html.table(
-            operations.listed(rows, ["policy", "pads"], "uavs", numbers.written(metric)),
+            tables.estimates(rows, ["policy", "pads"], "uavs", numbers.written(metric)),
             f"{names.metric_label(metric)}: means with {level} intervals, by number of UAVs",
         )
         for metric in uses

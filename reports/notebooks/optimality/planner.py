@@ -32,6 +32,7 @@ from analysis.figures import missions as maps
 from analysis.questions import decision_times, head_to_head, regions
 from analysis.questions.optimality import gap
 from analysis.questions.optimality import planner as questions
+from reports import tables
 from reports.pages import html
 
 # %%
@@ -66,8 +67,12 @@ html.figure(
 
 # %%
 html.table(
-    questions.listed(differences),
-    f"Paired differences from {learner} with 95 % intervals",
+    tables.estimates(
+        differences.assign(mean=differences["difference"]),
+        ["policy", "uavs", "n"],
+        write=numbers.points,
+    ),
+    f"Paired differences from {learner} in percentage points, with 95 % intervals",
     data=differences,
 )
 

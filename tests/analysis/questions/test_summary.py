@@ -177,4 +177,4 @@ def test_with_one_policy_there_is_no_comparison(tmp_path):
     assert summary.comparisons(results).empty
     assert summary.learned_against_heuristic(results).empty
     assert summary.selections(results).empty
-    assert summary.settings(results) == ["initial_data 5", "initial_data 5–7.5"]
+    assert summary.settings(results) == ["initial_data 5", "initial_data 5..7.5"]

@@ -75,7 +75,7 @@ def test_the_best_policies_of_a_point_are_named(shown, dess_json):
     means = pd.DataFrame(dess_json("study", "show", "out")["means"])
     product = means[means["metric"] == "collection_ratio_and_communication"]
     table = out[out.index("product ") :]
-    for point, words in enumerate(("uavs 1, initial_data 5 ", "uavs 1, initial_data 5–9.5 ")):
+    for point, words in enumerate(("uavs 1, initial_data 5 ", "uavs 1, initial_data 5..9.5 ")):
         rows = product[(product["point"] == point) & (product["verdict"] != "worse")]
         names = rows.sort_values("mean", ascending=False)["policy"]
         line = next(line for line in table.splitlines() if line.startswith(words))
