@@ -5,13 +5,10 @@ import pandas as pd
 import pytest
 
 from analysis.questions.sensitivity import (
-    METRICS,
-    index_table,
     sensitivity,
 )
-from analysis.study.design import NOISE, Saltelli
+from analysis.study.design import Saltelli
 from dess import InputError
-from dess.record import MISSION_RECORD
 
 FIELDS = ("edge_snr", "arrival_rate", "path_loss_exponent")  # names only: nothing is simulated
 INDICES = ["first", "first_low", "first_high", "total", "total_low", "total_high"]
@@ -91,17 +88,6 @@ def test_intervals_cover_what_they_claim(case):
     assert hits[0, -1] / runs < level + error
 
 
-def test_the_table_is_tidy():
-    assert set(METRICS) < set(MISSION_RECORD.names)
-    design = unit(2, base=16)
-    missions = evaluated(design, **{m: lambda x, y, e: x + e for m in METRICS})
-    table = sensitivity(design, missions)
-    assert list(table.columns) == ["metric", "parameter", *INDICES, "n"]
-    assert table["metric"].tolist() == [metric for metric in METRICS for _ in range(3)]
-    assert table["parameter"].tolist() == ["edge_snr", "arrival_rate", NOISE] * len(METRICS)
-    assert (table["n"] == 16 * 5).all()
-
-
 def test_a_metric_without_variance_has_no_shares():
     design = unit(2, base=16)
     missions = evaluated(
@@ -149,11 +135,3 @@ def test_intervals_are_symmetric_and_depend_on_nothing_else():
         half = alone[f"{index}_high"] - alone[index]
         assert (half > 0).all()
         assert half.to_numpy() == pytest.approx((alone[index] - alone[f"{index}_low"]).to_numpy())
-
-
-def test_metrics_without_variance_have_no_row_of_text():
-    design = unit(1, base=16)
-    missions = evaluated(design, success=lambda x, e: np.ones(x.size), reward=lambda x, e: x + e)
-    shown = index_table(sensitivity(design, missions, ["success", "reward"]).assign(policy="mine"))
-    assert shown["Metric"].isna().tolist() == [True] * 2  # the reward has no name in tables
-    assert shown["Parameter"].tolist() == ["edge_snr", "noise"]
