@@ -162,7 +162,7 @@ def answers(results: Results, table: pd.DataFrame) -> list[str]:
     """
     rule, currency = results.store.manifest.selection, _prices(results).currency
     wanted = rule.requirements if isinstance(rule, Cheapest) else {}
-    together = everywhere(results, table).assign(condition=EVERYWHERE)
+    together = everywhere(results, table).assign(condition=f"{EVERYWHERE} together")
     sentences = []
     for rows, required in ((table, wanted), (together, {})):
         for (condition, policy), part in rows.groupby(["condition", "policy"], sort=False):

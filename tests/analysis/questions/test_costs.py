@@ -122,7 +122,7 @@ def test_a_search_is_kept_told_and_checked(searched):
     assert table["selected"].any()  # or this test says little
     assert len(costs.checks(searched)) == len(searched.checks) / 6
     assert searched.choice("greedy") is None
-    assert "All conditions, `greedy`" in "\n".join(costs.answers(searched, table))
+    assert "All conditions together, `greedy`" in "\n".join(costs.answers(searched, table))
 
 
 def test_bad_questions_get_one_line(fixed, tmp_path):

@@ -70,7 +70,7 @@ def test_the_cheapest_fleet_is_named(dess, unrendered):
     code, out, _ = dess(*asked)
     assert code == 0
     assert re.search(r"quota 20, greedy: the cheapest .* is 1 UAV for 20,000 EUR", out)
-    assert "All conditions together, greedy: the cheapest fleet" in out
+    assert "All conditions together, greedy: the cheapest setting" in out
     data = json.loads(dess(*asked, "--json")[1])
     assert [row["selected"] for row in data["table"] if row["uavs"] == 1] == [True, True]
     assert len(data["answers"]) == 3
