@@ -11,8 +11,9 @@ if TYPE_CHECKING:  # the command line raises InputError long before anything nee
     from pydantic import BaseModel, ValidationError
     from pydantic.fields import FieldInfo
 
-# The longest list of allowed names [characters].
-_NAMES = 180
+# The longest list of allowed names [characters], and the most names of which all are listed even
+# where some of them are close to the unknown one.
+_NAMES, _CLOSE = 180, 12
 
 # What is wrong with a value, by pydantic's name of the error, or its first word.
 _PROBLEMS = {
@@ -53,7 +54,11 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
+    return "".join(c if c.isprintable() else _escape(ord(c)) for c in text)
+
+
+def _escape(number: int) -> str:
+    return f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
 
 
 def cut(text: str, length: int) -> str:
@@ -82,7 +87,7 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
 
     Args:
         name: The unknown name.
-        names: The known names.
+        names: The known names. Of many, only those that are close are printed, if there are some.
         also: What else is allowed, such as ``a TOML file``.
     """
     known = list(dict.fromkeys(names))
@@ -90,7 +95,10 @@ def one_of(name: object, names: Iterable[str], also: str = "") -> str:
     asked = name[:_QUOTED].lower() if isinstance(name, str) else shown(name)
     close = [lower[match] for match in get_close_matches(asked, lower, cutoff=0.7)]
     meant = f" (did you mean {' or '.join(close)}?)" if close else ""
-    allowed = ", or ".join(part for part in (listed(known), also) if part)
+    text = listed(known)
+    if close and len(known) > _CLOSE:
+        text = f"{', '.join(close)} and {len(known) - len(close)} others"
+    allowed = ", or ".join(part for part in (text, also) if part)
     return f"{meant}; allowed: {allowed or 'none'}"
 
 

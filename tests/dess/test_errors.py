@@ -20,7 +20,7 @@ FIRST = ", ".join(MANY[:18])
         ("other", [], "a file", "; allowed: a file"),
         ("other", [], "", "; allowed: none"),
         (None, ["tour"], "", "; allowed: tour"),
-        ("uvs", MANY, "", " (did you mean uavs?); allowed: " + FIRST + " and 3 others"),
+        ("uvs", MANY, "", " (did you mean uavs?); allowed: uavs and 20 others"),
         ("speed", MANY, "", f"; allowed: {FIRST} and 3 others"),
         ("speed", ["x" * 4000, "y"], "", f"; allowed: {'x' * 4000} and 1 others"),
     ],
