@@ -16,7 +16,8 @@ nox.options.sessions = ["tests"]
 # pages say what their studies were made with.
 STUDIES = {
     "table4 fig1 fig4 sensitivity pads failures verification": "",
-    "fig5 sweet-spot": "--policy ddqn --policy greedy",
+    "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
+    "sweet-spot": "--policy ddqn --policy greedy --policy random",
     "comparison": "--missions 1000",
     "explorer age": "--missions 50",
     "gap": "--missions 12",

@@ -13,14 +13,15 @@ from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 
-# The paper's metrics, in its order and words (Section VI-A).
+# The paper's metrics, in its order (Section VI-A). It calls them successful communication, collection
+# ratio, and collection ratio and communication; the last is here the product of each mission.
 METRICS = {
-    SUCCESS: "Successful communication",
+    SUCCESS: "Success",
     RATIO: "Collection ratio",
-    PRODUCT: "Collection ratio and communication",
+    PRODUCT: "Product",
 }
-# Shorter names for the terminal.
-SHORT_METRICS = {SUCCESS: "success", RATIO: "collection ratio", PRODUCT: "product"}
+# Their names for the terminal.
+SHORT_METRICS = {metric: name.lower() for metric, name in METRICS.items()}
 
 # The description of the studies of sweeps, and the folder of their results folders.
 SWEEP, SWEEPS = "a sweep: every combination of the values", "sweeps"

@@ -14,7 +14,7 @@ PRICES = {"uavs": 0.08, "pads": 0.02}  # in units of the product
 
 
 def search(trials: int, seed: int = 0) -> optuna.Study:
-    """Ask for a design, tell what it is worth: collection ratio and communication minus price."""
+    """Ask for a design, tell what it is worth: product minus price."""
     pruner = optuna.pruners.WilcoxonPruner(p_threshold=0.05)  # paired with the best design so far
     sampler = optuna.samplers.TPESampler(seed=seed)
     study = optuna.create_study(direction="maximize", sampler=sampler, pruner=pruner)

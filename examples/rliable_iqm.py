@@ -29,7 +29,7 @@ def profiles(scores: dict[str, np.ndarray], file: str, reps: int = 2000) -> None
     """Draw the share of runs and tasks with more than a score, over the score."""
     shares, bands = library.create_performance_profile(scores, SHARES, reps=reps)
     axes = plot_utils.plot_performance_profiles(
-        shares, SHARES, bands, xlabel="Collection ratio and communication", legend=True
+        shares, SHARES, bands, xlabel="Product", legend=True
     )
     axes.figure.savefig(file, bbox_inches="tight")
 

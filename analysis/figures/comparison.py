@@ -50,6 +50,28 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     return figure
 
 
+def claims(table: pd.DataFrame) -> Figure:
+    """Results minus the numbers that the paper prints: a row per number, a colour per policy.
+
+    Args:
+        table: Rows with ``claim``, ``policy``, and the difference ``mean``, ``low`` and ``high``.
+    """
+    names = [*table["claim"].unique()]
+    looks = style.policy_colours(table["policy"])
+    with style.panels(0.3 * len(names), values="x", legend=5) as (figure, ax):
+        for shift, (policy, rows) in zip(
+            style.shifts(len(looks), 0.3), table.groupby("policy", sort=False), strict=True
+        ):
+            places = rows["claim"].map(names.index) + shift
+            ax.errorbar(rows["mean"], places, xerr=style.arms(rows), linestyle="", label=policy,
+                        **style.dot(looks[str(policy)]))  # fmt: skip
+        ax.axvline(0, **style.ZERO)
+        ax.set_yticks(range(len(names)), names)
+        ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
+        style.in_units(ax.xaxis, "points")
+    return figure
+
+
 def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
     """The mean difference over two parameters: blue where it is positive, orange where negative.
 

@@ -57,17 +57,15 @@ def costs(table: pd.DataFrame, metric: str, currency: str, required: float | Non
     return figure
 
 
-def decision_times(table: pd.DataFrame, bound: float) -> Figure:
+def decision_times(table: pd.DataFrame) -> Figure:
     """Decision time against the product of all policies, and their Pareto front.
 
     Args:
         table: Rows of ``optimality.planner.front``.
-        bound: The mean upper bound of the product.
     """
     looks = style.policy_colours(table["policy"])
     best = table[table["on_front"]].sort_values("seconds")
     with style.panels(4.2) as (figure, ax):
-        ax.axhline(bound, color=style.INK, linewidth=1.3, linestyle="--", label="upper bound")
         _front(best["seconds"], best["mean"], "Pareto front", ax)
         for _, row in table.iterrows():
             ax.errorbar(row["seconds"], row["mean"], yerr=style.arms(row), label=row["policy"],

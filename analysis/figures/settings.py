@@ -274,6 +274,25 @@ def effect(
     return figure
 
 
+def one_by_one(table: pd.DataFrame, policies: list[str]) -> Figure:
+    """The product against every parameter, in panels side by side with the same axis.
+
+    Args:
+        table: Rows of ``questions.main_effects.effects``, of the policies to draw.
+        policies: All policies of the study, so that every policy has the same colour on all pages.
+    """
+    rows = table[table["metric"] == PRODUCT]
+    fields, colours = [*rows["field"].unique()], style.policy_colours(policies)
+    looks = {policy: colours[policy] for policy in rows["policy"].unique()}
+    with _grid(3.4, len(fields), len(fields)) as (figure, axes):
+        for ax, field in zip(axes, fields, strict=True):
+            drawings.along(rows[rows["field"] == field], looks, "%", ax)
+            ax.set_xlabel(fill(parameter(field).label, 24), parse_math=True)
+            ax.tick_params(axis="x", labelsize=8)
+        figure.suptitle(metric_label(PRODUCT), fontsize=11, fontweight="bold", x=0.01, ha="left")
+    return figure
+
+
 def sensitivity(rows: pd.DataFrame, title: str) -> Figure:
     """Sobol indices of every parameter as dots with intervals; the noise has its own row.
 

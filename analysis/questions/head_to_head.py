@@ -47,7 +47,7 @@ class Pair(NamedTuple):
 def pair_of(results: Results, learned: str | None = None, heuristic: str | None = None) -> Pair:
     """The best learned policy of a study, and the best of the other policies.
 
-    Policies are ranked by mean collection ratio and communication. A learner with several trainings
+    Policies are ranked by mean product. A learner with several trainings
     is ranked by their mean and represented by its first training, because the best of several
     trainings would give a biased picture of the learner. If all policies are learned, or none is,
     the best two policies are compared.
@@ -81,13 +81,21 @@ def pair_of(results: Results, learned: str | None = None, heuristic: str | None 
     return Pair(*pairs[0], len({frozenset(pair) for pair in pairs}))
 
 
-def introduction(pair: Pair, missions: int) -> str:
-    """In words: the two policies of a pair, and the number of missions of ``duels``."""
+def answer(comparison: pd.DataFrame, missions: pd.DataFrame, pair: Pair) -> str:
+    """By how much a policy is ahead of the other one on average, and in how many missions.
+
+    Args:
+        comparison: The rows of ``overall``.
+        missions: The rows of ``duels``.
+        pair: The policies.
+    """
+    row = comparison.set_index("metric").loc[PRODUCT]
+    share = numbers.percent((missions["difference"] > 0).mean())
     return (
-        "**{0}** and **{1}** are compared in the same {3:,} missions. Differences are {0} minus "
-        "{1}; a positive difference means that {0} is better. These data chose the two among {2} "
-        "pairs."
-    ).format(*pair, missions)
+        f"The product of {pair.policy} minus that of {pair.baseline} is "
+        f"{numbers.points(*row[['difference', 'low', 'high']])} points on average over "
+        f"{len(missions):,} missions; {pair.policy} is ahead in {share} of them."
+    )
 
 
 def duels(results: Results, pair: Pair) -> pd.DataFrame:
@@ -155,7 +163,7 @@ def outcomes(missions: pd.DataFrame, pair: Pair) -> pd.DataFrame:
 
 
 def worst(missions: pd.DataFrame, count: int) -> pd.DataFrame:
-    """The missions of ``duels`` with the policy's lowest collection ratio and communication.
+    """The missions of ``duels`` with the policy's lowest product.
 
     The worst mission is first; among equal ones, the one with the lowest collection ratio.
     """

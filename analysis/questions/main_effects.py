@@ -156,8 +156,30 @@ def leading_policies(
     return [policy for policy in (learned, heuristic) if policy]
 
 
+def answer(table: pd.DataFrame, policy: str) -> str:
+    """Which parameters change the product of a policy most, in a sentence.
+
+    Args:
+        table: The ``effects``.
+        policy: The policy.
+    """
+    rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
+    by_field = rows.sort_values("mean", kind="stable").groupby("field", sort=False)
+    spans = (by_field["mean"].max() - by_field["mean"].min()).sort_values(ascending=False)
+    ends = [
+        f"{parameter(str(field)).within} ({numbers.percent(low['mean'])} at {low['value']}, "
+        f"{numbers.percent(high['mean'])} at {high['value']})"
+        for field in spans.index[:2]
+        for low, high in [(by_field.get_group(field).iloc[0], by_field.get_group(field).iloc[-1])]
+    ]
+    return (
+        f"The product of {policy} depends most on the {' and on the '.join(ends)}; "
+        f"n = {numbers.span(rows['n'])} missions per value."
+    )
+
+
 def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:
-    """How collection ratio and communication goes along every parameter, as a table to print.
+    """How product goes along every parameter, as a table to print.
 
     Beside the change of the product from the first to the last value stands that of the collection
     ratio alone, which no failed mission moves: a few failures can make most of a small change.

@@ -16,7 +16,6 @@ from analysis.questions import settings
 from analysis.results.event_log import duration
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
-from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import relative_change
 from dess.errors import InputError
 
@@ -91,10 +90,11 @@ def changes(
 
 
 def enough_pads(results: Results, margin: float) -> pd.DataFrame:
-    """The fewest pads that are enough for every fleet.
+    """The fewest pads that are enough for every fleet, and the most that are too few.
 
     A number of pads is enough if with it, and with every larger number, the product is at most
-    ``margin`` below that with most pads: the lower end of the 95 % interval says so.
+    ``margin`` below that with most pads: the lower end of the 95 % interval says so. It is too few
+    if the whole interval is below 0. What is neither is open.
 
     Args:
         results: The study ``pads``, or another one that varies ``uavs`` and ``pads``.
@@ -102,8 +102,7 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
 
     Returns:
         A row per policy and fleet: ``policy``, ``uavs``, ``pads`` (the fewest that are enough),
-        ``mean``, ``low``, ``high``: the change of the product with the next smaller number; nan if
-        the smallest number is enough.
+        ``too_few`` (the most that are too few, 0 if none is), and ``open``, those in between.
 
     Raises:
         InputError: If the study does not vary these fields.
@@ -112,11 +111,12 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
     lost = changes(results, "pads", max(pads), PRODUCT)
     rows = []
     for (policy, uavs), part in lost.groupby(["policy", "uavs"], sort=False):
-        short = part[part["low"] < -margin].nlargest(1, "pads")
-        change = short[_ENDS].iloc[0] if len(short) else [np.nan] * 3
-        more = [n for n in (*part["pads"], max(pads)) if n > short["pads"].sum()]
-        rows.append((policy, uavs, int(min(more)), *change))
-    return pd.DataFrame(rows, columns=["policy", "uavs", "pads", *_ENDS])
+        short = part.loc[part["low"] < -margin, "pads"].max()
+        enough = min(n for n in (*part["pads"], max(pads)) if not n <= short)
+        few = part.loc[(part["high"] < 0) & (part["pads"] < enough), "pads"].max()
+        few = 0 if np.isnan(few) else int(few)
+        rows.append((policy, uavs, enough, few, [n for n in part["pads"] if few < n < enough]))
+    return pd.DataFrame(rows, columns=["policy", "uavs", "pads", "too_few", "open"])
 
 
 def short_of_pads(results: Results, margin: float) -> list[int]:
@@ -131,18 +131,15 @@ def short_of_pads(results: Results, margin: float) -> list[int]:
 def pads(results: Results, margin: float) -> str:
     """How many pads are enough for every fleet, by the first policy of the study."""
     found = enough_pads(results, margin)
-    rows = found[found["policy"] == results.policies[0]]
-    fleets = [f"{row.uavs} UAVs need {row.pads}" for row in rows.itertuples()]
-    lost = [
-        f"{numbers.points(row.mean, row.low, row.high)} points for {row.uavs} UAVs"
-        for row in rows.dropna().itertuples()
-    ]
-    cost = f" The next smaller number of pads changes the product by {numbers.words(lost)}."
+    parts = []
+    for row in found[found["policy"] == results.policies[0]].itertuples():
+        part = f"{row.pads} {'are' if row.pads > 1 else 'is'} enough for {row.uavs} UAVs"
+        if row.too_few:
+            part += f", {row.too_few} {'are' if row.too_few > 1 else 'is'} too few"
+        parts.append(part + f", {numbers.words([*map(str, row.open)])} open" * bool(row.open))
     return (
-        f"**Charging pads: {numbers.words(fleets)}** (policy `{results.policies[0]}`). With fewer, "
-        f"the product may be more than {numbers.margin(margin)} below that with a pad for every "
-        f"UAV.{cost if lost else ''} Intervals are {numbers.level(LEVEL)} intervals of paired "
-        "differences."
+        f"Of charging pads, {'; '.join(parts)} (policy {results.policies[0]}, at most "
+        f"{numbers.margin(margin)} of the product lost)."
     )
 
 
@@ -166,10 +163,8 @@ def age(results: Results) -> str:
             for row in rows.itertuples()
         ]
         parts.append(f"from 1 to {uavs} UAVs by {numbers.words(at_rates)}")
-    printed = [f"{numbers.minus(f'{100 * of:+.0f}')} %" for of in table["published"].unique()]
     return (
-        f"**The average age of information changes {'; '.join(parts)}** (policy "
-        f"`{results.policies[0]}`). Published for another model: {numbers.words(printed)}."
+        f"The average age of information changes {'; '.join(parts)} (policy {results.policies[0]})."
     )
 
 
@@ -184,9 +179,9 @@ def failures(results: Results) -> str:
         for _, row in rows.iterrows()
     ]
     return (
-        "**A UAV that fails in a mission slot with probability "
-        f"{value_text(rows[RATE].iloc[0])} changes the product of {rows['uavs'].iloc[0]} UAVs "
-        f"{numbers.words(parts)}** (policy `{results.policies[0]}`)."
+        f"If a UAV fails in each slot with probability {value_text(rows[RATE].iloc[0])}, the "
+        f"product of {rows['uavs'].iloc[0]} UAVs changes {numbers.words(parts)} "
+        f"(policy {results.policies[0]})."
     )
 
 

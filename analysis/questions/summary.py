@@ -144,26 +144,50 @@ def with_mark(estimate: Any, printed: float) -> str:
     return f"{text} {numbers.difference(estimate.mean, printed)} {mark}"
 
 
+def of_policy(means: pd.DataFrame, policy: str) -> pd.Series:
+    """The means of a policy by metric, as text with their intervals.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+        policy: The policy.
+    """
+    rows = means[means["policy"] == policy].set_index("metric")
+    return rows.loc[[*METRICS]].apply(numbers.estimate, axis=1)
+
+
+def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]) -> str:
+    """The success and the product of a policy, beside the paper's product, in a sentence.
+
+    Args:
+        means: Rows of ``analysis.summary`` by policy.
+        policy: The policy.
+        printed: The paper's numbers by metric.
+    """
+    texts, n = of_policy(means, policy), means["n"].min()
+    return (
+        f"The best policy, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions with a product "
+        f"of {texts[PRODUCT]}; the paper prints {numbers.percent(printed[SUCCESS])} and "
+        f"{numbers.percent(printed[PRODUCT])}."
+    )
+
+
 def guard_in_words(means: pd.DataFrame) -> str:
     """Why even a random policy succeeds: the return guard, and what success is without it.
 
     Args:
         means: Rows of ``analysis.summary`` by policy.
     """
-    of_success = means[means["metric"] == SUCCESS].set_index("policy")
-    shares = {policy: numbers.estimate(row) for policy, row in of_success.iterrows()}
-    text = (
-        "Every policy of this project except `random-unguarded` acts under the return guard, which "
-        "allows only actions after which a UAV can still reach the charging zone in time."
-    )
+    text = "All policies but `random-unguarded` act under the return guard, so nearly all succeed."
+    known = {*means["policy"]}
     for policy, guarded in (("random", "under"), ("random-unguarded", "without")):
-        if policy in shares:
-            text += f" Random moves {guarded} the guard have a success of {shares[policy]}."
+        if policy in known:
+            share = of_policy(means, policy)[SUCCESS]
+            text += f" Random moves {guarded} the guard have a success of {share}."
     return text
 
 
 def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) -> list[str]:
-    """The policies by their mean collection ratio and communication, the best one first.
+    """The policies by their mean product, the best one first.
 
     Every design point has the same weight. Of policies with equal means, the one that appears first
     is ranked first.
@@ -181,7 +205,7 @@ def ranked_policies(missions: pd.DataFrame, among: Iterable[str] | None = None) 
 
 
 def best_policy(missions: pd.DataFrame, among: Iterable[str] | None = None) -> str:
-    """The policy with the highest mean collection ratio and communication."""
+    """The policy with the highest mean product."""
     return ranked_policies(missions, among)[0]
 
 
@@ -203,7 +227,7 @@ def worst(
     point: int | None = None,
     folder: str | Path | None = None,
 ) -> pd.DataFrame:
-    """The missions of a policy with the lowest collection ratio and communication.
+    """The missions of a policy with the lowest product.
 
     Args:
         results: The study.
@@ -281,7 +305,7 @@ def _same_missions(results: Results) -> bool:
 
 
 def distributions(results: Results) -> pd.DataFrame:
-    """The distribution of collection ratio and communication over the missions of every policy.
+    """The distribution of product over the missions of every policy.
 
     Returns:
         A row per policy and view, as ``analysis.distribution`` returns it. Empty if there are

@@ -127,6 +127,8 @@ def evidence_of_policy(
     if study not in studies:
         raise MissingError(f"the study {study} has not been run")
     if policy:
+        if policy not in studies[study].policies:
+            raise MissingError(f"the study {study} has no policy {policy}")
         return EvidenceOfPolicy(studies[study], policy)
     learners = summary.learners(studies[study])
     wanted = [learner] if learner else [*learners]

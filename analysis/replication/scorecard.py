@@ -1,7 +1,8 @@
 """The replication scorecard: the claims of the paper's Section V and the results of the studies.
 
-Verdicts are computed for two policies: the best learned policy of each study, and the policy with
-the paper's observation, network and algorithm.
+Verdicts are computed for the best learned policy of each study, for the policy with the paper's
+observation, network and algorithm, and for policies that have learned nothing. A claim that one of
+these passes says nothing about learning: it is not diagnostic.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -20,14 +21,25 @@ from analysis.replication.evidence_of_policy import (
     evidence_of_trainings,
 )
 from analysis.replication.measures import Measured, Quantity
-from analysis.replication.verdict_rules import MARGIN, NO_RESULTS
+from analysis.replication.verdict_rules import (
+    EXCEEDS,
+    FALLS_SHORT,
+    MARGIN,
+    MATCHES,
+    NO_RESULTS,
+    NOT_APPLICABLE,
+    gap,
+)
 from analysis.results.tables import Results
-from analysis.stats.verdict import INCONCLUSIVE, position
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
 from dess import InputError
 from policies.ddqn.config import TrainingConfig
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
+# Policies that have learned nothing.
+NULLS = ("greedy", "random", "random-unguarded")
+COLUMNS = ("the best learned policy", PAPERS_NETWORK, *NULLS)
 # Trainings with and without transfer learning, with the methods of the best learned policy.
 VARIANTS = ("quick", "no transfer")
 
@@ -54,6 +66,21 @@ class Finding:
     against: str = ""
     note: str = ""
 
+    @property
+    def holds(self) -> bool:
+        """Whether the policy passes the claim."""
+        return self.verdict == HOLDS
+
+    @property
+    def outcome(self) -> str:
+        """The verdict as pages write it: one of ``verdict_rules.OUTCOMES``."""
+        if self.holds:
+            return EXCEEDS if self.against == ABOVE else MATCHES
+        short = self.verdict == REFUTED or (self.verdict == IN_PART and self.against == BELOW)
+        if short:
+            return FALLS_SHORT
+        return NOT_APPLICABLE if self.verdict == NO_RESULTS else INCONCLUSIVE
+
 
 @dataclass(frozen=True)
 class Row:
@@ -63,6 +90,11 @@ class Row:
     claim: Claim
     rule: str
     findings: tuple[Finding, ...]
+
+    @property
+    def is_diagnostic(self) -> bool:
+        """Whether no policy passes the claim that has learned nothing."""
+        return not any(finding.holds for finding in self.findings[-len(NULLS) :])
 
 
 def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[Row]:
@@ -75,16 +107,21 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
             empty.
 
     Returns:
-        A row per claim, with the findings for the best learned policy of each study and for the
-        policy with the paper's observation, network and algorithm.
+        A row per claim, with a finding for each of ``COLUMNS``.
     """
 
-    def evidence(learner: str, variants: tuple[str, str] | None, study: str) -> Any:
+    def evidence(
+        variants: tuple[str, str] | None, study: str, learner: str = "", policy: str = ""
+    ) -> Any:
         if study == TRAININGS:
             return evidence_of_trainings(trainings, variants)
-        return evidence_of_policy(studies, study, learner)
+        return evidence_of_policy(studies, study, learner, policy)
 
-    policies = partial(evidence, "", VARIANTS), partial(evidence, PAPERS_NETWORK, None)
+    policies = (
+        partial(evidence, VARIANTS),
+        partial(evidence, None, learner=PAPERS_NETWORK),
+        *(partial(evidence, None, policy=name) for name in NULLS),
+    )
     return [
         row for section in SECTIONS.values() for row in _rows(section, margin(studies), policies)
     ]
@@ -104,7 +141,7 @@ def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> 
 def listed(rows: Iterable[Row]) -> str:
     """Claims with the verdict for one policy and the rule, in a line of Markdown each."""
     lines = [
-        f"- {row.claim.text}: **{row.findings[0].verdict}**"
+        f"- {row.claim.text}: **{row.findings[0].outcome}**"
         + (f"; {row.findings[0].note}" if row.findings[0].note else "")
         + f". ({row.rule})"
         for row in rows
@@ -181,3 +218,21 @@ def _against(claim: Claim, measured: Measured) -> str:
     if printed is None or first.low is None or first.unit != printed.unit:
         return ""
     return position(first.interval, printed.value)
+
+
+def against_paper(rows: Iterable[Row]) -> pd.DataFrame:
+    """The results minus the printed shares, where the paper prints one.
+
+    Returns:
+        A row per claim and policy, up to the best that has learned nothing: ``claim``, ``policy``,
+        ``mean``, ``low`` and ``high`` of the difference, with the interval of the printed number
+        where it has one, and ``n``.
+    """
+    table = [
+        (row.claim.text, finding.policy, *gap(first.interval, printed.interval), first.n)
+        for row in rows
+        if (printed := row.claim.printed) and printed.unit == "share"
+        for finding in row.findings[:3]
+        if finding.against and (first := finding.quantities[0])
+    ]
+    return pd.DataFrame(table, columns=["claim", "policy", "mean", "low", "high", "n"])

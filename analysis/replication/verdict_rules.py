@@ -35,6 +35,15 @@ from analysis.study.selection import Choice
 
 NO_RESULTS = "no results"
 VERDICTS = (HOLDS, IN_PART, INCONCLUSIVE, REFUTED, NO_RESULTS)
+# The verdicts as pages write them: of claims that hold, those with an interval above the paper's
+# number exceed it; what holds in part without such a number is inconclusive.
+EXCEEDS, MATCHES, FALLS_SHORT, NOT_APPLICABLE = (
+    "exceeds",
+    "matches",
+    "falls short",
+    "does not apply",
+)
+OUTCOMES = (EXCEEDS, MATCHES, FALLS_SHORT, INCONCLUSIVE, NOT_APPLICABLE)
 
 # A value is near a printed number if its interval is above that number - NEAR; a change is small if
 # it is less than NEAR.

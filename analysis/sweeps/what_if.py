@@ -74,7 +74,7 @@ class WhatIf:
     shown: str
 
     def answer(self) -> str:
-        """The paired differences in collection ratio and communication, in words (Markdown)."""
+        """The paired differences in product, in words (Markdown)."""
         before, after = (answer.best_of_side(self.results, p) for p in (BASELINE, VARIATION))
         return (
             f"{answer.conclusions(self.table())}\n\n"
@@ -106,7 +106,7 @@ class WhatIf:
         return figures.means(answer.means(self.results), metric, sides)
 
     def plot_spread(self) -> "Figure":
-        """The distribution of the paired differences in collection ratio and communication."""
+        """The distribution of the paired differences in product."""
         from analysis.figures import comparison as figures
 
         return figures.spread(answer.all_differences(self.results))

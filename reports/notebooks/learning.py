@@ -45,7 +45,7 @@ baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
 # With transfer learning, phase I trains without battery decrease, and phase II begins with the
 # weights of phase I (the paper's Algorithm 1). Without it, all steps belong to phase II. The paper
 # claims that the agent with transfer learning has a higher reward at every step, overtakes the
-# other one in collection ratio and communication, and ends higher, and that training without
+# other one in product, and ends higher, and that training without
 # transfer learning levels off early at a low value.
 
 # %%
@@ -78,7 +78,7 @@ by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 html.say(
     "**The rules here**, with Welch's t over the trainings:\n\n"
-    "- of the reward: {rules[0]}\n- of collection ratio and communication: {rules[1]}",
+    "- of the reward: {rules[0]}\n- of product: {rules[1]}",
     rules=[rule.in_words(verdict_rules.MARGIN) for rule in by_metric.values()],
 )
 
@@ -86,7 +86,7 @@ html.say(
 html.table(
     learning.transfer_table(transfers, verdicts),
     "The verdicts follow from the mean curves and from the last difference with its 99 % interval "
-    "(for collection ratio and communication, in percentage points)",
+    "(for product, in percentage points)",
 )
 
 # %%
@@ -94,7 +94,7 @@ best = last.groupby("variant")[final].max().map(numbers.percent)
 html.say(
     "The trainings here have {steps:,} steps. In the paper, the curves cross at {paper:,} steps; "
     "by the rules, shorter trainings are inconclusive. With {name}, the best training with "
-    "transfer reaches {ends[0]} in collection ratio and communication, the best without {ends[1]}.",
+    "transfer reaches {ends[0]} in product, the best without {ends[1]}.",
     steps=last["updates"].max(),
     paper=paper.CROSSING,
     name=[*pairs][-1],
@@ -120,7 +120,7 @@ html.say(
 table = ablation.ablation(last, final, baseline)
 html.figure(
     figures.ablation(table, last, final, baseline),
-    "Collection ratio and communication that the trainings of every variant reach",
+    "Product that the trainings of every variant reach",
     "A dot is a training; a diamond is the mean of n trainings with its 95 % interval (Student's t "
     "over the trainings). A single training has neither interval nor diamond. The dashed line is "
     f"the mean of {baseline}. An arrow means that all trainings are left of the axis.",
@@ -171,7 +171,7 @@ html.gallery([once(policy) for policy in shipped])
 
 # %%
 html.say(
-    "From which step on the exponential moving average of collection ratio and communication does "
+    "From which step on the exponential moving average of product does "
     "not improve any more. Minutes are elapsed time, and other programs may have slowed the "
     "training down.\n\n{courses}",
     courses=html.composed(

@@ -18,7 +18,7 @@
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders of the studies fig1 and fig4
-policy = None  # the policy to show; None for the best by collection ratio and communication
+policy = None  # the policy to show; None for the best by product
 replication = 0  # the replication to show; the study must have stored its event log
 
 # %%
@@ -53,7 +53,7 @@ example = missions.logged_mission(fig1, best, 0, replication)
 mean = missions.estimate(fig1, best)
 html.say(
     "The map has {grid} x {grid} cells and {nodes} nodes. The policy of this mission is "
-    "**{best}**, the best of {policies} by collection ratio and communication: {mean}, n = {n:,}.",
+    "**{best}**, the best of {policies} by product: {mean}, n = {n:,}.",
     grid=example.scenario.grid, nodes=len(example.scenario.nodes), best=best,
     policies=numbers.words(fig1.policies), mean=numbers.estimate(mean), n=mean["n"],
 )  # fmt: skip
@@ -88,7 +88,7 @@ html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 # %%
 mean = missions.estimate(fig4, shown_policy)
 html.say(
-    "The policy is **{policy}**: the mean of its collection ratio and communication over the three "
+    "The policy is **{policy}**: the mean of its product over the three "
     "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all). The best "
     "policy of the study is {best}. Each column is replication {replication} of seed {seed}.",
     policy=shown_policy, mean=numbers.estimate(mean), n=mean["n"],

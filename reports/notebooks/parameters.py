@@ -9,11 +9,9 @@
 # ---
 
 # %% [markdown]
-# # Scenario parameters
+# # Which parameters matter?
 #
-# This page shows the effects of the number of UAVs, the charging thresholds, the initial data and
-# the flying time: one parameter at a time as in the paper's Fig. 5, the best setting of all
-# parameters, and the share of the variance that each parameter explains.
+# The effect of every parameter alone, the best setting of all, and the shares of the variance.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folders of fig5, sweet-spot and sensitivity
@@ -22,6 +20,8 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 
 # %%
 from pathlib import Path
+
+from IPython.display import display
 
 from analysis import load_results, names, numbers
 from analysis.figures import settings as figures
@@ -41,26 +41,24 @@ effects = main_effects.effects(fig5)
 effects = effects[effects["policy"].isin(policies)]
 changes = main_effects.changes_by_field(fig5, effects)
 ratios = main_effects.changes_by_field(fig5, effects, names.RATIO)
-level = numbers.level(LEVEL)
-rule, checks = sweet.manifest["study"]["selection"], summary.checks(sweet)
-
-# %% [markdown]
-# ## <a id="fig-5"></a>One by one: the paper's Fig. 5
+level, checks = numbers.level(LEVEL), summary.checks(sweet)
 
 # %%
-html.say(
-    "The policies are the best learned one of the study, if there is one, and the best heuristic: "
-    "{policies}. Every value of a parameter was simulated in {n:,} missions per policy, with all "
-    "other parameters drawn from Table II. All values and policies have the same other random "
-    "draws (common random numbers).",
-    policies=html.composed(numbers.words([f"**{policy}**" for policy in policies])),
-    n=effects["n"].min(),
+html.answer(main_effects.answer(effects, leading))
+
+# %%
+html.lead(
+    figures.one_by_one(effects, fig5.policies),
+    "The product against every parameter",
+    f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from Table "
+    f"II; bars are {level} intervals.",
 )
 
 # %% [markdown]
-# Therefore the paired difference from the first value, in the lowest panel, shows most. This panel
-# has its own axis. Nearly all missions succeed, since both policies act under the return guard,
-# which allows only actions after which a UAV can still reach the charging zone in time.
+# ## <a id="fig-5"></a>Why: the paper's Fig. 5
+#
+# All values meet the same random draws, so the paired differences in the lowest panels show most.
+# They have an axis of their own.
 
 # %%
 html.gallery(
@@ -68,116 +66,53 @@ html.gallery(
         (
             figures.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
-            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per point, bars are "
-            f"{level} intervals.",
+            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per dot; bars are {level} "
+            "intervals.",
         )
         for field, pairs in changes.items()
     ]
 )
 
 # %% [markdown]
-# ### The effects in words
-#
-# Two values differ significantly if their paired difference does, at the 5 % level after Holm's
-# correction for the number of pairs. A metric *rises* if some values differ significantly and all
-# these differences are increases, *falls* if all are decreases, and *stays level* if no values
-# differ. It *rises, then falls* if there is a value with no decrease before it and no increase
-# after it. Several values may have the highest mean if they do not differ significantly.
+# ## <a id="sweet-spot"></a>The best setting of all
 
 # %%
-html.table(
-    main_effects.listed(effects, changes, ratios),
-    f"Collection ratio and communication; differences in points with {level} intervals. The last "
-    "minus the first value is also shown for the collection ratio, which failures do not lower",
-)
-
-# %% [markdown]
-# ### The paper's claims
-
-# %%
+rule = sweet.manifest["study"]["selection"]
 studies = {"fig5": fig5, "sweet-spot": sweet}
-rows = scorecard.of_policy(studies, leading, SECTIONS["fig-5"])
-rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
 html.say(
-    "The paper's claims about its Fig. 5, and the verdicts for {leading}:\n\n{claims}",
-    leading=leading,
-    claims=html.composed(scorecard.listed(rows)),
-)
-
-# %% [markdown]
-# Verdicts follow from the rules of the scorecard: *inconclusive* means too few missions. Claims
-# overlap, so the number of verdicts is not a score.
-
-# %% [markdown]
-# ## <a id="sweet-spot"></a>All together: the sweet spot
-
-# %%
-html.say(
-    "Of {n:,} settings, the one with the highest mean of {metric} was selected for every policy, "
-    "by <code>{rule[procedure]}</code> with an indifference of {margin}. The mean of a selected "
-    "setting tends to be too high, because it was selected for its high mean. So each selected "
-    "setting was simulated in {rule[check]:,} additional missions, and only these are compared "
-    "with the paper's numbers (means of {paper:,} missions, with all parameters at their best).",
+    "Of {n:,} settings, the best by product was selected for every policy by "
+    "<code>{rule[procedure]}</code>, with an indifference of {margin}, and simulated in "
+    "{rule[check]:,} further missions. Only these are compared with the paper's means over {paper:,}.",
     n=len(sweet.manifest["points"]),
-    metric=names.METRICS[rule["metric"]].lower(),
     rule=rule,
     margin=numbers.margin(scorecard.margin(studies)),
     paper=paper.SWEET_SPOT_MISSIONS,
 )
 
 # %%
-caption = "The check: n = {:,} missions per policy, bars are {} intervals. Dashed line: the paper."
 html.gallery(
     [
         (
             figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
-            caption.format(checks["n"].min(), level),
+            f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the paper.",
         )
         for metric, name in names.METRICS.items()
         if len(checks)
     ]
 )
 
-# %%
-html.table(
-    sweet_spot.table(sweet),
-    f"The selected setting and its check: means with {level} intervals, and the difference from "
-    "the paper in percentage points (▲ above the paper's number, ▼ below, ≈ contains it), the "
-    "number of missions of the selection, and the number of settings that were not ruled out, the "
-    "selected one included",
-)
-
-# %%
-html.say(
-    "The guarantees of the selections:\n\n{known}\n\nA selected value may be lower than another "
-    "by its main effect above, which is a mean over everything else that the missions draw; at the "
-    "selected setting all else is fixed.",
-    known=html.composed(sweet_spot.guarantees(sweet)),
-)
-
 # %% [markdown]
-# ## Sensitivity: which parameters matter
-
-# %%
-ranges = sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
-html.say("Here all parameters are drawn together: {ranges}.", ranges=ranges)
-
-# %% [markdown]
-# A Sobol index is the share of a metric's variance that a parameter explains, *alone* or *with all
-# interactions* that it takes part in. The replication, which determines all random draws, counts as
-# a parameter: its share is noise that no setting removes.
+# ## The shares of the variance
 #
-# The figures show the collection ratio. The product differs from it only in failed missions, which
-# are too few here. The intervals come from a bootstrap over the blocks of the design; they are too
-# wide where the parameters dominate. Estimates are not limited to 0 to 100 %; that of a small share
-# may be negative. Below the dotted line is the noise.
+# All parameters are drawn together. A Sobol index is the share of the variance of the collection
+# ratio that a parameter explains, alone or with its interactions. The replication counts as a
+# parameter: its share, below the dotted line, is noise that no setting removes.
 
 # %%
 indices = summary.sensitivities(sobol)
 of_ratio = indices[indices["metric"] == names.RATIO].dropna()
-failed = sensitivity.failures_in_words(sobol.missions)
-caption = f"n = {indices['n'].min():,} missions; lines: {level} intervals, bootstrap over blocks."
+caption = f"n = {indices['n'].min():,} missions; bars are {level} intervals, bootstrap over blocks."
 html.gallery(
     [
         (figures.sensitivity(rows, policy), f"Sobol indices of {policy}", f"{policy}: {caption}")
@@ -185,15 +120,60 @@ html.gallery(
     ]
 )
 
+# %% [markdown]
+# ## How far to trust it
+#
+# Two values differ if their paired difference does, at the 5 % level after Holm's correction for all
+# pairs of values. A metric *rises* if all differences that are significant are increases. Estimates
+# of small Sobol indices may be negative.
+
 # %%
-html.table(
-    sensitivity.index_table(indices),
-    f"Sobol indices as shares of the variance, with {level} intervals (bootstrap over blocks). A "
-    f"metric without variance has no row. Rows of success and the product depend on only {failed}",
+html.say(
+    "The guarantees of the selections:\n\n{known}",
+    known=html.composed(sweet_spot.guarantees(sweet)),
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## Tables
+
+# %%
+display(
+    html.table(
+        main_effects.listed(effects, changes, ratios),
+        f"Product; differences in points with {level} intervals, also of the collection ratio",
+    ),
+    html.table(
+        sweet_spot.table(sweet),
+        f"The selected settings and their checks: means with {level} intervals, the difference from "
+        "the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled out",
+    ),
+    html.table(
+        sensitivity.index_table(of_ratio),
+        f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
+        data=indices,
+    ),
+)
+
+# %%
+rows = scorecard.of_policy(studies, leading, SECTIONS["fig-5"])
+rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
+html.say(
+    "The paper's claims about its Fig. 5, judged for {leading} by the rules of the "
+    "[scorecard](scorecard.html):\n\n{claims}",
+    leading=leading,
+    claims=html.composed(scorecard.listed(rows)),
+)
+
+# %% [markdown]
+# ## How this page was made
+
+# %%
+ranges = sensitivity.ranges_in_words(sobol.manifest["study"]["design"]["ranges"])
+html.say(
+    "The policies are the best learned one and the best heuristic of the study. For the Sobol "
+    "indices all parameters are drawn together: {ranges}.",
+    ranges=ranges,
+)
 
 # %%
 html.provenance([fig5, sweet, sobol])

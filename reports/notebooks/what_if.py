@@ -83,7 +83,7 @@ html.gallery(
 
 # %% [markdown]
 # The next figures show the paired differences, and how they are distributed over the
-# single missions (collection ratio and communication). A failed mission counts 0, so a pair with
+# single missions (product). A failed mission counts 0, so a pair with
 # one failed mission has a large difference.
 
 # %%
@@ -115,7 +115,7 @@ for policy in found.policies:
 # The baseline and the variation use the same random numbers in each replication (common random
 # numbers). What a replication adds to both of them cancels in the difference, so the interval is
 # narrower. Little cancels where a mission fails on one side only, since it then counts 0 in
-# collection ratio and communication. The table compares the pairs with independent missions: the
+# product. The table compares the pairs with independent missions: the
 # variance of the difference as a share of that of independent missions, how much narrower the
 # interval is, and how many independent missions would give the same precision.
 
@@ -132,7 +132,7 @@ html.table(answer.pairing(table), f"Differences of n = {missions:,} pairs")
 # %% [markdown]
 # ### A typical mission
 #
-# This replication has the median of all differences in collection ratio and communication.
+# This replication has the median of all differences in product.
 
 # %%
 typical = asked.typical()
@@ -145,7 +145,7 @@ html.gallery(typical.drawings())
 # %% [markdown]
 # ### A bad mission
 #
-# This is the worst mission of the variation by collection ratio and communication; if several are
+# This is the worst mission of the variation by product; if several are
 # equally bad, the one with the lowest collection ratio.
 
 # %%

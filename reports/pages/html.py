@@ -37,6 +37,7 @@ STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contai
 # A figure, its alternative text, its caption and, if the page links to them, its data.
 Drawing = tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
 
+LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 DIGITS = "%.6g"  # format of numbers in files with data
 # Characters that LaTeX cannot print directly.
 _IN_LATEX = str.maketrans(
@@ -196,9 +197,24 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
-    above = f'<p class="caption">{escape(caption)}</p>' if caption else ""
+    if caption:
+        html = html.replace(">", f"><caption>{escape(caption)}</caption>", 1)
     below = "" if data is None else _downloads(caption, data, frame)
-    return HTML(f'{above}<div class="scroll">{html}</div>{below}')
+    label = escape(caption or "Table")
+    return HTML(
+        f'<div class="scroll" role="region" tabindex="0" aria-label="{label}">{html}</div>{below}'
+    )
+
+
+def answer(sentence: str, number: str = "") -> HTML:
+    """The answer to the question of a page: it stands below the title, and on the page's card.
+
+    Args:
+        sentence: One sentence, in plain text or as ``analysis`` writes it for Markdown.
+        number: The number of the answer, for pages that have a tile on the index.
+    """
+    plain = escape(printable(re.sub(r"[*`]", "", sentence)))
+    return HTML(f'<p class="answer" data-number="{escape(number)}">{plain}</p>')
 
 
 def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> HTML:
@@ -213,6 +229,12 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
     return HTML(_figure(drawing, alt, caption, data))
 
 
+def lead(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> HTML:
+    """The figure that shows the answer, as wide as the page; with the arguments of ``figure``."""
+    drawing.set_size_inches(LEAD)
+    return HTML(_figure(drawing, alt, caption, data, "lead"))
+
+
 def gallery(drawings: Sequence[Drawing]) -> HTML:
     """Several figures side by side where there is room; each has the arguments of ``figure``."""
     return HTML(f'<div class="gallery">{"".join(_figure(*parts) for parts in drawings)}</div>')
@@ -223,18 +245,19 @@ def svg(drawing: Figure) -> bytes:
     buffer = io.BytesIO()
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams["svg.hashsalt"] = "dess"
+        mpl.rcParams |= {"svg.hashsalt": "dess", "svg.fonttype": "none"}  # text, not outlines
         drawing.savefig(buffer, format="svg", metadata=_NO_METADATA)
     return buffer.getvalue()
 
 
-def _figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> str:
+def _figure(
+    drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None, look: str = ""
+) -> str:
     source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
-    width, height = drawing.get_size_inches()
-    shape = ' class="tall"' if height > 1.5 * width else ""
-    image = f'<img{shape} alt="{escape(alt)}" src="{source}">'
+    image = f'<img alt="{escape(alt)}" src="{source}">'
     below = "" if data is None else _downloads(alt, data, data)
-    return f"<figure>{image}<figcaption>{escape(caption)}{below}</figcaption></figure>"
+    kind = f' class="{look}"' if look else ""
+    return f"<figure{kind}>{image}<figcaption>{escape(caption)}{below}</figcaption></figure>"
 
 
 def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:

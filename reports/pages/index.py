@@ -1,4 +1,4 @@
-"""The index of a folder of pages: a card per page, the scorecard, and the origin of the results.
+"""The index of a folder of pages: tiles, the figure of the scorecard, and a card per page.
 
 Anybody may have made a page in the folder. So of older pages, the index takes only what cannot run.
 """
@@ -9,6 +9,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from markupsafe import Markup
 
@@ -17,68 +18,89 @@ from dess import InputError
 from dess.files.reading import Missing, paths_in, read_text
 from reports.folders import INDEX, PREFIX
 from reports.pages import html
-from reports.pages.notebook import NAMES, SCORECARD, Report
+from reports.pages.notebook import GROUPS, NAMES, SCORECARD
 from reports.pages.template import fill
-from reports.pages.verify import is_sealed
+from reports.pages.verify import is_sealed, sealed
 
 log = logging.getLogger(__name__)
 
 LARGEST = 512 * 2**20  # bytes of a page
+TILES = {  # pages whose number has a tile, and what it is
+    "performance": "The best policy on the paper's missions",
+    "planner": "Planning against learning",
+    "own-sea": "The cheapest fleet of the example",
+}
 _IMAGE = re.compile(
-    """<img alt=("[^"<>]*"|'[^'<>]*')( class="tall")? """
-    r'src="data:image/svg\+xml;base64,[\w+/=]+"/?>',
-    re.ASCII,
+    """<img alt=("[^"<>]*"|'[^'<>]*') src="data:image/svg\\+xml;base64,[\\w+/=]+"/?>""", re.ASCII
 )
-_TITLE, _LEAD = re.compile("<h1>([^<]*)</h1>"), re.compile('<p class="lead">([^<]*)</p>')
+_TITLE = re.compile("<h1>([^<]*)</h1>")
+_LEAD = re.compile('<p class="lead"(?: data-number="([^"<>]*)")?>([^<]*)</p>')
+_BAR = re.compile('<nav class="bar" aria-label="All pages">.*?</nav>', re.S)
 _OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
-_SCORECARD = re.compile(r'<section id="scorecard">.*?</section>', re.S)
-# What a scorecard consists of: text, and tags with a few attributes.
-_TAG = (
-    "</?(section|style|p|strong|span|small|sub|ul|li|a|details|summary|table|thead|tbody|tr|th|td)"
-    r'( (id|class|scope|colspan|data-label)="[^"<>]*"| href="[\w-]+\.html(#[\w-]*)?")*>'
-)
-_PLAIN = re.compile(rf"([^<]++|{_TAG})*+", re.ASCII)
-_STYLE = re.compile("<style>(.*?)</style>", re.S)
-_REQUESTS = re.compile(r"@import|url|image|src|\\", re.I)
 
 
 @dataclass(frozen=True)
 class Card:
-    """What the index shows about a page."""
+    """What the index shows about a page: its question and, in one sentence, what it found."""
 
     page: str
-    title: str
-    description: str
-    thumbnail: Markup
+    title: Markup
+    number: Markup
+    finding: Markup
+
+    @classmethod
+    def of(cls, page: str, content: str) -> "Card":
+        """The card of a page."""
+        title, (number, finding) = _first(_TITLE, content), _first(_LEAD, content) or ("", "")
+        return cls(page, Markup(title), Markup(number), Markup(finding))
 
 
 def index_of(
-    pages: Mapping[str, str],
-    reports: Sequence[Report],
-    left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    pages: Mapping[str, str], left_out: Mapping[str, Sequence[str]] = MappingProxyType({})
 ) -> str:
     """The index of pages.
 
     Args:
         pages: The HTML of pages, by file name.
-        reports: The reports in the order of their cards; those without a page are left out. Pages
-            of studies come after them, by name.
         left_out: Titles of reports whose results are missing, with the commands that make these.
     """
-    shown = [report for report in reports if report.page in pages]
-    cards = [
-        Card(r.page, r.title, r.description, _thumbnail(pages[r.page], -1))
-        for r in shown
-        if r.name != SCORECARD
-    ]
-    studies = [name for name in sorted(pages) if _OF_STUDY.fullmatch(name)]
-    cards += [_card_of_study(name, pages[name]) for name in studies]
-    contents = [pages[name] for name in (*(report.page for report in shown), *studies)]
+    cards = {name: Card.of(name, pages[name]) for name in in_order(pages)}
+    tiles = [(text, cards.get(f"{name}.html")) for name, text in TILES.items()]
+    groups = [(head, [cards[name] for name in in_order(pages, head)]) for head in GROUPS]
+    contents = [pages[name] for name in cards]
     files = dict.fromkeys(text for page in contents for text in html.embedded(html.FILES, page))
     origins = html.carrying(_evidence(contents), files)
-    scorecard = _SCORECARD.findall(pages.get(f"{SCORECARD}.html", ""))
-    parts = {"scorecard": Markup("".join(scorecard)), "origins": Markup(origins.data)}
-    return fill(INDEX, scripts=False, cards=cards, left_out=left_out, **parts)
+    claims = _IMAGE.search(pages.get(f"{SCORECARD}.html", ""))
+    return fill(
+        INDEX,
+        tiles=[(text, card) for text, card in tiles if card and card.number],
+        claims=Markup(claims[0] if claims else ""),
+        groups=[(head, of_group) for head, of_group in groups if of_group],
+        left_out=left_out,
+        origins=Markup(origins.data),
+    )
+
+
+def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
+    """File names of pages in the order of the index: those of a group, or all."""
+    known = {*pages}
+    studies = sorted(name for name in known if _OF_STUDY.fullmatch(name))
+    order = []
+    for heading, names in GROUPS.items():
+        if group in (None, heading):
+            order += [*(studies if heading == [*GROUPS][0] else ()), *(f"{n}.html" for n in names)]
+    return [name for name in order if name in known]
+
+
+def with_bar(content: str, page: str, pages: Iterable[str]) -> str:
+    """A page with the links to all pages of its folder in its bar, sealed again."""
+    links = ['<a href="index.html">Overview</a>']
+    for name in in_order(pages):
+        here = ' aria-current="page"' if name == page else ""
+        label = name.removesuffix(".html").removeprefix(PREFIX).replace("-", " ").capitalize()
+        links.append(f'<a href="{Markup.escape(name)}"{here}>{Markup.escape(label)}</a>')
+    bar = f'<nav class="bar" aria-label="All pages">{" ".join(links)}</nav>'
+    return sealed(_BAR.sub(lambda _: bar, content, count=1))
 
 
 def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
@@ -94,7 +116,7 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
     for path in (out / name for name in names if name not in but):
         try:
             content = read_text(path, LARGEST)
-            if not is_sealed(content) or not _is_plain("".join(_SCORECARD.findall(content))):
+            if not is_sealed(content):
                 raise InputError("altered")
             _evidence([content])
         except Missing:
@@ -106,25 +128,11 @@ def pages_in(out: Path, but: Container[str] = ()) -> dict[str, str]:
     return pages
 
 
-def _is_plain(html: str) -> bool:
-    """Whether HTML has only what scorecards consist of, such as no script and no image."""
-    styles = "".join(_STYLE.findall(html))
-    return bool(_PLAIN.fullmatch(html)) and not _REQUESTS.search(styles)
+def _first(pattern: re.Pattern[str], content: str) -> Any:
+    return next(iter(pattern.findall(content)), "")
 
 
 def _evidence(pages: Iterable[str]) -> list[Evidence]:
     """The evidence of all studies in the pages, without duplicates."""
     texts = [text for content in pages for text in html.embedded(html.STUDY, content)]
     return [Evidence.parse(text, "page", "a page of dess report") for text in dict.fromkeys(texts)]
-
-
-def _card_of_study(name: str, content: str) -> Card:
-    """The card of a page of a study: its title, its description and its first drawing."""
-    title, description = (Markup("".join(part.findall(content)[:1])) for part in (_TITLE, _LEAD))
-    return Card(name, title, description, _thumbnail(content, 0))
-
-
-def _thumbnail(content: str, number: int) -> Markup:
-    """An image of a page (of a report the last one, which shows most), or nothing without one."""
-    images = [image[0] for image in _IMAGE.finditer(content)]
-    return Markup(images[number] if images else "")

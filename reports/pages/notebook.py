@@ -25,24 +25,15 @@ from dess.files.reading import paths_in, read_text
 from policies.registry import is_path
 
 SHIPPED = Path(__file__).parents[1] / "notebooks"
-SCORECARD = "scorecard"  # the index shows the complete scorecard
-NAMES = (  # in the order of the index
-    "mission",
-    "performance",
-    "learning",
-    "parameters",
-    "comparison",
-    "planner",
-    "pads",
-    "age",
-    "failures",
-    "explorer",
-    "what-if",
-    "sweep",
-    "own-sea",
-    "verification",
-    SCORECARD,
-)
+SCORECARD = "scorecard"
+# The reports in the order of the index, by what people ask.
+GROUPS = {
+    "Our sea, our fleet": ("own-sea", "sweep", "what-if", "pads", "failures", "age", "explorer"),
+    "The policies": ("planner", "comparison", "mission", "learning"),
+    "The paper": ("performance", SCORECARD, "parameters"),
+    "Is it right?": ("verification",),
+}
+NAMES = tuple(name for names in GROUPS.values() for name in names)
 PARAMETERS = "parameters"  # the tag of the cell with the parameters
 
 _KERNEL = {"name": "python3", "display_name": "Python 3", "language": "python"}

@@ -5,14 +5,12 @@ The same results give the same bytes, since a page contains no time and no path 
 
 import logging
 import os
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from markupsafe import Markup
-from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
@@ -26,7 +24,8 @@ from dess.files.reading import paths_in
 from dess.files.writing import delete, write_files
 from reports.folders import INDEX, LOCK, check_pages
 from reports.pages import kernels, missions
-from reports.pages.index import index_of, pages_in
+from reports.pages.body import Body
+from reports.pages.index import index_of, pages_in, with_bar
 from reports.pages.kernels import Progress
 from reports.pages.keys import has_key, key_of
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
@@ -38,9 +37,6 @@ log = logging.getLogger(__name__)
 PATIENCE = 60.0  # for which the page of another process is waited for [s]
 _BUSY = "another process writes there; allowed: wait"
 _WIDGET = "application/vnd.jupyter.widget-view+json"  # type of an output, such as a progress bar
-
-# ``C_S`` in the text of a page, or a piece of the page that is not text.
-_INDEX_OR_NO_TEXT = re.compile(r"<(code|pre|script|style)\b.*?</\1>|<[^>]*>|\bC_([SC])\b", re.S)
 
 
 class ReportError(RuntimeError):
@@ -94,7 +90,7 @@ def render(
     reports = [report for report in reports if not lacking[report.name]]
     for report in reports:
         report.set({"results": str(results.absolute()), **values})
-    _write(reports, results, out, progress, values, notebooks, left_out)
+    _write(reports, results, out, progress, values, left_out)
     return out / INDEX
 
 
@@ -124,7 +120,7 @@ def render_study(
     report = report_of(folder, values)
     check_parameters([report], values)
     report.set({"results": str(folder.absolute()), **values})
-    _write([report], folder, out, progress, values, SHIPPED)
+    _write([report], folder, out, progress, values)
     return out / report.page
 
 
@@ -134,7 +130,6 @@ def _write(
     out: Path,
     progress: Progress | None,
     values: Mapping[str, Any],
-    notebooks: Path,
     left_out: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Run reports in the folder of their results, and write the pages and the index."""
@@ -147,9 +142,11 @@ def _write(
     files = {report.page: _page(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
-    shown = [read(name, notebooks) for name in names_in(notebooks)]
     with locked(out / LOCK, _BUSY, PATIENCE):
-        files[INDEX] = index_of(pages_in(out, but=files) | files, shown, left_out)
+        pages = pages_in(out, but=files) | {r.page: files[r.page] for r in changed}
+        with_bars = {name: with_bar(page, name, pages) for name, page in pages.items()}
+        files |= {name: page for name, page in with_bars.items() if page != pages[name]}
+        files[INDEX] = index_of(pages, left_out)
         write_files({out / name: text for name, text in files.items()})
         for report in complete:
             delete(out / f"{report.name}.partial.html")
@@ -192,15 +189,15 @@ def _check_results(folder: Path) -> None:
 
 def _page(report: Report) -> str:
     """The page of a report that has been run."""
-    code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
-    body = html_of(report.notebook)
-    return fill("report.html", scripts=report.scripts, report=report, body=body, code=Markup(code))
+    code = Markup(highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter()))
+    body = Body.of(_cleaned(report.notebook))
+    return fill("report.html", scripts=report.scripts, report=report, body=body, code=code)
 
 
-def html_of(notebook: NotebookNode) -> str:
-    """The outputs and the text of a notebook as HTML, without widgets, which only Jupyter shows.
+def _cleaned(notebook: NotebookNode) -> NotebookNode:
+    """A notebook without widgets, which only Jupyter shows, and without what it wrote to stderr.
 
-    What the notebook wrote to stderr is logged instead.
+    That is logged instead.
     """
     notebook.metadata.pop("widgets", None)
     for cell in notebook.cells:
@@ -210,16 +207,4 @@ def html_of(notebook: NotebookNode) -> str:
             is_error = output.get("name") == "stderr" or output.output_type == "error"
             if is_error or _WIDGET in output.get("data", {}):
                 cell.outputs.remove(output)
-    exporter = HTMLExporter(
-        template_name="basic",
-        exclude_input=True,
-        exclude_output_prompt=True,
-        exclude_anchor_links=True,
-        extra_template_basedirs=[],  # otherwise templates in the working directory come first
-    )
-    return with_indices(exporter.from_notebook_node(notebook)[0])
-
-
-def with_indices(content: str) -> str:
-    """HTML in which ``C_S`` is a C with an index, except in code and attributes."""
-    return _INDEX_OR_NO_TEXT.sub(lambda m: f"C<sub>{m[2]}</sub>" if m[2] else m[0], content)
+    return notebook

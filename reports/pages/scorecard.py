@@ -1,56 +1,50 @@
-"""The replication scorecard as HTML: a table, and on a phone a card per claim.
+"""The replication scorecard on its page: the answer, the tables of claims, the counts of verdicts.
 
-The words of the page stand in ``templates/scorecard.html``; here is what it fills in.
+The words of the tables stand in ``templates/scorecard.html``; here is what it fills in.
 """
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from itertools import groupby
 
+import pandas as pd
 from IPython.display import HTML
 
 from analysis import numbers
-from analysis.replication import paper
 from analysis.replication.measures import Quantity
-from analysis.replication.scorecard import Finding, Row
-from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
-from analysis.stats.intervals import LEVEL
-from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
+from analysis.replication.scorecard import COLUMNS, Row
+from analysis.replication.verdict_rules import EXCEEDS, FALLS_SHORT, MATCHES, OUTCOMES
 from reports.pages.template import template
 
-# The class and the sign of each verdict; the sign helps readers who cannot see the colours.
-LOOKS = {
-    HOLDS: ("holds", "✓"),
-    IN_PART: ("in-part", "◐"),
-    INCONCLUSIVE: ("open", "?"),
-    REFUTED: ("refuted", "✗"),
-    NO_RESULTS: ("none", "–"),
-}
+_LOOKS = dict.fromkeys(OUTCOMES, "") | {EXCEEDS: "better", MATCHES: "better", FALLS_SHORT: "worse"}
 
 
-def as_html(rows: Sequence[Row], departures: Sequence[str] = ()) -> HTML:
-    """The scorecard.
-
-    Args:
-        rows: The result of ``analysis.replication.scorecard.scorecard``.
-        departures: In what the policy with the paper's network departs from the paper.
-    """
-    columns = [*zip(*(row.findings for row in rows), strict=True)]
-    page = template("scorecard.html", figure=figure, percent=numbers.percent)
-    html = page.render(
-        sections=[(s, [*of_section]) for s, of_section in groupby(rows, lambda row: row.section)],
-        total=len(rows),
-        policies=[*map(_usual_policy, columns)],
-        counts=[_counts(findings) for findings in columns],
-        looks=LOOKS,
-        best_uavs=paper.BEST_UAVS,
-        above=ABOVE,
-        below=BELOW,
-        level=numbers.level(LEVEL),
-        spreads=_spreads(rows),
-        departures=numbers.words(departures) if departures else "",
+def answer(rows: Sequence[Row]) -> str:
+    """How many claims hold for the best learned policy, diagnostic ones and all."""
+    telling = [row for row in rows if row.is_diagnostic]
+    held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
+    names = " or ".join(COLUMNS[2:])
+    return (
+        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {names} does not pass them. "
+        f"{_named(rows, 0)} passes {held} of these {len(telling)}, and {all_held} of all."
     )
-    return HTML(html)
+
+
+def as_html(rows: Sequence[Row], caption: str) -> HTML:
+    """A table of claims: the paper's number, and what every policy shows, with the rule."""
+    columns = [_named(rows, number) for number in range(len(COLUMNS))]
+    page = template("scorecard.html", figure=figure)
+    return HTML(page.render(rows=rows, caption=caption, columns=columns, looks=_LOOKS))
+
+
+def counts(rows: Sequence[Row]) -> pd.DataFrame:
+    """The number of verdicts of each kind, for every policy, of diagnostic claims and of all."""
+    table = []
+    for claims, of in (("diagnostic", [row for row in rows if row.is_diagnostic]), ("all", rows)):
+        for number in range(len(COLUMNS)):
+            given = Counter(row.findings[number].outcome for row in of)
+            counted = {outcome.capitalize(): given[outcome] for outcome in OUTCOMES}
+            table.append({"Claims": claims, "Policy": _named(rows, number), **counted})
+    return pd.DataFrame(table)
 
 
 def figure(quantity: Quantity) -> str:
@@ -71,20 +65,7 @@ def figure(quantity: Quantity) -> str:
     return f"{value:g}"
 
 
-def _usual_policy(findings: Iterable[Finding]) -> str:
-    """The policy of most findings; empty if none has any."""
-    named = Counter(finding.policy for finding in findings if finding.policy)
-    return named.most_common(1)[0][0] if named else ""
-
-
-def _counts(findings: Iterable[Finding]) -> dict[str, int]:
-    """The number of findings with each verdict."""
-    given = Counter(finding.verdict for finding in findings)
-    return {verdict: given[verdict] for verdict in VERDICTS if given[verdict]}
-
-
-def _spreads(rows: Iterable[Row]) -> list[tuple[str, Quantity]]:
-    """The ends of the intervals of printed figures, as ``[88.1, 91.8]``, with the figures."""
-    printed = [row.claim.printed for row in rows if row.claim.printed]
-    spreads = {quantity.interval: quantity for quantity in printed if quantity.low is not None}
-    return [(numbers.interval(*ends).partition(" % ")[2], q) for ends, q in spreads.items()]
+def _named(rows: Iterable[Row], number: int) -> str:
+    """The policy of most findings of a column, or the name of the column."""
+    named = Counter(row.findings[number].policy for row in rows if row.findings[number].policy)
+    return named.most_common(1)[0][0] if named else COLUMNS[number]

@@ -94,7 +94,7 @@ def difference(
 
 
 def ablation_table(table: pd.DataFrame, last: pd.DataFrame, baseline: str) -> pd.DataFrame:
-    """The rows of ``ablation`` for collection ratio and communication, as a table of text.
+    """The rows of ``ablation`` for product, as a table of text.
 
     Args:
         table: Rows of ``ablation``.

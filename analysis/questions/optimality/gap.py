@@ -19,7 +19,6 @@ from analysis.names import BOUND, GAP, PRODUCT
 from analysis.questions import summary
 from analysis.results.files import MANIFEST
 from analysis.results.tables import Results, load_results
-from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 
 NOT_RUN = (
@@ -28,6 +27,9 @@ NOT_RUN = (
 )
 ALL = "all"  # in place of a number of UAVs: the missions of fleets of any size
 _SHOWN = {PRODUCT: "Product", BOUND: "Upper bound", GAP: "Gap [points]"}
+
+
+_SAYS_NOTHING = 0.999  # a mean bound from which on it is not below 100 % as pages print it
 
 
 def results_in(folder: Path) -> Results | None:
@@ -68,27 +70,13 @@ def listed(table: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def at_most(table: pd.DataFrame) -> pd.DataFrame:
-    """How far every policy is from the best possible at most, as a table of text.
-
-    Args:
-        table: Rows of ``by_fleet``.
-
-    Returns:
-        A row per policy, the closest one first, and a column per number of UAVs: the upper end of
-        the interval of the gap, in points.
-    """
-    closest = table[table["uavs"] == table["uavs"].iloc[-1]].sort_values(GAP, kind="stable")
-    columns = {"Policy": closest["policy"].to_numpy()}
-    for uavs, rows in table.groupby("uavs", sort=False):
-        ends = 100 * rows.set_index("policy").loc[closest["policy"], f"{GAP}_high"]
-        head = "all missions" if uavs == ALL else fleet(int(str(uavs)))
-        columns[head] = ends.map("{:.1f}".format).to_numpy()
-    return pd.DataFrame(columns)
+def useful(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of ``by_fleet`` of fleets whose bound says something: it is below 100 %."""
+    return table[(table["uavs"] != ALL) & (table[BOUND] < _SAYS_NOTHING)]
 
 
 def in_words(results: Results, policy: str | None = None) -> str:
-    """How far a policy is from the best possible at most, by number of UAVs.
+    """How far a policy is from the best possible at most, for fleets with a useful bound.
 
     Args:
         results: A study with bounds.
@@ -96,17 +84,19 @@ def in_words(results: Results, policy: str | None = None) -> str:
     """
     policy = policy or summary.best_policy(results.missions)
     table = by_fleet(results)
-    table = table[(table["policy"] == policy) & (table["uavs"] != ALL)]
-    rows = table.assign(text=numbers.estimates(table, GAP, _points))
+    found = useful(table)
+    rows = found[found["policy"] == policy]
     parts = [
-        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap {row['text']})"
+        f"{100 * row[f'{GAP}_high']:.1f} points with {fleet(row['uavs'])} (mean gap "
+        f"{_points(*row[[GAP, f'{GAP}_low', f'{GAP}_high']])})"
         for _, row in rows.iterrows()
     ]
-    return (
-        f"**`{policy}` is at most {numbers.words(parts)} from the best possible.** The gap is the "
-        "upper bound minus the mean product (collection ratio and communication); the first number "
-        f"is the upper end of its {numbers.level(LEVEL)} interval."
-    )
+    others = sorted({*table["uavs"]} - {*found["uavs"], ALL})
+    text = f"`{policy}` is at most {numbers.words(parts)} from the best possible. " if parts else ""
+    if others:
+        fleets = numbers.words([fleet(int(uavs)) for uavs in others])
+        text += f"The upper bound is 100 % for {fleets}, so there is no useful bound."
+    return text.strip()
 
 
 def fleet(uavs: int) -> str:

@@ -19,7 +19,6 @@ from analysis.questions.optimality.gap import ALL, fleet
 from analysis.results.event_log import uav_slots
 from analysis.results.tables import Results
 from analysis.stats.front import on_front
-from analysis.stats.intervals import LEVEL
 from analysis.stats.intervals import summary as means_of
 from analysis.stats.paired import compare
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position
@@ -60,17 +59,25 @@ def answer(table: pd.DataFrame, planner: str) -> str:
         table: Rows of ``differences``.
         planner: The planner.
     """
-    rows = table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
+    rows = _of_product(table, planner)
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
     parts = [
         f"{_points(row)} with {fleet(row.uavs)}" for row in rows.itertuples() if row.uavs != ALL
     ]
     return (
-        f"**{_CLAIMS[position(overall)]}: `{planner}` minus `{overall.baseline}` is "
-        f"{_points(overall)} points** in the product (collection ratio and communication), over "
-        f"{overall.n:,} common missions: {numbers.words(parts)}. Brackets are "
-        f"{numbers.level(LEVEL)} intervals of paired differences."
+        f"{_CLAIMS[position(overall)]}: the product of {planner} minus that of {overall.baseline} "
+        f"is {_points(overall)} points over {overall.n:,} missions ({numbers.words(parts)})."
     )
+
+
+def ahead(table: pd.DataFrame, planner: str) -> str:
+    """By how many points the planner is ahead over all missions."""
+    rows = _of_product(table, planner)
+    return f"{numbers.difference(rows.set_index('uavs').loc[ALL, 'difference'], 0)} points"
+
+
+def _of_product(table: pd.DataFrame, planner: str) -> pd.DataFrame:
+    return table[(table["policy"] == planner) & (table["metric"] == PRODUCT)]
 
 
 def front(results: Results, times: Times) -> pd.DataFrame:
@@ -86,11 +93,6 @@ def front(results: Results, times: Times) -> pd.DataFrame:
     table = means[["policy", "mean", "low", "high"]].assign(seconds=means["policy"].map(seconds))
     table = table.dropna().sort_values("seconds", ignore_index=True)
     return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
-
-
-def mean_bound(results: Results) -> float:
-    """The mean upper bound of the missions."""
-    return float(np.mean([bound.ratio for bound in results.bounds.values()]))
 
 
 def coverage(results: Results, policy: str) -> np.ndarray:

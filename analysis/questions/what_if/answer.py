@@ -125,7 +125,7 @@ def missions_needed(answer: Any) -> float:
 
 
 def differences(results: Results, policy: str) -> pd.Series:
-    """Variation - baseline in collection ratio and communication of a policy, by replication."""
+    """Variation - baseline in product of a policy, by replication."""
     missions = results.missions[results.missions["policy"] == policy]
     sides = missions.pivot(index="replication", columns="point", values=PRODUCT)
     return sides[VARIATION] - sides[BASELINE]
@@ -137,13 +137,13 @@ def all_differences(results: Results) -> dict[str, pd.Series]:
 
 
 def best_policy(results: Results, point: int) -> str:
-    """The policy with the highest mean collection ratio and communication on one side."""
+    """The policy with the highest mean product on one side."""
     missions = results.missions
     return summary.best_policy(missions[missions["point"] == point])
 
 
 def typical(results: Results, policy: str) -> int:
-    """The replication whose difference in collection ratio and communication is the median.
+    """The replication whose difference in product is the median.
 
     With an even number it is the lower one of the two in the middle; among equal ones, the first.
     """
@@ -153,7 +153,7 @@ def typical(results: Results, policy: str) -> int:
 
 
 def worst(results: Results, policy: str) -> int:
-    """The replication with the lowest collection ratio and communication in the variation.
+    """The replication with the lowest product in the variation.
 
     Among equal ones it is the one with the lowest collection ratio, then the first.
     """
@@ -163,14 +163,14 @@ def worst(results: Results, policy: str) -> int:
 
 
 def conclusions(table: pd.DataFrame) -> str:
-    """What ``answers`` say about collection ratio and communication: a list, an item per policy."""
+    """What ``answers`` say about product: a list, an item per policy."""
     words = {
         ABOVE: "is **higher** in the variation",
         BELOW: "is **lower** in the variation",
         INCONCLUSIVE: "is **inconclusive**",
     }
     return "\n".join(
-        f"- **{row.policy}**: collection ratio and communication {words[verdict(row)]}, by "
+        f"- **{row.policy}**: product {words[verdict(row)]}, by "
         f"{change(row)} points: from {numbers.percent(row.before)} to "
         f"{numbers.percent(row.after)}.{_missing(row) if verdict(row) == INCONCLUSIVE else ''}"
         for row in table[table["metric"] == PRODUCT].itertuples()

@@ -222,7 +222,7 @@ def _gain(reduction: float) -> str:
 def _print_worst(table: pd.DataFrame) -> None:
     """The worst missions of a policy, with the commands that simulate them again."""
     policy = table["policy"].iloc[0]
-    console.say(f" worst missions of {policy}, by collection ratio and communication:")
+    console.say(f" worst missions of {policy}, by product:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
         console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")

@@ -9,10 +9,9 @@
 # ---
 
 # %% [markdown]
-# # How old the data are
+# # How old are the data?
 #
-# This page shows the age of information of the sensor nodes against the number of UAVs and the rate
-# at which new data arrive.
+# The age of information against the number of UAVs and the rate at which data arrive.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of the study age
@@ -31,70 +30,65 @@ from reports.pages import html
 study = load_results(Path(results) / "age")
 ages = [names.AGE, "peak_age", "age_p99"]
 means = operations.means(study, [*ages, names.RATIO])
-missions, level = numbers.span(means["n"]), numbers.level(LEVEL)
-rates = "arrival_rate"
-
-# %%
-html.say("{answer}", answer=html.composed(operations.age(study)))
-
-# %% [markdown]
-# ## What was simulated
-#
-# The fleet keeps watch: no UAV can fill its quota, so every mission lasts to its last slot, and
-# UAVs collect, charge and collect again. The charging zone is in the middle of the grid, so that a
-# battery is enough for every node. The rest is the paper's scenario with 25 nodes. The age of
-# a node is the time since it was last emptied (it is 0 at the start of the mission), and the age of
-# a mission is its mean over time and nodes, exact from the areas under the sawtooth. The peak age
-# is the mean of the ages just before they fall. A node that no UAV empties has no peak, but a
-# growing age. A node without new data cannot be emptied, so at low rates no fleet can keep the age
-# below the mean time between arrivals.
-
-# %% [markdown]
-# ## The age against the number of UAVs
-
-# %%
-html.gallery(
-    [
-        (
-            lines(means[means["metric"] == metric], "uavs", rates, metric, "policy"),
-            f"{names.metric_name(metric)} against the number of UAVs, by arrival rate",
-            f"n = {missions} missions per point; bars are {level} intervals.",
-        )
-        for metric in (*ages, names.RATIO)
-    ]
+caption = (
+    f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
 )
+drawn = [
+    (
+        lines(rows, "uavs", "arrival_rate", str(metric), "policy"),
+        f"{names.metric_name(str(metric))} against the number of UAVs, by arrival rate",
+        caption,
+    )
+    for metric, rows in means.groupby("metric", sort=False)
+]
+
+# %%
+html.answer(operations.age(study))
+
+# %%
+html.lead(*drawn[0])
 
 # %% [markdown]
-# ## Beside the published effect
+# ## Why
 #
-# Mathematics 13(21) 3564 reports for another model of UAVs that collect data that the average age
-# falls by 46 % from one to two UAVs, and by 79 % from one to ten. The comparison is of the size of
-# the effect only: scenario, channel and trajectories differ. `greedy` chooses nodes by their data
-# for the distance, `age` by their age for the distance.
+# The age of a node grows until a UAV empties it. A node without new data cannot be emptied, so at
+# low rates no fleet can keep the age below the mean time between arrivals.
+
+# %%
+html.gallery(drawn[1:])
+
+# %% [markdown]
+# ## How far to trust it
+#
+# Mathematics 13(21) 3564 reports, for another model, −46 % from one to two UAVs and −79 % from one
+# to ten. Only the size of the effect compares: scenario, channel and trajectories differ.
 
 # %%
 change = operations.age_changes(study)
 html.table(
-    tables.estimates(change, ["policy", "uavs"], rates, operations.relative),
-    f"Change of the average age of information from one UAV, with {level} intervals of the ratio "
-    "of means over common replications, by arrival rate",
+    tables.estimates(change, ["policy", "uavs", "n"], "arrival_rate", operations.relative),
+    "Change of the age from one UAV, with intervals of the ratio of means, by arrival rate",
     data=change,
 )
 
 # %% [markdown]
-# ## All means
+# ## Tables
 
 # %%
+of_age = means[means["metric"] == names.AGE]
 html.table(
-    tables.estimates(
-        means[means["metric"] == names.AGE], ["policy", "uavs"], rates, numbers.quantities
-    ),
-    f"{names.metric_label(names.AGE)}: means with {level} intervals, by arrival rate",
+    tables.estimates(of_age, ["policy", "uavs", "n"], "arrival_rate", numbers.quantities),
+    f"{names.metric_label(names.AGE)}, by arrival rate",
     data=means,
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+#
+# No UAV can fill its quota, so every mission lasts to its last slot. The zone is in the middle of
+# the grid of 25 nodes; the rest is the paper's scenario. The age of a mission is the mean over time
+# and nodes, the peak age that just before nodes are emptied. `greedy` weighs the data of nodes
+# against the distance, `age` their age.
 
 # %%
 html.provenance([study])

@@ -9,10 +9,9 @@
 # ---
 
 # %% [markdown]
-# # What failures of UAVs cost
+# # What do failures of UAVs cost?
 #
-# This page shows how the performance of a fleet degrades with the failure rate of its UAVs, if they
-# are lost, and if they are repaired.
+# How the performance of a fleet falls with the failure rate, with repairs and without.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of the study failures
@@ -35,45 +34,46 @@ columns = [c for c in ("failures", "slots_grounded", "lost") if c in study.missi
 counts = [c for c in columns if study.missions[c].max() > 0]
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
 means = operations.means(study, [*metrics, *counts])
-missions = numbers.span(means.loc[means["metric"].isin(metrics), "n"])
-level = numbers.level(LEVEL)
 rate, repair = operations.RATE, operations.REPAIR
-
-# %%
-html.say("{answer}", answer=html.composed(operations.failures(study)))
-
-# %% [markdown]
-# ## What was simulated
-#
-# The mission is that of the paper. In every mission slot, each UAV fails with the same probability.
-# A failed UAV is lost for the rest of the mission, or is grounded and repaired after a random time.
-# The data that a lost UAV has collected count. A mission succeeds only if every UAV fills its
-# quota, so a single lost UAV makes it fail; the collection ratio shows how far the others make up
-# for it. All rates meet the same random draws (common random numbers).
-
-# %% [markdown]
-# ## Product, success and collection ratio
-
-# %%
-html.gallery(
-    [
-        (
-            lines(means[means["metric"] == metric], rate, "uavs", metric, repair),
-            f"{names.metric_name(metric)} against the failure rate, by number of UAVs",
-            f"n = {missions} missions per point; bars are {level} intervals. A mean time of a "
-            "repair of 0 means that a failed UAV is lost.",
-        )
-        for metric in metrics
-    ]
+caption = (
+    f"n = {numbers.span(means.loc[means['metric'].isin(metrics), 'n'])} missions per dot; bars are "
+    f"{numbers.level(LEVEL)} intervals. A repair time of 0 means that a failed UAV is lost."
 )
+drawn = [
+    (
+        lines(means[means["metric"] == metric], rate, "uavs", metric, repair),
+        f"{names.metric_name(metric)} against the failure rate, by number of UAVs",
+        caption,
+    )
+    for metric in metrics
+]
+
+# %%
+html.answer(operations.failures(study))
+
+# %%
+html.lead(*drawn[0])
+
+# %% [markdown]
+# ## Why
+#
+# A mission succeeds only if every UAV fills its quota, so one lost UAV makes it fail. What it has
+# collected still counts in the collection ratio, which shows how far the others make up for it.
+
+# %%
+html.gallery(drawn[1:])
+
+# %% [markdown]
+# ## How far to trust it
+#
+# All rates meet the same random draws, so the differences are paired.
 
 # %%
 display(
     *(
         html.table(
-            tables.estimates(change, ["policy", "uavs", repair], rate, numbers.points),
-            f"{names.metric_name(metric)} minus that without failures: paired differences in "
-            f"percentage points with {level} intervals, by failure rate per mission slot",
+            tables.estimates(change, ["policy", "uavs", repair, "n"], rate, numbers.points),
+            f"{names.metric_name(metric)} minus that without failures, in points, by failure rate",
             data=change,
         )
         for metric in metrics
@@ -82,15 +82,14 @@ display(
 )
 
 # %% [markdown]
-# ## How often UAVs fail
+# ## Tables
 
 # %%
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "uavs", repair], rate, numbers.quantities),
-            f"{names.metric_label(metric)} per mission: means with {level} intervals, by failure "
-            "rate per mission slot; nothing where nothing can fail",
+            tables.estimates(rows, ["policy", "uavs", repair, "n"], rate, numbers.quantities),
+            f"{names.metric_label(metric)} per mission, by failure rate; empty: nothing can fail",
         )
         for metric in counts
         for rows in [means[means["metric"] == metric]]
@@ -98,7 +97,10 @@ display(
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+#
+# The mission is that of the paper. In every slot, each UAV fails with the same probability; then it
+# is lost, or grounded and repaired after a random time.
 
 # %%
 html.provenance([study])

@@ -9,10 +9,9 @@
 # ---
 
 # %% [markdown]
-# # How many charging pads
+# # How many charging pads does a fleet need?
 #
-# This page shows how many charging pads fleets of different sizes need, and how long UAVs wait for
-# a pad if there are fewer.
+# The fewest pads that are enough for fleets of different sizes, and the waits with fewer.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of the study pads
@@ -34,63 +33,32 @@ from reports.pages import html
 # %%
 study = load_results(Path(results) / "pads")
 uses = ["waiting", "queue", names.UTILISATION]
-metrics = [names.SUCCESS, names.PRODUCT, *uses]
-means = operations.means(study, metrics)
-missions = numbers.span(means["n"])
-level = numbers.level(LEVEL)
-
-# %%
-html.say("{answer}", answer=html.composed(operations.pads(study, margin)))
-
-# %% [markdown]
-# ## What was simulated
-#
-# The mission is that of the paper: UAVs start in a zone of 16 cells, collect data until their quota
-# is filled, and return to the zone to charge. Pads are given to UAVs in the order of their requests
-# (first come, first served). All numbers of pads meet the same random draws (common random
-# numbers). Waits are planned, which is the default of all scenarios (`charging.plan_waits`): the
-# return guard sends a UAV home earlier if it must expect to wait for a pad. A UAV that finds all
-# pads in use waits, and flying in place takes battery.
-
-# %% [markdown]
-# ## Success and product
-
-# %%
-drawn = [
-    (
-        lines(means[means["metric"] == metric], "pads", "uavs", metric, "policy"),
-        f"{names.metric_name(metric)} against the number of pads, by number of UAVs",
-        f"n = {missions} missions per point; bars are {level} intervals.",
-    )
-    for metric in metrics
-]
-html.gallery(drawn[:2])
-
-# %%
-lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
-html.table(
-    tables.estimates(lost, ["policy", "pads"], "uavs", numbers.points),
-    "Collection ratio and communication with fewer pads, minus that with the most pads: paired "
-    f"differences in percentage points with {level} intervals, by number of UAVs",
-    data=lost,
+means = operations.means(study, [names.PRODUCT, names.SUCCESS, *uses])
+caption = (
+    f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
 )
-
-# %% [markdown]
-# ## Waiting, queue and use of the pads
-#
-# The waiting time of a request ends when the UAV is given a pad or gives up. The queue and the
-# utilisation are means over the time of the mission: the number of UAVs that wait, and the share of
-# the pads in use. A mission in which no UAV asked for a pad has no waiting time.
+drawn = {
+    metric: (
+        lines(rows, "pads", "uavs", str(metric), "policy"),
+        f"{names.metric_name(str(metric))} against the number of pads, by number of UAVs",
+        caption,
+        rows,
+    )
+    for metric, rows in means.groupby("metric", sort=False)
+}
 
 # %%
-html.gallery(drawn[2:])
+html.answer(operations.pads(study, margin))
+
+# %%
+html.lead(*drawn[names.PRODUCT])
 
 # %% [markdown]
-# ### The queue over time
+# ## Why
 #
-# All UAVs take off together, so their batteries reach the charging threshold at about the same time
-# and the queue comes in a wave. The figure shows, for every fleet, a single pad, and the largest
-# number of pads that is not enough.
+# All UAVs take off together, so they come home to charge in waves. Pads are given in the order of
+# requests; a UAV that waits flies in place and uses its battery. The return guard plans for waits
+# and sends UAVs home earlier, so few pads cost data rather than success.
 
 # %%
 waves = operations.queues(study, study.policies[0], operations.short_of_pads(study, margin))
@@ -99,17 +67,41 @@ titles = {uavs: f"UAVs that wait for a pad: {uavs} UAVs" for uavs in waves["uavs
 html.figure(
     courses(waves.assign(panel=waves["uavs"]), "pads", "", titles, "Number of charging pads"),
     "The number of UAVs that wait for a pad over the slots of the mission",
-    f"The line is the mean of n = {waves['n'].min()} missions, the band has the missions between "
-    f"the {low} and the {high} quantile. A mission that is over has no queue.",
+    f"Mean of n = {waves['n'].min()} missions; the band is from the {low} to the {high} quantile.",
     waves,
 )
+
+# %%
+html.gallery([drawn[metric] for metric in (*uses, names.SUCCESS)])
+
+# %% [markdown]
+# ## How far to trust it
+
+# %%
+html.say(
+    "Pads are enough if the interval of the loss against a pad for every UAV is above −{margin}, "
+    "here and with more pads. They are too few if the interval is below 0. Between the two, more "
+    "missions or other numbers of pads would decide.",
+    margin=numbers.margin(margin),
+)
+
+# %%
+lost = operations.changes(study, "pads", study.missions["pads"].max(), names.PRODUCT)
+html.table(
+    tables.estimates(lost, ["policy", "pads", "n"], "uavs", numbers.points),
+    "Product minus that with the most pads: paired differences in points, by number of UAVs",
+    data=lost,
+)
+
+# %% [markdown]
+# ## Tables
 
 # %%
 display(
     *(
         html.table(
-            tables.estimates(rows, ["policy", "pads"], "uavs", numbers.written(metric)),
-            f"{names.metric_label(metric)}: means with {level} intervals, by number of UAVs",
+            tables.estimates(rows, ["policy", "pads", "n"], "uavs", numbers.written(metric)),
+            f"{names.metric_label(metric)}, by number of UAVs",
         )
         for metric in uses
         for rows in [means[means["metric"] == metric]]
@@ -117,7 +109,10 @@ display(
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+#
+# The mission is that of the paper, with a zone of 16 cells. A waiting time ends when the UAV is
+# given a pad or gives up. Queue and utilisation are means over the time of the mission.
 
 # %%
 html.provenance([study])

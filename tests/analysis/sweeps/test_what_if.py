@@ -43,7 +43,7 @@ def test_the_answer_has_the_difference_of_every_policy(asked: WhatIf) -> None:
     pd.testing.assert_frame_equal(table, answer.answers(asked.results))
     lines = asked.answer().splitlines()
     for line, policy in zip(lines, asked.results.policies, strict=False):
-        assert line.startswith(f"- **{policy}**: collection ratio and communication is")
+        assert line.startswith(f"- **{policy}**: product is")
     assert "in the variation" in lines[-1]
     assert asked._repr_markdown_() == asked.answer()  # what Jupyter shows
 

@@ -39,4 +39,4 @@ def test_the_policy_of_the_example_is_the_best_one(results: Path, text: str) -> 
     missions = pd.read_parquet(results / "fig1" / "missions")
     means = missions.groupby("policy")[PRODUCT].mean()
     assert f"The policy of this mission is {means.idxmax()}, the best of " in text
-    assert f"collection ratio and communication: {100 * means.max():.1f} % [" in text
+    assert f"product: {100 * means.max():.1f} % [" in text

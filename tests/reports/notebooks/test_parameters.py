@@ -14,7 +14,7 @@ from tests.by_hand import bounded
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
 PRODUCT = "collection_ratio_and_communication"
-PRINTED = 0.93  # collection ratio and communication at the paper's sweet spot
+PRINTED = 0.93  # product at the paper's sweet spot
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def test_every_parameter_is_shown_from_its_first_value_to_its_last(
 def test_the_sweet_spot_is_checked_by_missions_of_its_own(results: Path, text: str) -> None:
     """And metrics without variance have no Sobol indices."""
     assert "greedy Collection ratio Number of UAVs" in text
-    assert "greedy Successful communication Number of UAVs" not in text
+    assert "greedy Success Number of UAVs" not in text
     checks = load_results(results / "sweet-spot").checks
     for policy in POLICIES:
         values = checks.loc[checks["policy"] == policy, PRODUCT].to_numpy(float)

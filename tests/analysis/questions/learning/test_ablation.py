@@ -56,7 +56,7 @@ def test_the_table_of_text_has_a_row_per_variant(last: pd.DataFrame) -> None:
     base = [3, "72.0 % [67.0, 77.0]", "[62.1, 81.9]", "", "", "100.0 %", "82.0 %"]
     assert rows.loc["base"].tolist() == base
     assert rows.loc["once", "One new training"] == ""
-    assert rows.loc["once", "Collection ratio and communication"] == "73.0 %"
+    assert rows.loc["once", "Product"] == "73.0 %"
     assert rows.loc["worse", "Difference from base [points]"].startswith("−61.0 [")
     assert [cell[-1:] for cell in rows["Difference from base [points]"]] == ["≈", "", "▼"]
     assert rows.loc["worse", "p (Holm)"] == "< 0.001"

@@ -173,7 +173,7 @@ def answer_of(metric, difference, low, high, **more):
 )
 def test_a_conclusion_names_the_side_of_the_whole_interval(ends, words):
     text = what_if_answer.conclusions(answer_of(PRODUCT, *ends))
-    assert text.startswith(f"- **greedy**: collection ratio and communication {words}: from 90.0 %")
+    assert text.startswith(f"- **greedy**: product {words}: from 90.0 %")
 
 
 def test_an_inconclusive_answer_says_how_many_missions_it_takes():
