@@ -13,8 +13,9 @@ from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
 SUCCESS, RATIO = "success", "collection_ratio"
 PRODUCT, REWARD = "collection_ratio_and_communication", "reward"
 
-# The paper's metrics, in its order (Section VI-A). It calls them successful communication, collection
-# ratio, and collection ratio and communication; the last is here the product of each mission.
+# The paper's metrics, in its order (Section VI-A). It calls them successful communication,
+# collection ratio, and collection ratio and communication; the last is here the product of each
+# mission.
 METRICS = {
     SUCCESS: "Success",
     RATIO: "Collection ratio",

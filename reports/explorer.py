@@ -95,6 +95,13 @@ class Grid:
         """The rows of ``means`` of the design point ``start``."""
         return self.means[self.means["point"] == self.start]
 
+    def answer(self) -> str:
+        """The policies at the design point ``start``, the best first."""
+        rows = self.at_start()
+        best = rows[rows["metric"] == names.PRODUCT].sort_values("mean", ascending=False)
+        parts = [f"{row.policy} {numbers.percent(row.mean)}" for row in best.itertuples()]
+        return f"In the middle of all ranges the product is {numbers.words(parts)}; move a slider."
+
     def table(self) -> pd.DataFrame:
         """The means of all settings: the fields, then the columns of ``analysis.summary``."""
         return self.means.join(points(self.results), on="point")[

@@ -171,6 +171,12 @@ def answers(results: Results, table: pd.DataFrame) -> list[str]:
     return sentences
 
 
+def cheapest_fleet(results: Results) -> str:
+    """The cheapest fleet of the first policy that meets the requirements under every condition."""
+    found = selections(results)
+    return str(found[found["policy"] == results.policies[0]]["setting"].iloc[-1])
+
+
 def selections(results: Results) -> pd.DataFrame:
     """What was selected by a study that searches for the cheapest settings.
 

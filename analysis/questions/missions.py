@@ -53,6 +53,11 @@ class LoggedMission:
         return f"{self.row['collected']:.1f} of {total:.1f} data units collected"
 
     @property
+    def fleet(self) -> str:
+        """The fleet of the mission, as ``3 UAVs``."""
+        return f"{self.scenario.uavs} UAV{'s' * (self.scenario.uavs > 1)}"
+
+    @property
     def caption(self) -> str:
         """What happened in the mission, as the caption of a figure."""
         policy, replication = self.row["policy"], self.row["replication"]
@@ -67,6 +72,17 @@ class LoggedMission:
             f"{'; '.join(fates) or 'no battery is depleted'}. "
             f"{self.collected} in {self.row['slots']} mission slots."
         )
+
+
+def answer(missions: Sequence[LoggedMission]) -> str:
+    """What share of the data single missions of fleets of different sizes collect."""
+    parts = [
+        f"{m.fleet} {numbers.percent(m.row[RATIO])} in {m.row['slots']} slots" for m in missions
+    ]
+    return (
+        f"In one mission of {missions[0].row['policy']} each, {numbers.words(parts)}: the UAVs "
+        "share the nodes, and fly home to charge before their batteries are empty."
+    )
 
 
 def logged_mission(

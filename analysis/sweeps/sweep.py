@@ -83,6 +83,10 @@ class Sweep:
         lines = costs.answers(self.results, costs.judged(self.results))
         return [line.replace("**", "").replace("`", "") for line in lines]
 
+    def cheapest(self) -> str:
+        """With requirements: the cheapest fleet of the first policy for all conditions."""
+        return costs.cheapest_fleet(self.results) if self.study.selection else ""
+
     @property
     def fields(self) -> list[str]:
         """The swept fields."""

@@ -81,6 +81,10 @@ class WhatIf:
             f"The highest mean: in the baseline {before}; in the variation {after}."
         )
 
+    def sentence(self) -> str:
+        """What the variation changes, in a sentence."""
+        return answer.sentence(self.results, self.table())
+
     def _repr_markdown_(self) -> str:
         return self.answer()
 

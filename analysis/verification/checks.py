@@ -141,6 +141,16 @@ def _reason(row: pd.Series) -> str:
     return f"error {row['error']:.2g}, allowed {row['bound']:.2g}"
 
 
+def answer(judged: pd.DataFrame) -> str:
+    """How many checks hold, in a sentence."""
+    held, refuted = (len(_tests(judged, verdict)) for verdict in (HOLDS, REFUTED))
+    exact, chance = judged["error"].count(), judged["p"].count()
+    return (
+        f"{held} of {len(judged)} comparisons with theory hold and {refuted} do not; {exact} are "
+        f"exact, {chance} are statistical."
+    )
+
+
 def overall(judged: pd.DataFrame) -> str:
     """A summary of all checks, as Markdown.
 

@@ -47,8 +47,8 @@ lowest, highest = (numbers.difference(end, 0) for end in missions["difference"].
 html.lead(
     figures.distribution(missions, pair),
     f"Distribution of the difference {title} of the product over the missions",
-    f"Share of the missions (n = {len(missions):,}) with at most the difference on the axis, with a "
-    f"95 % band for the whole curve; from {lowest} to {highest} points.",
+    f"Share of the missions (n = {len(missions):,}) with at most the difference on the axis, with "
+    f"a 95 % band for the whole curve; from {lowest} to {highest} points.",
 )
 
 # %% [markdown]
@@ -106,9 +106,10 @@ html.gallery(
 # %% [markdown]
 # ## How far to trust it
 #
-# P-values are corrected for the number of comparisons (Holm) and for choosing the pair by these data
-# (Bonferroni); every interval has its level alone. A learner with several trainings is judged by
-# their mean; *one new training* is a prediction interval. A single training stands for itself only.
+# P-values are corrected for the number of comparisons (Holm) and for choosing the pair by these
+# data (Bonferroni); every interval has its level alone. A learner with several trainings is judged
+# by their mean; *one new training* is a prediction interval. A single training stands for itself
+# only.
 
 # %%
 found = {
@@ -137,7 +138,8 @@ display(
     ),
     html.table(
         regions.listed(leaves, policy),
-        f"{policy} is {regions.tally(leaves)} regions of a regression tree, fitted to the other half",
+        f"{policy} is {regions.tally(leaves)} regions of a regression tree, fitted to the other "
+        "half",
     ),
     html.table(
         head_to_head.listed(worst, study, pair),

@@ -10,10 +10,9 @@
 # ---
 
 # %% [markdown]
-# # Explorer
+# # What does each parameter change?
 #
-# Change the parameters of the paper with sliders and see their effect: the three metrics of every
-# policy at every setting of a grid, with confidence intervals, and curves along each parameter.
+# Sliders for the parameters of the paper, and the metrics of every policy at each setting.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder with the results folder of explorer
@@ -24,7 +23,6 @@ from pathlib import Path
 from analysis import load_results, names, numbers
 from analysis.figures.settings import performance
 from analysis.questions.settings import in_words
-from analysis.stats.intervals import LEVEL
 from reports.explorer import Grid, explorer
 from reports.pages import html
 
@@ -34,31 +32,20 @@ grid = Grid(study)
 start = grid.at_start()
 
 # %%
+html.answer(grid.answer())
+
+# %%
 explorer(study)
 
-# %%
-html.say(
-    "A dot is a mean, and the bar is its {level} confidence interval. At every setting, each "
-    "policy is simulated in the same {missions} replications.",
-    level=numbers.level(LEVEL),
-    missions=numbers.span(start["n"]),
-)
-
 # %% [markdown]
-# The thin lines are at 0, 50 and 100 %. All replications have the same random initial data,
-# arrivals and shadowing. Therefore two settings, or two policies, may differ significantly although
-# their intervals overlap. A [what-if question](what-if.html) compares two settings mission by
-# mission.
+# ## How far to trust it
 
 # %%
 html.say(
-    "All other fields are those of the scenario {name}, among them {nodes} sensor nodes on "
-    "{s.grid} x {s.grid} cells, {s.charging_pads} charging pads, a quota of {s.quota:,} "
-    "communication slots for each UAV, and on average {s.arrival_rate:g} data units that arrive "
-    "per node and mission slot.",
-    s=study.scenario(),
-    nodes=len(study.scenario().nodes),
-    name=study.manifest["study"]["scenario"],
+    "A dot is a mean over n = {missions} missions, its bar the 95 % interval. All settings have "
+    "the same random draws, so two settings may differ although their intervals overlap; a "
+    "[what-if question](what-if.html) compares them mission by mission.",
+    missions=numbers.span(start["n"]),
 )
 
 # %% [markdown]
@@ -78,7 +65,17 @@ table = numbers.wide(start, "policy").rename(columns=names.METRICS).reset_index(
 html.table(table, "The same in numbers; the CSV file has all settings", data=grid.table())
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+
+# %%
+html.say(
+    "All other fields are those of the scenario {name}, such as {nodes} sensor nodes, {grid} x "
+    "{grid} cells and a quota of {quota:,} communication slots.",
+    name=study.manifest["study"]["scenario"],
+    nodes=len(study.scenario().nodes),
+    grid=study.scenario().grid,
+    quota=study.scenario().quota,
+)
 
 # %%
 html.provenance([study])

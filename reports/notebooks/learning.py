@@ -9,10 +9,9 @@
 # ---
 
 # %% [markdown]
-# # Learning
+# # What makes learning work?
 #
-# This page shows how the learned policies were trained: with and without transfer learning as in
-# the paper's Fig. 3, the effect of each method of learning, and the curves of the shipped policies.
+# The trainings of the learned policies: transfer learning, and the effect of each method.
 
 # %% tags=["parameters"]
 trained = None  # folder with curves.parquet and a folder per policy; None for the shipped ones
@@ -20,6 +19,7 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 # %%
 from pathlib import Path
 
+from IPython.display import display
 from matplotlib.figure import Figure
 
 from analysis import numbers
@@ -39,25 +39,38 @@ trainings = read_curves(folder / "curves.parquet")
 last, final = ablation.finals(trainings), f"final_{PRODUCT}"
 baseline, pairs = ablation.BASELINE, learning.pairs_in(trainings)
 
-# %% [markdown]
-# ## <a id="fig-3"></a>With and without transfer learning: the paper's Fig. 3
-#
-# With transfer learning, phase I trains without battery decrease, and phase II begins with the
-# weights of phase I (the paper's Algorithm 1). Without it, all steps belong to phase II. The paper
-# claims that the agent with transfer learning has a higher reward at every step, overtakes the
-# other one in product, and ends higher, and that training without
-# transfer learning levels off early at a low value.
+table = ablation.ablation(last, final, baseline)
 
 # %%
-html.say(
-    "Each training makes {updates} updates and simulates {slots} million UAV-slots.",
-    updates=numbers.span(last["updates"]),
-    slots=numbers.span(last["uav_slots"] / 1e6, "{:.1f}"),
+html.answer(ablation.answer(table, baseline))
+
+# %%
+html.lead(
+    figures.ablation(table, last, final, baseline),
+    "The product that the trainings of every variant reach",
+    "A dot is a training; a diamond is the mean of n trainings with its 95 % interval (Student's "
+    f"t). Dashed: the mean of {baseline}. An arrow: all trainings are left of the axis.",
 )
 
 # %% [markdown]
-# Trainings of a variant differ only in their seed. The curves show the policy without exploration
-# on evaluation missions. Left of the vertical line, in phase I, these have no battery decrease.
+# ## Why: the effect of each method
+#
+# Every variant is the config `quick` with one change and the same number of updates, evaluated on
+# missions that were used neither for training nor for selecting weights.
+#
+# - **guard**: the return guard masks actions after which it is too late to return for charging.
+# - **low-battery starts**: some missions begin in the zone, with little battery left.
+# - **early returns**: some UAVs return to charge as soon as they may.
+# - **none of the three**: only the methods of the paper.
+# - **transfer**: phase I without battery decrease comes first.
+# - **nodes**, **maps**: another observation and network; **maps** is the paper's.
+# - **environments**: missions simulated in parallel.
+
+# %% [markdown]
+# ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
+#
+# With transfer learning, phase I (left of the vertical line) trains without battery decrease. The
+# paper claims a higher reward at every step, and a higher product in the end.
 
 
 # %%
@@ -71,75 +84,6 @@ def with_and_without(name: str, metric: str) -> tuple[Figure, str, str]:
 metrics = (learning.REWARD, learning.PRODUCT)
 drawn = dict.fromkeys([[*pairs][0], [*pairs][-1]])
 html.gallery([with_and_without(name, metric) for name in drawn for metric in metrics])
-
-# %%
-transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
-by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"]), strict=True))
-verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
-html.say(
-    "**The rules here**, with Welch's t over the trainings:\n\n"
-    "- of the reward: {rules[0]}\n- of product: {rules[1]}",
-    rules=[rule.in_words(verdict_rules.MARGIN) for rule in by_metric.values()],
-)
-
-# %%
-html.table(
-    learning.transfer_table(transfers, verdicts),
-    "The verdicts follow from the mean curves and from the last difference with its 99 % interval "
-    "(for product, in percentage points)",
-)
-
-# %%
-best = last.groupby("variant")[final].max().map(numbers.percent)
-html.say(
-    "The trainings here have {steps:,} steps. In the paper, the curves cross at {paper:,} steps; "
-    "by the rules, shorter trainings are inconclusive. With {name}, the best training with "
-    "transfer reaches {ends[0]} in product, the best without {ends[1]}.",
-    steps=last["updates"].max(),
-    paper=paper.CROSSING,
-    name=[*pairs][-1],
-    ends=[best[variant] for variant in pairs[[*pairs][-1]]],
-)
-
-# %% [markdown]
-# ## The effect of each method of learning
-#
-# These are trainings of the config `quick`, each with one change and the same number of updates.
-# The selected weights are evaluated on the same missions, which were used neither for training nor
-# for selecting weights.
-#
-# - **guard**: the return guard masks actions after which it is too late to return for charging.
-# - **low-battery starts**: some missions begin in the zone, with little battery left.
-# - **early returns**: some UAVs return to charge as soon as they may.
-# - **none of the three**: none of these methods; only those of the paper.
-# - **transfer**: phase I without battery decrease comes first.
-# - **nodes**, **maps**: another observation and network; **maps** is the paper's.
-# - **environments**: missions simulated in parallel; with fewer, an update has less new experience.
-
-# %%
-table = ablation.ablation(last, final, baseline)
-html.figure(
-    figures.ablation(table, last, final, baseline),
-    "Product that the trainings of every variant reach",
-    "A dot is a training; a diamond is the mean of n trainings with its 95 % interval (Student's t "
-    "over the trainings). A single training has neither interval nor diamond. The dashed line is "
-    f"the mean of {baseline}. An arrow means that all trainings are left of the axis.",
-)
-
-# %%
-html.table(
-    ablation.ablation_table(table, last, baseline),
-    "Means over n trainings with 95 % confidence intervals of the expected result, then the 95 % "
-    "prediction interval of one new training, except for single or equal trainings. Differences "
-    "have Welch's t interval. For a single training it is Student's t with the variance of "
-    f"{baseline}; it contains 0 if the training could be one more training of {baseline}. "
-    "▲ the interval is above 0 (better), ▼ below 0 (worse), ≈ contains 0 (inconclusive)",
-)
-
-# %% [markdown]
-# With so many intervals, some do not contain the true value by chance; the p-values are corrected
-# for the number of tests (Holm). For a variant that was trained once, only large differences can be
-# significant.
 
 # %% [markdown]
 # ## The shipped policies
@@ -169,28 +113,66 @@ def once(policy: policies.Trained) -> tuple[Figure, str, str]:
 
 html.gallery([once(policy) for policy in shipped])
 
+# %% [markdown]
+# ## How far to trust it
+#
+# Trainings of a variant differ only in their seed. A variant that was trained once has neither
+# interval nor mean; only large differences of it can be significant. P-values are corrected for the
+# number of tests (Holm).
+
+# %%
+transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
+by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"]), strict=True))
+verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
+best = last.groupby("variant")[final].max().map(numbers.percent)
+html.say(
+    "The trainings have {steps:,} steps; in the paper the curves cross at {paper:,}, and shorter "
+    "trainings are inconclusive. With {name}, the best training with transfer reaches a product of "
+    "{ends[0]}, the best without {ends[1]}.",
+    steps=last["updates"].max(),
+    paper=paper.CROSSING,
+    name=[*pairs][-1],
+    ends=[best[variant] for variant in pairs[[*pairs][-1]]],
+)
+
+# %% [markdown]
+# ## Tables
+
+# %%
+display(
+    html.table(
+        ablation.ablation_table(table, last, baseline),
+        "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
+        "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
+    ),
+    html.table(
+        learning.transfer_table(transfers, verdicts),
+        "With transfer against without: the last difference with its 99 % interval (of the product "
+        "in points)",
+    ),
+    html.table(policies.settings_table(shipped), "The settings of the shipped policies"),
+)
+
+# %% [markdown]
+# ## How this page was made
+
 # %%
 html.say(
-    "From which step on the exponential moving average of product does "
-    "not improve any more. Minutes are elapsed time, and other programs may have slowed the "
-    "training down.\n\n{courses}",
+    "Each training makes {updates} updates and simulates {slots} million UAV-slots. From which "
+    "step on the moving average of the product does not improve any more:\n\n{courses}",
+    updates=numbers.span(last["updates"]),
+    slots=numbers.span(last["uav_slots"] / 1e6, "{:.1f}"),
     courses=html.composed(
         "\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped)
     ),
 )
 
 # %% [markdown]
-# ## Where the figures come from
-#
-# This page reads no study: the curves are shipped with the policies, in `policies/trained`. These
-# commands make them again:
+# The curves are shipped with the policies, in `policies/trained`. These commands make them again:
 
 # %%
 curves = "python -m reports.tools.learning_curves --out runs/learning"
 html.say("{lines}", lines=html.commands([curves, *policies.commands(shipped)]))
-
-# %%
-html.table(policies.settings_table(shipped))
 
 # %%
 html.weights(folder)

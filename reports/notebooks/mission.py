@@ -10,11 +10,9 @@
 # ---
 
 # %% [markdown]
-# # Missions
+# # What does a mission look like?
 #
-# This page shows where the UAVs fly, which sensor nodes they serve on the way, when they charge,
-# and how much data is left. Missions like those of the paper's Fig. 1 and Fig. 4 are drawn, and can
-# be played slot by slot.
+# Where UAVs fly, which nodes they serve and when they charge, slot by slot.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder that holds the results folders of the studies fig1 and fig4
@@ -38,66 +36,55 @@ from reports.player import READING, library, player
 
 # %%
 fig1, fig4 = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
-shown_policy = policy or best_policy(fig4.missions)
+shown_policy, best = policy or best_policy(fig4.missions), best_policy(fig1.missions)
 seed = fig4.manifest["seed"]
 points = range(len(fig4.manifest["points"]))
 shown = [missions.logged_mission(fig4, shown_policy, point, replication) for point in points]
 printed = [paper.FIG_4[mission.scenario.uavs][RATIO] for mission in shown]
-
-# %% [markdown]
-# ## One UAV on a small map: the paper's Fig. 1
-
-# %%
-best = best_policy(fig1.missions)
 example = missions.logged_mission(fig1, best, 0, replication)
-mean = missions.estimate(fig1, best)
-html.say(
-    "The map has {grid} x {grid} cells and {nodes} nodes. The policy of this mission is "
-    "**{best}**, the best of {policies} by product: {mean}, n = {n:,}.",
-    grid=example.scenario.grid, nodes=len(example.scenario.nodes), best=best,
-    policies=numbers.words(fig1.policies), mean=numbers.estimate(mean), n=mean["n"],
-)  # fmt: skip
-
-# %% [markdown]
-# The paper draws this example without numbers, so nothing can be compared. A learned policy works
-# only on the map of its training, so none can be used here.
 
 # %%
-caption = (
-    f"n = 1 mission, replication {replication} of seed {fig1.manifest['seed']}: "
-    f"{example.row['slots']} mission slots, {example.collected}."
-)
-alt = "Map of the mission; battery, residual data and charging"
-html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
+html.answer(missions.answer(shown))
+
+# %%
+library()
+
+
+# %%
+def played(number: int) -> html.HTML:
+    mission = shown[number]
+    title = f"{mission.fleet}: {numbers.percent(mission.row[RATIO])} collected"
+    caption = (
+        f"n = 1 mission of {shown_policy}, replication {replication} of seed {seed}, "
+        f"{mission.row['slots']} mission slots."
+    )
+    name = f"player-{mission.scenario.uavs}"
+    return player(mission.log, mission.scenario, name, title, caption)
+
+
+played(-1)
 
 # %% [markdown]
-# **How to read the map.** Every sensor node has a colour. An arrow is the move of a UAV in one
-# mission slot; it has the colour of the node that was served in most communication slots of that
-# slot (on a tie, the last of them), and is grey if no node was served. A cross is a slot in which
-# the UAV hovered, in the same colours, a star a slot in which it charged. A UAV starts at a
-# numbered diamond, and its mission ends at a dot. UAVs on the same path are drawn side by side. The
-# y axis points south.
+# ## How to read it
+
+# %%
+html.say("{reading}", reading=READING)
+
+# %% [markdown]
+# On the maps, an arrow is a move in one slot, in the colour of the node that was served most in it;
+# it is grey if none was. A cross is a slot of hovering, a star one of charging, a numbered diamond
+# the start, a dot the end. The y axis points south.
+
+# %% [markdown]
+# ## With fewer UAVs
+
+# %%
+display(*map(played, range(len(shown) - 1)))
+
+# %% [markdown]
+# ## <a id="fig-4"></a>The paper's Fig. 4
 #
-# **How to read the curves.** A UAV may start to charge when its battery is at or below
-# C<sub>S</sub>; charging ends at C<sub>C</sub>. Each band of residual data is one node, in its
-# colour. A band that remains at the end is a node that still has data.
-
-# %% [markdown]
-# ## <a id="fig-4"></a>From one to three UAVs: the paper's Fig. 4
-
-# %%
-mean = missions.estimate(fig4, shown_policy)
-html.say(
-    "The policy is **{policy}**: the mean of its product over the three "
-    "numbers of UAVs is {mean}, each number with the same weight ({n:,} missions in all). The best "
-    "policy of the study is {best}. Each column is replication {replication} of seed {seed}.",
-    policy=shown_policy, mean=numbers.estimate(mean), n=mean["n"],
-    best=best_policy(fig4.missions), replication=replication, seed=seed,
-)  # fmt: skip
-
-# %% [markdown]
-# Each is a single mission: an example, not an average. All three have the same random initial data,
-# arrivals and shadowing; only the number of UAVs differs.
+# The missions have the same initial data, arrivals and shadowing; only the number of UAVs differs.
 
 
 # %%
@@ -108,55 +95,43 @@ def captioned(point: int) -> tuple[Figure, str, str]:
         f"policy, n = {mean['n']:,}, is {numbers.estimate(mean)}, the paper's "
         f"{numbers.percent(printed[point])}."
     )
-    alt = (
-        f"Map of the mission with I = {mission.scenario.uavs}; battery, residual data and charging"
-    )
+    alt = f"Map of the mission with {mission.fleet}; battery, residual data and charging"
     return mission_figure(mission.log, mission.scenario), alt, caption
 
 
 html.gallery([captioned(point) for point in points])
 
 # %% [markdown]
-# A UAV seldom runs out of energy on its way, because all policies here act under the return guard:
-# it allows only actions after which a UAV can still reach the charging zone in time.
-
-# %% [markdown]
-# ## Slot by slot
+# ## The paper's Fig. 1
 #
-# The players show the same missions: press *Play*, or move the slider.
+# The paper draws a small map without numbers. A learned policy works only on the map of its
+# training, so a heuristic is shown.
 
 # %%
-display(html.say("{reading}", reading=READING))
-library()
-
-# %%
-for mission in shown:
-    title = f"I = {mission.scenario.uavs}: {numbers.percent(mission.row[RATIO])} collected"
-    caption = (
-        f"n = 1 mission of {shown_policy}, replication {replication} of seed {seed}, "
-        f"{mission.row['slots']} mission slots, {len(mission.log):,} events. A single mission has "
-        "no interval."
-    )
-    name = f"player-{mission.scenario.uavs}"
-    display(player(mission.log, mission.scenario, name, title, caption))
+caption = (
+    f"n = 1 mission of {best}, replication {replication} of seed {fig1.manifest['seed']}: "
+    f"{example.row['slots']} mission slots, {example.collected}."
+)
+alt = "Map of the mission; battery, residual data and charging"
+html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 
 # %% [markdown]
-# ## The missions in numbers
-
-# %%
-html.table(missions.outcome_table(shown), "The three missions; data in data units")
+# ## How far to trust it
+#
+# Each is a single mission: an example, not an average. The captions of Fig. 4 have the means.
 
 # %% [markdown]
-# ## Every UAV
+# ## Tables
 
 # %%
-html.table(
-    missions.uav_table(shown),
-    "Communications are the communication slots that count towards the quota",
+uavs = "Every UAV; communications are the communication slots that count towards the quota"
+display(
+    html.table(missions.outcome_table(shown), "The missions; data in data units"),
+    html.table(missions.uav_table(shown), uavs),
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
 #
 # These commands simulate the missions again:
 

@@ -9,10 +9,9 @@
 # ---
 
 # %% [markdown]
-# # An own sea
+# # Which fleet is the cheapest for a sea of our own?
 #
-# This page leads from the coordinates of sensor nodes to a decision: which is the cheapest fleet
-# that meets the requirements at this sea, and why a cheaper fleet does not meet them.
+# From the coordinates of sensor nodes to the cheapest fleet that meets the requirements.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the sweep is kept
@@ -37,10 +36,68 @@ from dess import load_scenario
 from policies import load_team
 from reports.pages import html
 
+# %%
+sea = load_scenario(scenario)
+priced = {**prices, "currency": currency, "missions": planned}
+about = (scenario, policies, missions, seed, results, workers, priced, requirements)
+answer = sweep(*about, yes=yes, **fields)
+costs, found = answer.table("cost"), answer.answers()
+
+# %%
+html.answer(found[-1], answer.cheapest() or "none")
+
+# %%
+html.lead(
+    answer.plot(metric="success"),
+    "Success against the number of UAVs, by number of pads",
+    "Bars are 95 % intervals; n is small for settings that were ruled out early (see the table).",
+)
+
 # %% [markdown]
-# ## The sea
+# ## Why
+
+# %%
+html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in found)))
+
+# %%
+mission = mission_of(load_scenario(scenario, **example), load_team(policies[0]), seed)
+html.gallery(
+    [
+        (
+            sea_figure(sea),
+            "Map of the sea",
+            f"The n = {len(sea.nodes)} sensor nodes and the zone. The y axis points south.",
+        ),
+        (
+            mission_figure(mission.events, mission.scenario),
+            "Map of a mission; battery, residual data and charging",
+            f"A mission of {policies[0]}, replication 0 (n = 1).",
+        ),
+    ]
+)
+
+# %% [markdown]
+# ## How far to trust it
+
+# %%
+html.say("Guarantee: {guarantee}.", guarantee=answer.guarantee)
+
+# %% [markdown]
+# ## Tables
 #
-# A sea is a TOML file; a second file in the same folder has the coordinates of its sensor nodes:
+# The verdict is *open* where no decision was needed to find the cheapest fleet.
+
+# %%
+columns = ["policy", *answer.fields, "success", "collection_ratio", "n", "cost", "verdict"]
+shown = costs[columns].assign(cost=costs["cost"].map("{:,.0f}".format))
+shown[[*METRICS][:2]] = shown[[*METRICS][:2]].map(numbers.percent)
+html.table(shown, f"Mean cost of {planned:,} planned missions in {currency}", data=costs)
+
+# %% [markdown]
+# ## With your own sea
+#
+# A sea is a TOML file; a CSV or GeoJSON file in the same folder has the coordinates of its nodes,
+# in degrees (`lon`, `lat`) or cells (`x`, `y`). What the file does not set is as in the paper.
 #
 # ```toml
 # nodes = "bay.csv"
@@ -50,88 +107,24 @@ from reports.pages import html
 # quota = 600             # communication slots that every UAV must fill
 # ```
 #
-# The CSV file has the columns `lon` and `lat` in degrees, or `x` and `y` in cells; a GeoJSON file
-# of points is also possible. Degrees are projected, centred on the grid and rounded to cells. All
-# fields that the TOML file does not set have the values of the paper.
-
-# %%
-sea = load_scenario(scenario)
-html.say(
-    "This sea has {nodes} sensor nodes on {grid} x {grid} cells with a side of {size:g} m. Its "
-    "zone has {pads} cells, each with room for one charging pad.",
-    nodes=len(sea.nodes),
-    grid=sea.grid,
-    size=sea.cell_size,
-    pads=sea.zone_cells,
-)
-
-# %%
-caption = f"The n = {len(sea.nodes)} sensor nodes and the zone. The y axis points south."
-html.figure(sea_figure(sea), "Map of the sea", caption)
-
-# %% [markdown]
-# ## An example mission
-#
-# A single mission (n = 1) helps to check that the sea is described as intended.
-
-# %%
-mission = mission_of(load_scenario(scenario, **example), load_team(policies[0]), seed)
-caption = f"A mission of {policies[0]}, replication 0 (n = 1)."
-drawing = mission_figure(mission.events, mission.scenario)
-html.figure(drawing, "Map of the mission; battery, residual data and charging", caption)
-
-# %% [markdown]
-# ## The sweep
-#
-# Every fleet is simulated under every condition. With prices and requirements, a procedure adds
-# missions until it has found the cheapest fleet that meets the requirements, with a stated
-# confidence.
-
-# %%
-priced = {**prices, "currency": currency, "missions": planned}
-about = (scenario, policies, missions, seed, results, workers, priced, requirements)
-answer = sweep(*about, yes=yes, **fields)
-
-# %%
-html.say(
-    "The sweep has {settings} settings and simulated {n:,} missions. Its guarantee: {guarantee}.",
-    settings=len(answer.table()),
-    n=len(answer.results.missions),
-    guarantee=answer.guarantee,
-)
-
-# %% [markdown]
-# ## The decision
-
-# %%
-html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer.answers())))
-
-# %% [markdown]
-# The table lists the settings by cost, the cheapest first. The verdict on the
-# requirements is *met*, *missed*, or *open* where no decision was needed to find the cheapest
-# fleet.
-
-# %%
-columns = ["policy", *answer.fields, "success", "collection_ratio", "n", "cost", "verdict"]
-costs = answer.table("cost")
-shown = costs[columns].assign(cost=costs["cost"].map("{:,.0f}".format))
-shown[[*METRICS][:2]] = shown[[*METRICS][:2]].map(numbers.percent)
-html.table(shown, f"Mean cost of {planned:,} planned missions in {currency}", data=costs)
-
-# %%
-caption = "Success with 95 % intervals. n is small for settings that were ruled out early."
-html.figure(answer.plot(metric="success"), "Success by field", caption)
-
-# %% [markdown]
-# ## On the command line
-#
-# The following command runs the same sweep and makes a page with more details:
+# This command runs the same sweep and makes a page with more details:
 
 # %%
 html.say("{lines}", lines=html.commands([answer.command]))
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+
+# %%
+html.say(
+    "The sea has {nodes} sensor nodes on {grid} x {grid} cells of {size:g} m. The sweep has "
+    "{settings} settings and simulated {n:,} missions.",
+    nodes=len(sea.nodes),
+    grid=sea.grid,
+    size=sea.cell_size,
+    settings=len(costs),
+    n=len(answer.results.missions),
+)
 
 # %%
 html.provenance([answer.results])

@@ -50,8 +50,8 @@ html.answer(main_effects.answer(effects, leading))
 html.lead(
     figures.one_by_one(effects, fig5.policies),
     "The product against every parameter",
-    f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from Table "
-    f"II; bars are {level} intervals.",
+    f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from "
+    f"Table II; bars are {level} intervals.",
 )
 
 # %% [markdown]
@@ -66,8 +66,8 @@ html.gallery(
         (
             figures.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
-            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per dot; bars are {level} "
-            "intervals.",
+            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per dot; bars are "
+            f"{level} intervals.",
         )
         for field, pairs in changes.items()
     ]
@@ -82,7 +82,8 @@ studies = {"fig5": fig5, "sweet-spot": sweet}
 html.say(
     "Of {n:,} settings, the best by product was selected for every policy by "
     "<code>{rule[procedure]}</code>, with an indifference of {margin}, and simulated in "
-    "{rule[check]:,} further missions. Only these are compared with the paper's means over {paper:,}.",
+    "{rule[check]:,} further missions. Only these are compared with the paper's means over "
+    "{paper:,}.",
     n=len(sweet.manifest["points"]),
     rule=rule,
     margin=numbers.margin(scorecard.margin(studies)),
@@ -95,7 +96,8 @@ html.gallery(
         (
             figures.performance(checks, metric, paper.SWEET_SPOT[metric]),
             f"{name} of every policy at its best setting, and the paper's number",
-            f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the paper.",
+            f"n = {numbers.span(checks['n'])} missions; bars are {level} intervals. Dashed: the "
+            "paper.",
         )
         for metric, name in names.METRICS.items()
         if len(checks)
@@ -123,9 +125,9 @@ html.gallery(
 # %% [markdown]
 # ## How far to trust it
 #
-# Two values differ if their paired difference does, at the 5 % level after Holm's correction for all
-# pairs of values. A metric *rises* if all differences that are significant are increases. Estimates
-# of small Sobol indices may be negative.
+# Two values differ if their paired difference does, at the 5 % level after Holm's correction for
+# all pairs of values. A metric *rises* if all differences that are significant are increases.
+# Estimates of small Sobol indices may be negative.
 
 # %%
 html.say(
@@ -144,8 +146,9 @@ display(
     ),
     html.table(
         sweet_spot.table(sweet),
-        f"The selected settings and their checks: means with {level} intervals, the difference from "
-        "the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled out",
+        f"The selected settings and their checks: means with {level} intervals, the difference "
+        "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
+        "out",
     ),
     html.table(
         sensitivity.index_table(of_ratio),

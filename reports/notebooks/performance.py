@@ -97,7 +97,8 @@ html.gallery(
         (
             figures.by_fleet(fig4_fleets, m, {i: p[m] for i, p in paper.FIG_4.items()}),
             f"{METRICS[m]} against the number of UAVs, and the paper's numbers",
-            f"n = {numbers.span(fig4_fleets['n'])} missions per dot; diamonds: the paper's numbers.",
+            f"n = {numbers.span(fig4_fleets['n'])} missions per dot; diamonds: the paper's "
+            "numbers.",
         )
         for m in paper.FIG_4[1]
     ]
@@ -154,8 +155,8 @@ display(
 # %%
 html.say(
     "Every mission of Table IV draws its parameters from Table II. Those of Fig. 4 have C_S "
-    "{charge_start[0]} %, C_C {charge_complete[0]} %, {initial_data[0]:g} data units per node and a "
-    "flying time of {flying_time[0]}.",
+    "{charge_start[0]} %, C_C {charge_complete[0]} %, {initial_data[0]:g} data units per node and "
+    "a flying time of {flying_time[0]}.",
     **fig4.manifest["scenario"],
 )
 

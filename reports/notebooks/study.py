@@ -34,48 +34,48 @@ study = load_results(Path(results))
 by = words.metric_of(study, metric)
 metrics, called = words.metrics_of(by), names.metric_name(by).lower()
 
-# %% [markdown]
-# ## What was simulated
-
-# %%
-html.say("{simulated}", simulated=words.simulated(study))
-
-# %% [markdown] tags=["if-ranked"]
-# All policies and all design points are simulated with the same random numbers (common random
-# numbers). So they are compared mission by mission, and the randomness that they share cancels.
-
-# %% [markdown] tags=["if-cheapest"]
-# ## The cheapest fleet
-#
-# An operator decides on the fleet. The other fields are conditions under which it has to work.
-
 # %% tags=["if-cheapest"]
-display(
-    html.say("{answers}", answers=costs.cheapest(study)),
-    costs.judged_table(study),
-    costs.checked_table(study),
-)
-
-# %% [markdown] tags=["if-cheapest"]
-# The selection was not based on the missions of the check, so their means are unbiased. A setting
-# gets no further missions once a cheaper one is known to meet the requirements.
+html.answer(costs.cheapest(study)[-1])
 
 # %% tags=["if-ranked"]
 ranked = settings.ranked(study, by)
 best = ranked.iloc[0]
-html.say("## The best\n\n{answer}", answer=words.answer(study, ranked, by))
 
-# %% tags=["if-settings"]
-tables.ranked(study, ranked, by)
+# %% tags=["if-answer"]
+html.answer(words.answer(study, ranked, by))
+
+# %% tags=["if-sensitivity"]
+html.answer(words.of_variance(study, by))
+
+# %%
+html.lead(*drawings.leading(study, by))
+
+# %% [markdown] tags=["if-cheapest"]
+# ## Why
+#
+# An operator decides on the fleet. The other fields are conditions under which it has to work. A
+# setting gets no further missions once a cheaper one is known to meet the requirements.
+
+# %% tags=["if-cheapest"]
+display(html.say("{answers}", answers=costs.reasons(study)), costs.judged_table(study))
+
+# %% [markdown] tags=["if-cheapest"]
+# ## How far to trust it
+#
+# The check had no part in the selection, so its means are unbiased.
+
+# %% tags=["if-cheapest"]
+costs.checked_table(study)
 
 # %% [markdown] tags=["if-settings"]
-# A *setting* is a policy at a design point. It *may be the best* if no other setting is
-# significantly better. With a probability of 95 %, the truly best setting is among these (subset
-# selection by paired t tests with Bonferroni's correction, Nelson and others 2001). The mean of the
-# setting in the first rank tends to be too high, since it was ranked first for its high mean.
+# ## The best settings
+#
+# A *setting* is a policy at a design point. It *may be the best* if no other one is significantly
+# better: with a probability of 95 %, the truly best is among these (paired t tests, Bonferroni).
+# The mean of the first tends to be too high, since it was ranked first for it.
 
 # %% tags=["if-settings"]
-tables.best_of_policies(study, by)
+display(tables.ranked(study, ranked, by), tables.best_of_policies(study, by))
 
 # %% tags=["if-one-setting"]
 display(html.gallery(drawings.means(study, metrics)), tables.means(study))
@@ -83,10 +83,8 @@ display(html.gallery(drawings.means(study, metrics)), tables.means(study))
 # %% [markdown] tags=["if-costs"]
 # ## Costs
 #
-# The cost is that of the fleet and of all its missions. A setting is on the *Pareto front* if no
-# other setting is at most as expensive and at least as good. The probability of being on the front
-# takes the randomness of the missions into account (Bayesian bootstrap over common replications).
-# It is too low where more expensive settings are better by less than the missions can show.
+# A setting is on the *Pareto front* if no other one is at most as expensive and at least as good.
+# The probability of being on it comes from a Bayesian bootstrap over common replications.
 
 # %% tags=["if-costs"]
 fronts = costs.fronts_of(study)
@@ -99,9 +97,8 @@ display(
 # %% [markdown] tags=["if-selection"]
 # ## The selection
 #
-# A ranking-and-selection procedure decided how many missions each setting gets, until one setting
-# was selected for every policy. Settings with few missions were ruled out early. The guarantee is
-# stated below. *May be the best* above uses the replications that two settings have in common.
+# A ranking-and-selection procedure decided how many missions each setting gets. Those with few
+# missions were ruled out early. The check had no part in the selection.
 
 # %% tags=["if-selection"]
 display(
@@ -110,13 +107,10 @@ display(
     tables.checked(study),
 )
 
-# %% [markdown] tags=["if-selection"]
-# The selection was not based on the missions of the check, so their means are unbiased.
-
 # %% [markdown] tags=["if-precision"]
 # ## The precision
 #
-# The study simulated missions until its estimates were precise enough, or its budget was spent.
+# Missions were simulated until the estimates were precise enough, or the budget was spent.
 
 # %% tags=["if-precision"]
 tables.precisions(study)
@@ -151,8 +145,8 @@ display(html.gallery(drawings.main_effects(study, metrics)), tables.main_effects
 
 # %% tags=["if-settings"]
 html.say(
-    "## Comparison with a baseline\n\nThe baseline is design point {point}: {words}. Every policy "
-    "is compared with itself there. The parameter `baseline` of this page names another point.",
+    "## Comparison with a baseline\n\nEvery policy is compared with itself at design point "
+    "{point}: {words}. The parameter `baseline` names another point.",
     point=baseline,
     words=words.setting(study, baseline),
 )
@@ -194,7 +188,10 @@ display(
 )
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+
+# %%
+html.say("{simulated}", simulated=words.simulated(study))
 
 # %%
 html.provenance([study])

@@ -10,11 +10,9 @@
 # ---
 
 # %% [markdown]
-# # Verification
+# # Is the simulator right?
 #
-# This page compares the simulator with exact theory: the random draws, the channel, queues and the
-# age of information, the conservation of data, the batteries, both engines, and the coverage of all
-# confidence intervals. It also describes the model according to the STRESS-DES checklist.
+# The simulator against exact theory, and the model by the STRESS-DES checklist.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder of the results folder verification and of those beside it
@@ -37,23 +35,28 @@ space, level = suite.space, numbers.level(LEVEL)
 judged = checks.judge(suite.checks(block))
 band = f"the band below, which contains all dots in {level} of such figures."
 
-# %% [markdown]
-# ## What was checked
-#
-# An exact check fails if an error is above its bound: zero or the largest possible rounding error.
-# A statistical one fails if its p-value, corrected for their number (Holm), is too small.
+# %%
+html.answer(checks.answer(judged))
 
 # %%
-display(html.say("{text}", text=html.composed(checks.overall(judged))))
-caption = "Every check: the value known from theory, the value observed, and the verdict"
-html.table(checks.as_text(judged), caption, wrap=True)
+html.lead(
+    drawings.rates(suite.rates, space),
+    "Mean rate of a lone UAV against its distance from the node",
+    f"One of the checks: dots should lie on the curve of theory, and inside {band} "
+    f"n = {suite.rates['n'].min():,} communication slots per distance.",
+)
+
+# %% [markdown]
+# ## How far to trust it
+
+# %%
+html.say("{text}", text=html.composed(checks.overall(judged)))
 
 # %% [markdown]
 # ## Arrivals
 #
 # The data units that arrive at a node in a slot are Poisson distributed, and independent of other
-# nodes and slots: so are those at all nodes in a slot, and at a node over many slots. The counts
-# come from one event log per replication, since all policies meet the same arrivals.
+# nodes and slots.
 
 # %%
 html.say(
@@ -79,29 +82,19 @@ html.gallery(figures)
 # %% [markdown]
 # ## The channel
 #
-# A UAV serves the node with the highest SNR, so its data are not a random sample of the channel.
-# First, therefore, a single UAV hovers near a single node; its mean rate must equal the integral of
-# δ log<sub>2</sub>(1 + SNR) over the distribution of shadowing. Second, every communication in the
-# event logs is computed again with the shadowing of that communication slot for every node: which
-# node has the highest SNR, and how much data it sends.
+# The mean rate of a UAV that hovers near one node must equal the integral of δ log<sub>2</sub>(1 +
+# SNR) over the shadowing (Figure 1). Every communication in the logs is computed again: which node
+# has the highest SNR, and how much data it sends.
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.CHANNEL))
 n = sum((log.events["event"] == "communication").sum() for log in suite.logs)
-display(html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n))
-html.figure(
-    drawings.rates(suite.rates, space),
-    "Mean rate of a lone UAV against its distance from the node",
-    f"Dots should lie on the curve, and inside {band} n = {suite.rates['n'].min():,} communication "
-    "slots per distance.",
-)
+html.say("{verdicts} The logs have {n:,} communications.", verdicts=verdicts, n=n)
 
 # %% [markdown]
 # ## Queues and the age of information
 #
-# UAVs come to the charging zone as a Poisson process, and charge for exponential (M/M/c) or fixed
-# times (M/D/1). Packets fill a node's buffer, which a server empties in exponential times (M/M/1;
-# with K places, M/M/1/K), or a UAV of a mission at fixed times (M/D/1). The age is known for M/M/1
+# Pads and buffers are driven as M/M/c, M/D/1, M/M/1 and M/M/1/K queues. The age is known for M/M/1
 # and for visits at fixed or exponential gaps. Thinned arrivals must fit the integrated rate.
 
 # %%
@@ -110,9 +103,8 @@ html.say("{verdicts}", verdicts=html.composed(checks.on_topics(judged, checks.QU
 # %% [markdown]
 # ## Conservation, batteries and engines
 #
-# Data are neither created nor lost, every battery follows its rules in every slot of the logs, the
-# logs add up to the records, all policies meet the same random draws in a replication, and missions
-# simulated again with SimPy give the same records.
+# Data are neither created nor lost, batteries follow their rules, logs add up to the records, and
+# missions simulated again with SimPy give the same records.
 
 # %%
 kept = checks.on_topics(judged, *checks.BOOKKEEPING)
@@ -148,10 +140,8 @@ html.gallery(figures)
 # %% [markdown]
 # ## Coverage of the confidence intervals
 #
-# An interval is computed from each block of missions. The share of intervals that contain the mean
-# of all missions is their coverage. For Student's t it should be a little above the level, because
-# a block is itself a part of all missions. For Wilson's interval, used for success, the exact
-# coverage is known from the hypergeometric distribution, and is compared here.
+# The share of intervals of blocks of missions that contain the mean of all missions. For Wilson's
+# interval, used for success, the exact coverage is known (hypergeometric distribution).
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))
@@ -172,11 +162,17 @@ figures = [
 html.gallery(figures)
 
 # %% [markdown]
-# ## The model, described by the STRESS-DES checklist
+# ## Tables
+
+# %%
+caption = "Every check: the value known from theory, the value observed, and the verdict"
+html.table(checks.as_text(judged), caption, wrap=True)
+
+# %% [markdown]
+# ## How this page was made
 #
-# Monks, Currie, Onggo, Robinson, Kunc and Taylor (2019), *Strengthening the reporting of empirical
-# simulation studies: Introducing the STRESS guidelines*, Journal of Simulation 13(1), 55–67. Every
-# number is read from the scenario and the manifests of the studies.
+# The model by the STRESS-DES checklist (Monks and others 2019, Journal of Simulation 13(1), 55–67).
+# Every number is read from the scenario and the manifests of the studies.
 
 # %%
 model = stress_des.describe(suite.study.manifest, [s.manifest for s in suite.others.values()])
@@ -192,9 +188,6 @@ html.figure(
 display(Markdown(model.sections["3"]))
 display(html.table(model.parameters, "All input parameters (3.3)", wrap=True))
 Markdown("\n\n".join(model.sections[number] for number in "456"))
-
-# %% [markdown]
-# ## Where the figures come from
 
 # %%
 html.provenance(suite.studies.values())

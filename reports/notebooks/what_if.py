@@ -9,11 +9,9 @@
 # ---
 
 # %% [markdown]
-# # What if
+# # What if the fleet were larger?
 #
-# This page answers one question: what changes if some settings of the scenario change? A baseline
-# and a variation of it are simulated with the same random numbers and compared mission by mission.
-# A typical mission and a bad mission are shown in detail.
+# A baseline and a variation of it, with the same random draws.
 
 # %% tags=["parameters"]
 results = "../../results"  # folder in which the results of the question are kept
@@ -40,141 +38,78 @@ asked = what_if(
 )
 found, table = asked.results, asked.table()
 
-# %% [markdown]
-# ## The question
-#
-# What changes if missions have the settings of the variation instead of those of the baseline? The
-# table first lists the fields that the variation changes, then the fields that are set to the same
-# value in both, and the fields whose values every mission draws at random. Every policy acts in the
-# same number of missions of the baseline and of the variation. In each replication, both have the
-# same initial data, arrivals and shadowing, and the same values of all fields that the variation
-# does not set.
+# %%
+html.answer(asked.sentence())
 
 # %%
-name = found.manifest["study"]["scenario"]
-html.table(question.listed(found), f"Scenario {name}, {missions:,} missions of each policy")
+pairs, better = f"n = {missions:,} pairs per policy", answer.winners(answer.all_differences(found))
+html.lead(asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are 95 % intervals.")
 
 # %% [markdown]
-# ## The answer
+# ## Why
+
+# %%
+html.say("{better}.", better=html.composed(better[:1].upper() + better[1:]))
+
+# %% [markdown]
+# A failed mission counts 0 in the product: a policy that gains a little in most missions and fails
+# in a few more can be better in most of them and worse on average.
+
+# %%
+measured = [metric for metric in answer.measured(found) if found.missions[metric].any()]
+caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
+spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
+html.gallery(
+    [
+        (asked.plot_spread(), "Distribution of the paired differences of the product", spread),
+        *(
+            (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
+            for metric in (*names.METRICS, *measured)
+            for name in [names.metric_name(metric)]
+        ),
+    ]
+)
+
+# %% [markdown]
+# ## A typical mission and the worst
+#
+# The first has the median difference of the product, the second the lowest product in the
+# variation; each in the baseline and in the variation, by the policy that is best there.
+
+# %%
+examples = asked.typical(), asked.worst()
+html.gallery([drawing for example in examples for drawing in example.drawings()])
+
+# %% [markdown]
+# ## How far to trust it
+#
+# A difference is inconclusive (≈) if its interval contains 0. Intervals of the means may overlap
+# although the paired difference is clear. A learned policy is used as it was trained; in a setting
+# far from its training, a new training may do better.
 
 # %%
 html.say("{answer}", answer=html.composed(asked.answer()))
 
-# %% [markdown]
-# These are paired differences with their 95 % confidence intervals. A difference is
-# inconclusive if its interval contains 0. A learned policy is used as it was trained. In a setting
-# that differs from that of its training, which its model card describes, a newly trained policy may
-# do better. Where a field of a section is set, both sides measure what belongs to it, such as the
-# age of information.
-#
-# The figures below show the means of both sides. Their intervals may overlap although the paired
-# difference is clearly not zero:
-
 # %%
-measured = [metric for metric in answer.measured(found) if found.missions[metric].any()]
-caption = f"n = {missions:,} missions per dot, bars are 95 % intervals of the means."
-html.gallery(
-    [
-        (asked.plot_means(metric), f"{name}, baseline and variation", f"{name}. {caption}")
-        for metric in (*names.METRICS, *measured)
-        for name in [names.metric_name(metric)]
-    ]
+html.table(
+    answer.pairing(table),
+    f"What common random numbers gain in the differences of n = {missions:,} pairs: the variance "
+    "that is left of that of independent missions, and how many of these would be as precise",
 )
 
 # %% [markdown]
-# The next figures show the paired differences, and how they are distributed over the
-# single missions (product). A failed mission counts 0, so a pair with
-# one failed mission has a large difference.
-
-# %%
-pairs, better = f"n = {missions:,} pairs per policy", answer.winners(answer.all_differences(found))
-spread = f"{pairs}: {better}. The lower panel is limited to the 5 % and 95 % quantiles."
-html.gallery(
-    [
-        (asked.plot(), "Paired differences of the metrics", f"{pairs}, 95 % intervals."),
-        (asked.plot_spread(), "Distribution of the paired differences", spread),
-    ]
-)
-
-# %% [markdown]
-# ### In absolute terms
-#
-# The tables have means per mission and mean paired differences with their 95 % intervals. Data are
-# in data units. The signs mean: ▲ the whole interval is above 0, ▼ it is below 0, ≈ it contains 0.
-# A UAV waits while it requests a charging pad and none is free. Its battery counts as depleted if
-# it becomes empty before the quota is filled. A side that does not measure something has a dash,
-# and then there is no difference.
+# ## Tables
 
 # %%
 for policy in found.policies:
-    display(html.table(answer.listed(table, policy), policy))
-
-# %% [markdown]
-# ### What common random numbers gained
-#
-# The baseline and the variation use the same random numbers in each replication (common random
-# numbers). What a replication adds to both of them cancels in the difference, so the interval is
-# narrower. Little cancels where a mission fails on one side only, since it then counts 0 in
-# product. The table compares the pairs with independent missions: the
-# variance of the difference as a share of that of independent missions, how much narrower the
-# interval is, and how many independent missions would give the same precision.
-
-# %%
-html.table(answer.pairing(table), f"Differences of n = {missions:,} pairs")
-
-# %% [markdown]
-# ## Two missions to look at
-#
-# The missions are those of the policy that is best in the variation, unless the parameter `shown`
-# names another policy. Each is a single example (n = 1): one replication, simulated in the baseline
-# and in the variation.
-
-# %% [markdown]
-# ### A typical mission
-#
-# This replication has the median of all differences in product.
-
-# %%
-typical = asked.typical()
-lines = html.commands(typical.commands())
-html.say("{effect}\n\n{lines}", effect=html.composed(typical.effect()), lines=lines)
-
-# %%
-html.gallery(typical.drawings())
-
-# %% [markdown]
-# ### A bad mission
-#
-# This is the worst mission of the variation by product; if several are
-# equally bad, the one with the lowest collection ratio.
-
-# %%
-worst = asked.worst()
-lines = html.commands(worst.commands())
-html.say("{effect}\n\n{lines}", effect=html.composed(worst.effect()), lines=lines)
-
-# %%
-html.gallery(worst.drawings())
-
-# %% [markdown]
-# **How to read the map.** Every sensor node has a colour. An arrow is the move of a
-# UAV in one mission slot; it has the colour of the node that was served in most communication slots
-# of that slot, and is grey if no node was served. A cross is a slot in which the UAV hovered, a
-# star a slot in which it charged. A UAV starts at a numbered diamond, and its mission ends at a
-# dot. UAVs on the same path are drawn side by side. The y axis points south.
+    marks = "▲ higher in the variation, ▼ lower, ≈ inconclusive"
+    display(html.table(answer.listed(table, policy), f"{policy}, n = {missions:,}; {marks}"))
 
 # %% [markdown]
 # ## Change the question
 #
-# The first command below makes this page again. Missions that were simulated before are reused, so
-# with more `missions` only the additional ones are simulated. `--set` and the parameter `baseline`
-# accept every field of the scenario, in TOML syntax. You can also open the notebook of this page in
-# Jupyter, change its first cell and run all cells.
-#
-# To compare more than one variation, save the TOML lines as `my-sweep.toml` and add rows: the first
-# row is the baseline, every other row a variation. Then run `dess study run my-sweep.toml --out
-# results/my-sweep`. With `kind = "grid"` and a table `values` of lists in place of the rows, the
-# study simulates every combination of the values.
+# The first command makes this page again, with more missions or other values of `--set`. The TOML
+# lines are the same question as a study: every further row is another variation.
 
 # %%
 command = html.commands([question.command(found)])
@@ -182,7 +117,16 @@ study = html.block("toml", question.as_toml(found).rstrip("\n"))
 html.say("{command}\n\n{study}", command=command, study=study)
 
 # %% [markdown]
-# ## Where the figures come from
+# ## How this page was made
+
+# %%
+name = found.manifest["study"]["scenario"]
+html.table(question.listed(found), f"Scenario {name}, {missions:,} missions of each policy")
+
+# %%
+for example in examples:
+    lines = html.commands(example.commands())
+    display(html.say("{effect}\n\n{lines}", effect=html.composed(example.effect()), lines=lines))
 
 # %%
 html.provenance([found])

@@ -61,6 +61,24 @@ def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVE
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 
+def answer(table: pd.DataFrame, baseline: str) -> str:
+    """Without which method a training loses most, in a sentence.
+
+    Args:
+        table: Rows of ``ablation`` of the product.
+        baseline: The variant with which the others are compared.
+    """
+    own = table.set_index("variant").loc[baseline]
+    lost = [
+        f"{row.variant} {numbers.percent(row.mean)} (n = {row.n})"
+        for row in table[table["variant"] != baseline].nsmallest(3, "mean").itertuples()
+    ]
+    return (
+        f"Trainings of {baseline} reach a product of {numbers.percent(own['mean'])} (n = "
+        f"{own['n']:.0f}); the changes that cost most: {numbers.words(lost)}."
+    )
+
+
 def within(interval: Interval) -> Interval:
     """An interval of Student's t of results from 0 to 1, cut there.
 

@@ -162,6 +162,26 @@ def worst(results: Results, policy: str) -> int:
     return int(ordered["replication"].iloc[0])
 
 
+def sentence(results: Results, table: pd.DataFrame) -> str:
+    """What the variation changes, in a sentence.
+
+    Args:
+        results: The results of the question.
+        table: The ``answers``.
+    """
+    sides = zip(*settings_of(results), strict=True)
+    changed = numbers.words(
+        [f"{after} instead of {before.split(' ', 1)[1]}" for before, after in sides]
+    )
+    parts = [
+        f"that of {row.policy} by {change(row)} points"
+        + " (inconclusive)" * (verdict(row) == INCONCLUSIVE)
+        for row in table[table["metric"] == PRODUCT].itertuples()
+    ]
+    n = numbers.span(table["n"])
+    return f"With {changed}, the product changes: {numbers.words(parts)}; n = {n} pairs."
+
+
 def conclusions(table: pd.DataFrame) -> str:
     """What ``answers`` say about product: a list, an item per policy."""
     words = {

@@ -52,8 +52,8 @@ points = questions.front(study, times)
 html.lead(
     fronts.decision_times(points),
     "Decision time against the product of all policies, and their Pareto front",
-    f"n = {len(missions):,} missions per policy; bars are 95 % intervals. Times are medians for the "
-    "UAVs of a mission on one core. No policy is both faster and better than one on the line.",
+    f"n = {len(missions):,} missions per policy; bars are 95 % intervals. Times are medians for "
+    "the UAVs of a mission on one core. No policy is both faster and better than one on the line.",
     points,
 )
 

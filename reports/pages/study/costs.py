@@ -84,10 +84,14 @@ def parts_table(results: Results) -> HTML:
     return html.table(shown, caption, data=rows)
 
 
-def cheapest(results: Results) -> html.Marked:
-    """The cheapest settings that meet the requirements, with reasons and guarantee, as a list."""
-    table = questions.judged(results)
-    lines = [f"- {text}" for text in questions.answers(results, table)]
+def cheapest(results: Results) -> list[str]:
+    """The cheapest settings that meet the requirements, with reasons, a sentence each."""
+    return questions.answers(results, questions.judged(results))
+
+
+def reasons(results: Results) -> html.Marked:
+    """All of ``cheapest`` as a list, and the guarantee."""
+    lines = [f"- {text}" for text in cheapest(results)]
     said = {choice.guarantee for p in results.policies if (choice := results.cheapest(p))}
     sure = "\n\n".join(f"Guarantee: {text}." for text in sorted(said))
     return html.composed("\n".join(lines) + f"\n\n{sure}")

@@ -22,6 +22,28 @@ FRAMED = (
 )
 
 
+def leading(results: Results, metric: str) -> Drawing:
+    """The figure that shows the answer of a study: the metric over all that the design varies."""
+    count, kind = len(settings.varied(results)), _kind(results)
+    if kind == "saltelli":
+        return sensitivity(results, metric)[0]
+    if not count:
+        return means(results, [metric])[0]
+    if count == 1:
+        return curves(results, [metric])[0]
+    if count == 2 and kind in ("grid", "table"):
+        x, hue = settings.varied(results)
+        data = settings.averaged(results, [x, hue], metric)
+        caption = f"n = {_counted(data)} missions per dot; bars are {_LEVEL} intervals."
+        title = f"{metric_name(metric)} against the {parameter(x).within}"
+        return figures.plot(results, x, hue, metric), title, caption, data
+    if kind == "one-at-a-time":
+        return one_at_a_time(results)[0]
+    if kind == "latin-hypercube":
+        return scatter(results, [metric])[0]
+    return main_effects(results, [metric])[0]
+
+
 def means(results: Results, metrics: Iterable[str]) -> list[Drawing]:
     """Every metric of every policy at the only design point."""
     table = summary.means(results)
@@ -174,6 +196,10 @@ _MEANT = {
     "replication by replication",
     True: "the missions with the value, whatever the other fields are",
 }
+
+
+def _kind(results: Results) -> str:
+    return str((results.manifest["study"]["design"] or {}).get("kind", "grid"))
 
 
 def _of(table: pd.DataFrame, metric: str) -> pd.DataFrame:

@@ -51,7 +51,7 @@ def report_of(
     points = len(results.store.manifest.points)
     where = f"{points:,} design points" if points > 1 else f"the scenario {study['scenario']}"
     description = study["description"] or f"{numbers.words(results.policies)} at {where}."
-    title = f"Study {study['name']}"
+    title = words.title(results)
     original.cells[0].source = f"# {html.text(title)}\n\n{html.text(description)}"
     report = notebook.report_of(f"{PREFIX}{study['name']}", original)
     return replace(report, title=title, description=" ".join(description.split()))
@@ -84,6 +84,10 @@ TAGS: dict[str, Callable[[Results], bool]] = {
     "if-settings": _has_settings,
     # Settings, one or several, with missions enough to rank them.
     "if-ranked": lambda results: _kind(results) != "saltelli",
+    # The answer is the best setting.
+    "if-answer": lambda results: (
+        _kind(results) != "saltelli" and not isinstance(results.store.manifest.selection, Cheapest)
+    ),
     # A single design point: the policies are compared in it.
     "if-one-setting": lambda results: len(results.store.manifest.points) == 1,
     # Fields with several values; such that others are averaged over.

@@ -9,10 +9,13 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, metric_name, parameter, value_text
 from analysis.questions import settings, summary
 from analysis.results.tables import Results
+from analysis.study.cheapest import Cheapest
+from analysis.study.design import NOISE
 from dess import InputError
 from reports.pages import html
 
 MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
+_BEST = "Which setting is the best for {}?"
 _MOST_VALUES = 12  # the largest number of values of a field in a list
 
 
@@ -68,7 +71,7 @@ def simulated(results: Results) -> html.Marked:
     return html.Marked("\n".join(lines))
 
 
-def answer(results: Results, ranked: pd.DataFrame, metric: str) -> html.Marked:
+def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
     """The best setting, and how many settings may be as good.
 
     Args:
@@ -80,7 +83,7 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> html.Marked:
     value = numbers.written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
     where = settings.in_words(results)[best["point"]]
     what = "setting" if settings.varied(results) else "policy"
-    setting = html.marked(" with {where}", where=where) if where != settings.AS_IT_IS else ""
+    setting = f" with {where}" if where != settings.AS_IT_IS else ""
     if others == 1:
         rest = f" The other {what} {'may be as good' if tied else 'is significantly worse'}."
     elif not tied:
@@ -89,15 +92,39 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> html.Marked:
         rest = (
             f" Of the {others:,} others, {tied:,} may be as good; the rest are significantly worse."
         )
-    return html.marked(
-        "**The best {what} is {policy}{setting}: {metric} {value}.**{rest}",
-        what=what,
-        policy=html.code(best["policy"]),
-        setting=setting,
-        metric=metric_name(metric).lower(),
-        value=value,
-        rest=rest,
+    return (
+        f"The best {what} is {best['policy']}{setting}: {metric_name(metric).lower()} {value}, "
+        f"n = {best['n']:,}.{rest}"
     )
+
+
+def of_variance(results: Results, metric: str) -> str:
+    """Which fields explain most of the variance of a metric for the first policy."""
+    rows = summary.sensitivities(results)
+    rows = rows[(rows["metric"] == metric) & (rows["policy"] == results.policies[0])].dropna()
+    parts = [
+        f"{parameter(row.parameter).within if row.parameter != NOISE else 'the replication'} "
+        f"{numbers.percent(row.total)}"
+        for row in rows.nlargest(3, "total").itertuples()
+    ]
+    return (
+        f"Of the variance of the {metric_name(metric).lower()} of {results.policies[0]}, with all "
+        f"interactions: {numbers.words(parts)}."
+    )
+
+
+def title(results: Results) -> str:
+    """The question that a study answers."""
+    design = results.manifest["study"]["design"] or {}
+    if isinstance(results.store.manifest.selection, Cheapest):
+        question = "Which fleet is the cheapest for {}?"
+    elif design.get("kind") == "saltelli":
+        question = "Which parameters matter for {}?"
+    elif fields := [parameter(field).within for field in settings.varied(results)]:
+        question = f"Which {numbers.words(fields)} for {{}}?" if len(fields) < 4 else _BEST
+    else:
+        question = "Which policy for {}?"
+    return question.format(results.manifest["study"]["scenario"])
 
 
 def guarantees(results: Results) -> html.Marked:
