@@ -154,17 +154,17 @@ def age_changes(results: Results) -> pd.DataFrame:
 
 
 def age(results: Results) -> str:
-    """How the average age falls with the fleet, at every arrival rate, by the first policy."""
-    table = age_changes(results).dropna(subset=["published"])
+    """How the average age falls with the fleet, at the extreme arrival rates."""
+    table = age_changes(results).dropna(subset=["published"]).sort_values("arrival_rate")
     parts = []
     for uavs, rows in table[table["policy"] == results.policies[0]].groupby("uavs"):
-        at_rates = [
-            f"{relative(row.mean, row.low, row.high)} (arrival rate {value_text(row.arrival_rate)})"
-            for row in rows.itertuples()
-        ]
-        parts.append(f"from 1 to {uavs} UAVs by {numbers.words(at_rates)}")
+        ends = rows.drop_duplicates().iloc[[0, -1]].itertuples()
+        at_rates = [f"{relative(row.mean, row.low, row.high)}" for row in ends]
+        parts.append(f"by {' to '.join(dict.fromkeys(at_rates))} from 1 to {uavs} UAVs")
+    rates = " to ".join(map(value_text, table["arrival_rate"].iloc[[0, -1]].unique()))
     return (
-        f"The average age of information changes {'; '.join(parts)} (policy {results.policies[0]})."
+        f"The average age of information changes {numbers.words(parts)}, at arrival rates of "
+        f"{rates} (policy {results.policies[0]})."
     )
 
 

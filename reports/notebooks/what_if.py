@@ -9,7 +9,7 @@
 # ---
 
 # %% [markdown]
-# # What if the fleet were larger?
+# # What changes if some settings change?
 #
 # A baseline and a variation of it, with the same random draws.
 
@@ -49,7 +49,7 @@ html.lead(asked.plot(), "Paired differences of the metrics", f"{pairs}; bars are
 # ## Why
 
 # %%
-html.say("{better}.", better=html.composed(better[:1].upper() + better[1:]))
+html.say("Of the pairs, {better}.", better=html.composed(better))
 
 # %% [markdown]
 # A failed mission counts 0 in the product: a policy that gains a little in most missions and fails

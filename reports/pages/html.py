@@ -49,6 +49,9 @@ _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
 _MARKUP = re.compile(
     rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#](?!\d)|^\d+(?=[.)](\s|$))"
 )
+# The coordinates in a figure, a number with many decimals, and the space around a command of a path.
+_PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
+_BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
 
@@ -247,7 +250,12 @@ def svg(drawing: Figure) -> bytes:
         mpl.rcdefaults()
         mpl.rcParams |= {"svg.hashsalt": "dess", "svg.fonttype": "none"}  # text, not outlines
         drawing.savefig(buffer, format="svg", metadata=_NO_METADATA)
-    return buffer.getvalue()
+    return _PLACES.sub(_shorter, buffer.getvalue())
+
+
+def _shorter(coordinates: re.Match[bytes]) -> bytes:
+    """The coordinates without digits that are finer than any screen, and without line breaks."""
+    return _BREAKS.sub(rb"\1", _DIGITS.sub(rb"\1", coordinates[0]))
 
 
 def _figure(

@@ -223,8 +223,7 @@ def winners(changes: Mapping[str, pd.Series]) -> str:
     """
     shares = {policy: [(gaps > 0).mean(), (gaps < 0).mean()] for policy, gaps in changes.items()}
     return "; ".join(
-        f"{policy} is better in {numbers.percent(more)} of the missions and worse in "
-        f"{numbers.percent(less)}"
+        f"{policy} is better in {numbers.percent(more)} and worse in {numbers.percent(less)}"
         for policy, (more, less) in shares.items()
     )
 
