@@ -111,7 +111,7 @@ PARSED = {
     "analysis.study.candidates": {"loads"},
     "analysis.results.provenance": {"loads"},
     # Lines from the process that has started this one.
-    "reports.pages.cells": {"loads"},
+    "reports.pages.running.cells": {"loads"},
 }
 
 

@@ -16,7 +16,7 @@ from reports.cli.running import YesOption
 from reports.cli.settings import PAGES, PARAMETER, RESULTS, JsonOption, command, setting
 
 if TYPE_CHECKING:
-    from reports.pages.kernels import Progress
+    from reports.pages.running.kernels import Progress
     from reports.pages.verify import Check
 
 WHAT_IF = "what-if"  # the only report that has --set

@@ -38,6 +38,8 @@ pair = head_to_head.pair_of(study, learned, heuristic)
 policy, title = pair.policy, f"{pair.policy} − {pair.baseline}"
 missions = head_to_head.duels(study, pair)
 comparison = head_to_head.overall(study, pair)
+worst = head_to_head.worst(missions, 5)
+lost = head_to_head.most_lost(missions.drop(worst.index), 5)
 
 # %%
 html.answer(head_to_head.answer(comparison, missions, pair))
@@ -89,8 +91,6 @@ if len(cells):
 # The two missions with the lowest product of the learned policy, with both policies.
 
 # %%
-worst = head_to_head.worst(missions, 5)
-lost = head_to_head.most_lost(missions.drop(worst.index), 5)
 kept = kept_missions(study, head_to_head.drawn(missions, pair), results)
 html.gallery(
     [
@@ -129,25 +129,32 @@ for caption, rows in found.items():
 # %%
 leaves = regions.rules(missions, pair.candidates)
 depleted = head_to_head.depleted(study, policy, worst["replication"])
-display(
-    html.table(head_to_head.outcomes(missions, pair), "Outcomes of the missions"),
-    html.table(
-        regions.spread(lead, regions.dependence(missions)),
-        "Lowest and highest mean difference [points] by parameter, the share of the variance that "
-        "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
-    ),
-    html.table(
-        regions.listed(leaves, policy),
-        f"{policy} is {regions.tally(leaves)} regions of a regression tree, fitted to the other "
-        "half",
-    ),
-    html.table(
-        head_to_head.listed(worst, study, pair),
-        f"The worst missions of {policy}; {depleted} of its UAVs run out of battery in these",
-    ),
-    html.table(head_to_head.listed(lost, study, pair), f"The greatest losses to {pair.baseline}"),
-    html.table(decision_times.listed(times, study), "Time of a decision for the UAVs of a mission"),
+html.table(head_to_head.outcomes(missions, pair), "Outcomes of the missions")
+
+# %%
+html.table(
+    regions.spread(lead, regions.dependence(missions)),
+    "Lowest and highest mean difference [points] by parameter, the share of the variance that "
+    "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
 )
+
+# %%
+html.table(
+    regions.listed(leaves, policy),
+    f"{policy} is {regions.tally(leaves)} regions of a regression tree, fitted to the other half",
+)
+
+# %%
+html.table(
+    head_to_head.listed(worst, study, pair),
+    f"The worst missions of {policy}; {depleted} of its UAVs run out of battery in these",
+)
+
+# %%
+html.table(head_to_head.listed(lost, study, pair), f"The greatest losses to {pair.baseline}")
+
+# %%
+html.table(decision_times.listed(times, study), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made

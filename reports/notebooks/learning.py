@@ -19,7 +19,6 @@ trained = None  # folder with curves.parquet and a folder per policy; None for t
 # %%
 from pathlib import Path
 
-from IPython.display import display
 from matplotlib.figure import Figure
 
 from analysis import numbers
@@ -125,6 +124,8 @@ transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)
 by_metric = dict(zip(metrics, (claims.RULES["throughout"], claims.RULES["passes"]), strict=True))
 verdicts = {key: by_metric[key[1]].judge(compared) for key, compared in transfers.items()}
 best = last.groupby("variant")[final].max().map(numbers.percent)
+
+# %%
 html.say(
     "The trainings have {steps:,} steps; in the paper the curves cross at {paper:,}, and shorter "
     "trainings are inconclusive. With {name}, the best training with transfer reaches a product of "
@@ -139,19 +140,21 @@ html.say(
 # ## Tables
 
 # %%
-display(
-    html.table(
-        ablation.ablation_table(table, last, baseline),
-        "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
-        "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
-    ),
-    html.table(
-        learning.transfer_table(transfers, verdicts),
-        "With transfer against without: the last difference with its 99 % interval (of the product "
-        "in points)",
-    ),
-    html.table(policies.settings_table(shipped), "The settings of the shipped policies"),
+html.table(
+    ablation.ablation_table(table, last, baseline),
+    "Means over n trainings with 95 % intervals, the prediction interval of one new training, "
+    "and differences with Welch's t interval. ▲ better, ▼ worse, ≈ inconclusive",
 )
+
+# %%
+html.table(
+    learning.transfer_table(transfers, verdicts),
+    "With transfer against without: the last difference with its 99 % interval (of the product "
+    "in points)",
+)
+
+# %%
+html.table(policies.settings_table(shipped), "The settings of the shipped policies")
 
 # %% [markdown]
 # ## How this page was made

@@ -61,18 +61,13 @@ html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in found)
 
 # %%
 mission = mission_of(load_scenario(scenario, **example), load_team(policies[0]), seed)
+map_of_mission = mission_figure(mission.events, mission.scenario)
+
+# %%
 html.gallery(
     [
-        (
-            sea_figure(sea),
-            "Map of the sea",
-            f"The n = {len(sea.nodes)} sensor nodes and the zone. The y axis points south.",
-        ),
-        (
-            mission_figure(mission.events, mission.scenario),
-            "Map of a mission; battery, residual data and charging",
-            f"A mission of {policies[0]}, replication 0 (n = 1).",
-        ),
+        (sea_figure(sea), "Map of the sea", f"The n = {len(sea.nodes)} nodes and the zone."),
+        (map_of_mission, "Map of a mission", f"A mission of {policies[0]}, replication 0 (n = 1)."),
     ]
 )
 

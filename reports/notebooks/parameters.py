@@ -21,8 +21,6 @@ heuristic = None  # the other policy to show; None for the best that is not lear
 # %%
 from pathlib import Path
 
-from IPython.display import display
-
 from analysis import load_results, names, numbers
 from analysis.figures import settings as figures
 from analysis.questions import main_effects, sensitivity, summary
@@ -139,22 +137,24 @@ html.say(
 # ## Tables
 
 # %%
-display(
-    html.table(
-        main_effects.listed(effects, changes, ratios),
-        f"Product; differences in points with {level} intervals, also of the collection ratio",
-    ),
-    html.table(
-        sweet_spot.table(sweet),
-        f"The selected settings and their checks: means with {level} intervals, the difference "
-        "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
-        "out",
-    ),
-    html.table(
-        sensitivity.index_table(of_ratio),
-        f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
-        data=indices,
-    ),
+html.table(
+    main_effects.listed(effects, changes, ratios),
+    f"Product; differences in points with {level} intervals, also of the collection ratio",
+)
+
+# %%
+html.table(
+    sweet_spot.table(sweet),
+    f"The selected settings and their checks: means with {level} intervals, the difference "
+    "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
+    "out",
+)
+
+# %%
+html.table(
+    sensitivity.index_table(of_ratio),
+    f"Sobol indices of the collection ratio, with {level} intervals (bootstrap over blocks)",
+    data=indices,
 )
 
 # %%

@@ -134,19 +134,21 @@ if bounded and len(gaps := gap.useful(gap.by_fleet(bounded))):
 
 # %%
 marks = "▲ our interval is above the paper's number, ▼ below, ≈ contains it"
-display(
-    html.table(
-        questions.beside_paper(overall, {None: paper.TABLE_IV}),
-        f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
-    ),
-    html.table(
-        questions.beside_paper(fig4_fleets, paper.FIG_4),
-        f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
-    ),
-    html.table(
-        tables.estimates(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
-        "Means with 95 % intervals, by number of UAVs",
-    ),
+html.table(
+    questions.beside_paper(overall, {None: paper.TABLE_IV}),
+    f"Table IV: means with 95 % intervals, and the difference in points; {marks}",
+)
+
+# %%
+html.table(
+    questions.beside_paper(fig4_fleets, paper.FIG_4),
+    f"Fig. 4: means with 95 % intervals, and the difference in points; {marks}",
+)
+
+# %%
+html.table(
+    tables.estimates(fleets[fleets["metric"].isin(METRICS)], ["policy", "uavs", "n"]),
+    "Means with 95 % intervals, by number of UAVs",
 )
 
 # %% [markdown]

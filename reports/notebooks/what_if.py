@@ -58,6 +58,8 @@ html.say("Of the pairs, {better}.", better=html.composed(better))
 # %%
 measured = [metric for metric in answer.measured(found) if found.missions[metric].any()]
 caption = f"n = {missions:,} missions per dot; bars are 95 % intervals of the means."
+
+# %%
 spread = f"{pairs}. The lower panel ends at the 5 % and 95 % quantiles."
 html.gallery(
     [

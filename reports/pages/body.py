@@ -29,6 +29,8 @@ TERMS = {
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")
 _EXPLAINED = ("p", "li", "figcaption")  # elements in whose text terms are explained
+# What nbconvert puts around the cells of a notebook and around their outputs.
+_WRAPPERS = 'div.cell, div.inner_cell, div.text_cell_render, div[class^="output"]'
 _INDEX = re.compile(r"\bC_([SC])\b")  # as in C_S, a threshold of charging
 
 
@@ -59,8 +61,10 @@ class Body:
             extra_template_basedirs=[],  # otherwise templates in the working directory come first
         )
         soup = BeautifulSoup(exporter.from_notebook_node(notebook)[0], "html.parser")
-        for cell in soup.select('div[class*="jp-"], div[class*="celltag"]'):
-            cell.unwrap()
+        for prompt in soup.select("div.prompt"):
+            prompt.decompose()
+        for wrapper in soup.select(_WRAPPERS):
+            wrapper.unwrap()
         found = soup.select_one("p.answer")
         answer = found.extract() if found else soup.new_tag("p")
         for count, figure in enumerate(soup.find_all("figure"), 1):
@@ -116,7 +120,7 @@ def _sections(soup: BeautifulSoup) -> Iterator[tuple[Tag, str]]:
     """Make a section of every second-level heading and what follows it; the method is folded."""
     for heading in soup.find_all("h2"):
         title, following = heading.get_text(), [*heading.next_siblings]
-        section = soup.new_tag("section", id=str(heading.attrs.pop("id", title)))
+        section = soup.new_tag("section", id=re.sub(r"\W+", "-", title).strip("-"))
         heading.insert_before(section)
         ends = (n for n, item in enumerate(following) if getattr(item, "name", "") == "h2")
         content = following[: next(ends, len(following))]
@@ -134,7 +138,7 @@ def _sections(soup: BeautifulSoup) -> Iterator[tuple[Tag, str]]:
 
 def _beside(soup: BeautifulSoup, section: Tag) -> None:
     """Put the text of a section beside its figure, if it has one figure and begins with text."""
-    figures = section.find_all("figure", class_="", recursive=False)
+    figures = section.find_all("figure", class_=lambda name: name != "lead", recursive=False)
     words = section.find_all(["p", "ul"], recursive=False)
     if len(figures) == 1 and words:
         both = soup.new_tag("div", attrs={"class": "beside"})

@@ -49,7 +49,7 @@ _HARMFUL = re.compile(r"[<>\[\]$]|:(?=//)|(?<=www)\.")
 _MARKUP = re.compile(
     rf"{_HARMFUL.pattern}|[&\\`*|~]|(?<![^\W_])_|_(?![^\W_])|^[-+=#](?!\d)|^\d+(?=[.)](\s|$))"
 )
-# The coordinates in a figure, a number with many decimals, and the space around a command of a path.
+# The coordinates in a figure, a number with many decimals, the space around a command of a path.
 _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}

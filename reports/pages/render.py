@@ -23,12 +23,12 @@ from dess.files.locks import locked
 from dess.files.reading import paths_in
 from dess.files.writing import delete, write_files
 from reports.folders import INDEX, LOCK, check_pages
-from reports.pages import kernels, missions
 from reports.pages.body import Body
 from reports.pages.index import index_of, pages_in, with_bar
-from reports.pages.kernels import Progress
 from reports.pages.keys import has_key, key_of
 from reports.pages.notebook import SHIPPED, Report, check_parameters, names_in, read, with_paths
+from reports.pages.running import kernels, missions
+from reports.pages.running.kernels import Progress
 from reports.pages.study.sections import report_of
 from reports.pages.template import fill
 
@@ -190,14 +190,14 @@ def _check_results(folder: Path) -> None:
 def _page(report: Report) -> str:
     """The page of a report that has been run."""
     code = Markup(highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter()))
-    body = Body.of(_cleaned(report.notebook))
+    body = body_of(report.notebook)
     return fill("report.html", scripts=report.scripts, report=report, body=body, code=code)
 
 
-def _cleaned(notebook: NotebookNode) -> NotebookNode:
-    """A notebook without widgets, which only Jupyter shows, and without what it wrote to stderr.
+def body_of(notebook: NotebookNode) -> Body:
+    """The body of the page of a notebook that has been run, without widgets.
 
-    That is logged instead.
+    What the notebook wrote to stderr is logged instead.
     """
     notebook.metadata.pop("widgets", None)
     for cell in notebook.cells:
@@ -207,4 +207,4 @@ def _cleaned(notebook: NotebookNode) -> NotebookNode:
             is_error = output.get("name") == "stderr" or output.output_type == "error"
             if is_error or _WIDGET in output.get("data", {}):
                 cell.outputs.remove(output)
-    return notebook
+    return Body.of(notebook)

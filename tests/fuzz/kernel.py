@@ -15,8 +15,8 @@ from nbformat.v4 import new_output
 
 from dess import InputError
 from reports.pages import html, kernels
-from reports.pages.kernels import Progress
 from reports.pages.notebook import Report
+from reports.pages.running.kernels import Progress
 
 
 def run_here() -> None:

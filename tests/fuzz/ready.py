@@ -8,8 +8,8 @@ from analysis import load_study, run_study
 from analysis.questions.missions import FOLDER
 from analysis.verification import cross_check
 from policies import registry
-from reports.pages import missions
 from reports.pages.notebook import NAMES
+from reports.pages.running import missions
 from tests.fuzz.case import OUT, Case
 from tests.fuzz.child import STDERR
 from tests.fuzz.forks import Forks

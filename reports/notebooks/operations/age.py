@@ -30,6 +30,8 @@ from reports.pages import html
 study = load_results(Path(results) / "age")
 ages = [names.AGE, "peak_age", "age_p99"]
 means = operations.means(study, [*ages, names.RATIO])
+
+# %%
 caption = (
     f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
 )

@@ -35,6 +35,8 @@ counts = [c for c in columns if study.missions[c].max() > 0]
 metrics = [names.PRODUCT, names.SUCCESS, names.RATIO]
 means = operations.means(study, [*metrics, *counts])
 rate, repair = operations.RATE, operations.REPAIR
+
+# %%
 caption = (
     f"n = {numbers.span(means.loc[means['metric'].isin(metrics), 'n'])} missions per dot; bars are "
     f"{numbers.level(LEVEL)} intervals. A repair time of 0 means that a failed UAV is lost."

@@ -34,6 +34,8 @@ from reports.pages import html
 study = load_results(Path(results) / "pads")
 uses = ["waiting", "queue", names.UTILISATION]
 means = operations.means(study, [names.PRODUCT, names.SUCCESS, *uses])
+
+# %%
 caption = (
     f"n = {numbers.span(means['n'])} missions per dot; bars are {numbers.level(LEVEL)} intervals."
 )

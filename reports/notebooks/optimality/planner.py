@@ -22,8 +22,6 @@ learner = "ddqn"  # the policy that has learned
 # %%
 from pathlib import Path
 
-from IPython.display import display
-
 from analysis import load_results, numbers
 from analysis.figures import comparison as figures
 from analysis.figures import fronts, learning
@@ -92,24 +90,21 @@ html.gallery(
 # %%
 home = questions.at_home(study, [planner, learner])
 rows = home.assign(panel=0, **dict.fromkeys(("mean", "low", "high"), home["share"]))
+zone = learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"})
 mission = questions.example(study, planner)
 replication = int(mission.row["replication"])
 plan = maps.plan(mission.log, mission.scenario, questions.plan(study, planner, replication))
 values, title = questions.node_prices(study, replication), "Price of a node's data"
+prices = maps.node_map(nodes, title, values, write="{:.2f}".format)
+
+# %%
+counted = f"n = {logged} missions. A UAV that has filled its quota has left the mission."
+paid = f"n = 1, mission {replication}: what one more data unit would add to the upper bound."
 html.gallery(
     [
-        (
-            learning.courses(rows, "policy", "%", {0: "Share of the UAVs in the charging zone"}),
-            "The share of the UAVs in the charging zone over the slots of the mission",
-            f"n = {logged} missions. A UAV that has filled its quota has left the mission.",
-            home,
-        ),
+        (zone, "The share of the UAVs in the charging zone over the slots", counted, home),
         (plan, "The plan of the first slot, over the mission as simulated", mission.caption),
-        (
-            maps.node_map(nodes, title, values, write="{:.2f}".format),
-            "The price of every node's data in the upper bound of the same mission",
-            f"n = 1, mission {replication}: what one more data unit would add to the upper bound.",
-        ),
+        (prices, "The price of every node's data in the upper bound", paid),
     ]
 )
 
@@ -124,48 +119,42 @@ html.say("{gap}", gap=html.composed(gap.in_words(study, planners[-1])))
 
 # %%
 by_product = differences[differences["metric"] == PRODUCT]
-html.gallery(
-    [
-        (
-            figures.differences(by_product),
-            f"Paired differences from {learner} in the product, by number of UAVs",
-            f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals.",
-            by_product,
-        ),
-        *(
-            (
-                figures.gaps(gaps),
-                "The product of every policy and the upper bound, by number of UAVs",
-                f"n = {numbers.span(gaps['n'])} missions; bars and band are 95 % intervals.",
-            )
-            for gaps in [gap.useful(gap.by_fleet(study))]
-            if len(gaps)
-        ),
-    ]
-)
+gaps = gap.by_fleet(study)
+useful = gap.useful(gaps)
+caption = f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals."
+drawn = [
+    (figures.differences(by_product), f"Paired differences from {learner} in the product", caption)
+]
+if len(useful):
+    alt = "The product of every policy and the upper bound, by number of UAVs"
+    drawn.append((figures.gaps(useful), alt, f"{caption[:-1]}, the band as well."))
+html.gallery(drawn)
 
 # %% [markdown]
 # ## Tables
 
 # %%
-gaps = gap.by_fleet(study)
-display(
-    html.table(
-        tables.estimates(
-            differences.assign(mean=differences["difference"]),
-            ["policy", "uavs", "n"],
-            write=numbers.points,
-        ),
-        f"Paired differences from {learner} in points, with 95 % intervals",
-        data=differences,
+html.table(
+    tables.estimates(
+        differences.assign(mean=differences["difference"]),
+        ["policy", "uavs", "n"],
+        write=numbers.points,
     ),
-    html.table(gap.listed(gaps), "Means, the upper bound, and the gap in points", data=gaps),
-    html.table(
-        questions.returns(study, [planner, learner]),
-        f"Means over charging sessions of the same {logged} missions",
-    ),
-    html.table(decision_times.listed(times, study), "Time of a decision for the UAVs of a mission"),
+    f"Paired differences from {learner} in points, with 95 % intervals",
+    data=differences,
 )
+
+# %%
+html.table(gap.listed(gaps), "Means, the upper bound, and the gap in points", data=gaps)
+
+# %%
+html.table(
+    questions.returns(study, [planner, learner]),
+    f"Means over charging sessions of the same {logged} missions",
+)
+
+# %%
+html.table(decision_times.listed(times, study), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made

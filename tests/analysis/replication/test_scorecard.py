@@ -14,11 +14,18 @@ from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.replication import paper
 from analysis.replication import scorecard as module
 from analysis.replication.claims import SECTIONS
-from analysis.replication.scorecard import Finding, Row, departures, of_policy, scorecard
-from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
+from analysis.replication.scorecard import NULLS, Finding, Row, departures, of_policy, scorecard
+from analysis.replication.verdict_rules import (
+    EXCEEDS,
+    FALLS_SHORT,
+    MATCHES,
+    NO_RESULTS,
+    NOT_APPLICABLE,
+    VERDICTS,
+)
 from analysis.results.tables import Results
 from analysis.stats.intervals import interval_of
-from analysis.stats.verdict import HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
+from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED, position
 from dess import InputError
 from policies.ddqn.description import read_description
 from policies.registry import TRAINED
@@ -26,7 +33,7 @@ from tests.analysis.small import grid, small_study
 
 NOTEBOOKS = Path(__file__).parents[3] / "reports" / "notebooks"
 TABLE_4, FIG_3, FIG_5 = (SECTIONS[name] for name in ("table-4", "fig-3", "fig-5"))
-POLICIES = ["greedy", "ddqn"]
+POLICIES = ["greedy", "random", "random-unguarded", "ddqn"]
 RULE = {"procedure": "kn-bounded", "first": 4, "indifference": 0.02, "budget": 40, "check": 12}
 NONE = pd.DataFrame()
 
@@ -108,11 +115,39 @@ def test_every_claim_has_a_section_with_its_evidence_and_a_rule(rows: list[Row])
 
 def test_every_claim_is_judged_by_the_learned_policy_alone(rows: list[Row]) -> None:
     for row in rows:
-        ours, papers = row.findings
+        ours, papers, *nulls = row.findings
         assert ours.verdict != NO_RESULTS and ours.quantities, ours.note
         assert ours.policy == ("" if row.section is FIG_3 else "ddqn")
         lacks = "trainings of this policy" if row.section is FIG_3 else "has no policy ddqn-paper"
         assert papers.verdict == NO_RESULTS and lacks in papers.note
+        assert [null.policy for null in nulls] == ([""] * 3 if row.section is FIG_3 else [*NULLS])
+
+
+@pytest.mark.parametrize("null", NULLS[:2])
+def test_in_the_place_of_the_learned_policy_a_null_passes_no_diagnostic_claim(
+    null: str, studies: dict[str, Results]
+) -> None:
+    posing = {}
+    for name in ("table4", "fig5"):
+        missions = studies[name].missions
+        others = missions[missions["policy"] != "ddqn"]
+        copied = missions[missions["policy"] == null].assign(policy="ddqn")
+        together = pd.concat([others, copied], ignore_index=True)
+        posing[name] = replace(studies[name], missions=together)
+    found = [row for row in scorecard(posing, NONE) if row.is_diagnostic]
+    assert found and sum(row.findings[0].holds for row in found) <= 2
+
+
+def test_what_holds_above_the_papers_number_exceeds_it() -> None:
+    outcomes = {
+        Finding(HOLDS, against=ABOVE): EXCEEDS,
+        Finding(HOLDS, against=INCONCLUSIVE): MATCHES,
+        Finding(IN_PART, against=BELOW): FALLS_SHORT,
+        Finding(REFUTED): FALLS_SHORT,
+        Finding(IN_PART): INCONCLUSIVE,
+        Finding(NO_RESULTS): NOT_APPLICABLE,
+    }
+    assert all(finding.outcome == outcome for finding, outcome in outcomes.items())
 
 
 def test_without_results_there_are_no_verdicts(rows: list[Row]) -> None:

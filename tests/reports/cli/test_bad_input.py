@@ -8,7 +8,7 @@ from tests.analysis.small import files_of
 BAD = {
     "simulat": ["No such command 'simulat'. Did you mean 'simulate'?"],
     "simulate --polcy greedy": ["No such option: --polcy", "--policy"],
-    f"report {'x' * 300}": ["is unknown; allowed: mission"],
+    f"report {'x' * 300}": ["is unknown; allowed: own-sea"],
     "report what-if --parameter missons=3": ["'missons' is unknown to what-if (did you mean"],
     "report what-if --parameter policies=greedy": ["text in quotes: 'scenario=\"bay\"'"],
     "study run comparson": ["no such study (did you mean comparison?)"],

@@ -12,7 +12,7 @@ from analysis import load_results, load_study, numbers, run_study
 from analysis.questions import decision_times, head_to_head, regions, summary
 from analysis.questions.missions import FOLDER
 from dess import InputError
-from reports.pages import missions as missions_of_pages
+from reports.pages.running import missions as missions_of_pages
 from tests.reports.small import said_by, shown_by
 
 NAME = "comparison"

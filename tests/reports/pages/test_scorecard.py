@@ -7,14 +7,13 @@ from html.parser import HTMLParser
 
 import pytest
 
-from analysis import numbers
-from analysis.replication import measures, paper
+from analysis.replication import measures
 from analysis.replication.claims import RULES, Claim, Section
 from analysis.replication.measures import Quantity
-from analysis.replication.scorecard import Finding, Row
-from analysis.replication.verdict_rules import NO_RESULTS, VERDICTS
+from analysis.replication.scorecard import COLUMNS, Finding, Row
+from analysis.replication.verdict_rules import NO_RESULTS
 from analysis.stats.verdict import ABOVE, BELOW, HOLDS, IN_PART, INCONCLUSIVE, REFUTED
-from reports.pages.scorecard import as_html
+from reports.pages.scorecard import answer, as_html, counts
 
 ABSENT = Finding(NO_RESULTS, note="the study fig4 has not run")
 
@@ -29,7 +28,8 @@ def row(
 ) -> Row:
     """A row of the scorecard; pages do not look at how a claim is measured and judged."""
     claim = Claim(text, place, RULES["most"], measures.missed_data, printed)
-    return Row(Section(*section, "fig4", [claim]), claim, rule, findings)
+    nulls = (ABSENT,) * (len(COLUMNS) - len(findings))
+    return Row(Section(*section, "fig4", [claim]), claim, rule, (*findings, *nulls))
 
 
 TABLE_4, FIG_4 = ("Table IV", "performance.html#table-4"), ("Fig. 4", "mission.html#fig-4")
@@ -71,7 +71,7 @@ ROWS = [
 
 @pytest.fixture(scope="module")
 def html() -> str:
-    return as_html(ROWS).data
+    return as_html(ROWS, "The claims").data
 
 
 def text_of(html: str) -> str:
@@ -104,64 +104,36 @@ def test_every_row_is_told(html: str) -> None:
     for shown in (
         "Collection ratio <over> missions",
         "79.8 % (n = 1,000)",
-        "85.9 % [85.0, 86.7] (n = 1,000)",
-        "interval above the paper's number",
-        "75.8 % [75.1, 76.5] (n = 1,000)",
-        "interval below the paper's number",
+        "exceeds 85.9 % [85.0, 86.7] (n = 1,000)",
+        "falls short 75.8 % [75.1, 76.5] (n = 1,000)",
         "no number",
-        "change: 0.0 [−0.9, +0.9] points (n = 300)",
+        "inconclusive change: 0.0 [−0.9, +0.9] points (n = 300)",
         "crossing: 800,000 steps",
         "−13 [−46, +21] (n = 3)",
         "UAVs: 3",
-        "ends below of quick",
-        "the study fig4 has not run",
+        "does not apply the study fig4 has not run",
     ):
         assert shown in text, shown
 
 
-def test_verdicts_are_words_and_signs_and_are_counted(html: str) -> None:
-    text = text_of(html)
-    counts = "1 ✓ holds 1 ? inconclusive 1 ✗ does not hold"
-    assert f"The best learned policy (ddqn) , of 3 claims: {counts}" in text
-    other = "The paper's network and algorithm, with our additions (plain)"
-    assert f"{other} , of 3 claims: 1 ◐ holds in part 2 – no results" in text
-    for verdict in VERDICTS:
-        assert re.search(rf'<span class="verdict [a-z-]+">. {verdict}</span>', html)
-    assert html.count('class="verdict ') == 2 * len(ROWS) + 5
+def test_columns_are_named_by_their_policies_and_verdicts_are_counted(html: str) -> None:
+    assert re.findall('<th scope="col">(.*?)</th>', html) == [
+        "Claim", "Paper", "ddqn", "plain", *COLUMNS[2:],
+    ]  # fmt: skip
+    table = counts(ROWS).set_index(["Claims", "Policy"])
+    assert table.loc[("all", "ddqn")].tolist() == [1, 0, 1, 1, 0]
+    assert table.loc[("diagnostic", "greedy"), "Does not apply"] == 3
 
 
-def test_on_a_phone_every_cell_has_its_label(html: str) -> None:
-    assert html.count('<tr class="claim">') == len(ROWS)
-    assert html.count("data-label=") - html.count("attr(data-label") >= 3 * len(ROWS)
-    assert html.count('<td data-label="The best learned policy (ddqn)">') == len(ROWS)
+def test_the_answer_counts_diagnostic_claims_apart() -> None:
+    passed = replace(ROWS[0], findings=(*ROWS[0].findings[:2], *[Finding(HOLDS, "greedy")] * 3))
+    assert "Of 3 claims, 3 are diagnostic" in answer(ROWS)
+    assert "ddqn passes 1 of these 3, and 1 of all." in answer(ROWS)
+    text = answer([passed, *ROWS[1:]])
+    assert "2 are diagnostic" in text and "ddqn passes 0 of these 2, and 1 of all." in text
 
 
 def test_it_is_whole_and_loads_nothing(html: str) -> None:
     elements = Elements(html)
     assert not elements.open
     assert elements.links == ["performance.html#table-4", "mission.html#fig-4", "learning.html"]
-
-
-def test_without_any_results_columns_have_no_policy() -> None:
-    rows = [row(FIG_4, "Claim", "Place", "Holds if so.", None, ABSENT, ABSENT)]
-    text = text_of(as_html(rows).data)
-    assert "The best learned policy , of 1 claim: 1 – no results" in text
-    assert "()" not in text
-
-
-def test_it_says_how_to_read_it() -> None:
-    success = Quantity(*paper.spread(0.901, 1000), n=1000)
-    rows = [replace(ROWS[0], claim=replace(ROWS[0].claim, printed=success)), *ROWS[1:]]
-    text = text_of(as_html(rows, departures=["a guard", "5-step returns"]).data)
-    spread = numbers.interval(*success.interval).partition(" % ")[2]
-    assert (
-        f"At 95 % (Wilson) the intervals are {spread} for a success in 90.1 % of 1,000 missions"
-        in text
-    )
-    assert f"does not hold for all {len(rows)} rows together" in text
-    assert (
-        "The counts of verdicts are not a score" in text
-        and "the same missions that judge it" in text
-    )
-    assert "plain has the paper's observation, network and Algorithm 1." in text
-    assert "It differs from the paper in a guard and 5-step returns." in text

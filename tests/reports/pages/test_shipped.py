@@ -18,7 +18,7 @@ from analysis.questions.missions import FOLDER
 from policies.registry import trained_names
 from reports.pages.html import STUDY, embedded
 from reports.pages.notebook import NAMES, read
-from reports.pages.render import html_of, render
+from reports.pages.render import body_of, render
 from reports.player import library
 from tests.reports.browser import Visit
 from tests.reports.pages.test_render import another_environment
@@ -162,7 +162,7 @@ def test_notebooks_run_in_jupyter_and_show_what_the_pages_show(
     assert notebook.cells.pop(0).source.startswith("# ")
     NotebookClient(notebook, resources={"metadata": {"path": str(folder)}}).execute()
     assert all(cell.execution_count for cell in notebook.cells if cell.cell_type == "code")
-    assert html_of(notebook) in (folder / f"{name}.html").read_text("utf-8")
+    assert body_of(notebook).html in (folder / f"{name}.html").read_text("utf-8")
 
 
 @pytest.mark.parametrize("width", [1280, 390])

@@ -21,6 +21,7 @@ from dess import InputError
 from policies.registry import TRAINED
 from reports.cli import main
 from reports.pages import html, verify
+from reports.pages.body import Body
 from reports.pages.html import STUDY, embedded
 from reports.pages.index import index_of, pages_in
 from reports.pages.notebook import NAMES, read
@@ -48,11 +49,12 @@ def page(results: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("out")
     shown = html.table(pd.DataFrame({"Success": ["97.3 %"]}))
     origins = html.provenance([load_results(results / name) for name in ("table4", "fig4")])
-    parts = {"body": Markup(shown.data + origins.data), "code": Markup("")}
+    body = Body("", "", {}, shown.data + origins.data)
+    parts = {"body": body, "code": Markup("")}
     (out / "performance.html").write_text(
         fill("report.html", report=read("performance"), **parts), "utf-8"
     )
-    (out / "index.html").write_text(index_of(pages_in(out), [*map(read, NAMES)]), "utf-8")
+    (out / "index.html").write_text(index_of(pages_in(out)), "utf-8")
     return out / "performance.html"
 
 
@@ -187,7 +189,7 @@ def test_an_altered_page_does_not_get_into_the_index(
 ) -> None:
     folder = shutil.copytree(page.parent, tmp_path / "out")
     assert {*pages_in(folder)} == {"performance.html"}
-    altered(page, "Performance", "Perfection", folder / "performance.html")
+    altered(page, "How good are the policies", "Perfection", folder / "performance.html")
     (folder / "comparison.html").write_bytes(b"\xff")
     old = page.read_text("utf-8").replace(embedded(STUDY, page.read_text("utf-8"))[0], "{}")
     (folder / "mission.html").write_text(sealed(old), "utf-8")
@@ -267,7 +269,7 @@ def test_the_command_says_what_it_found(
         assert [check["compared"] for check in checks] == [1, 20, 20]
     else:
         assert re.search(r"table4 +20 +0", out)
-    forged = altered(page, "Performance", "Perfection", tmp_path / "page.html")
+    forged = altered(page, "How good are the policies", "Perfection", tmp_path / "page.html")
     assert main(["verify", str(forged), *options]) == 1
     captured = capsys.readouterr()
     assert "the page has been altered" in captured.err.splitlines()[0]

@@ -59,19 +59,17 @@ def test_rows_are_by_number_of_uavs_then_over_all(results):
     assert table[GAP].tolist() == pytest.approx([0.2, 0.15, 0.2, 0.05, 0.2, 0.11])
 
 
-def test_the_closest_policy_is_first_and_far_is_the_upper_end(results):
-    table = gap.by_fleet(results)
-    far = gap.at_most(table)
-    assert far["Policy"].tolist() == ["high", "low"]
-    assert [*far] == ["Policy", "1 UAV", "2 UAVs", "all missions"]
-    assert far["1 UAV"].tolist() == [f"{15 + 24.8:.1f}", f"{20 + 24.8:.1f}"]
-
-
-def test_the_sentence_names_the_best_policy(results):
+def test_the_sentence_is_about_fleets_whose_bound_says_something(results, monkeypatch):
     text = gap.in_words(results)
-    assert text.startswith("**`high` is at most 39.8 points with 1 UAV (mean gap 15.0 [")
-    assert "points with 2 UAVs (mean gap 5.0 [" in text
-    assert gap.in_words(results, "low").startswith("**`low` is at most 44.8 points")
+    assert text.startswith("`high` is at most 39.8 points with 1 UAV (mean gap 15.0 [")
+    assert gap.in_words(results, "low").startswith("`low` is at most 44.8 points")
+    table = gap.by_fleet(results)
+    certain = table.assign(**{BOUND: table[BOUND].mask(table["uavs"] == 2, 1.0)})
+    assert {*gap.useful(certain)["uavs"]} == {1}
+    monkeypatch.setattr(gap, "by_fleet", lambda _: certain)
+    text = gap.in_words(results)
+    assert "with 2 UAVs" not in text
+    assert text.endswith("The upper bound is 100 % for 2 UAVs, so there is no useful bound.")
 
 
 def test_results_without_bounds_have_no_gap(tmp_path, monkeypatch):

@@ -229,4 +229,4 @@ def test_the_outcome_of_a_mission_names_the_uavs_that_failed(results):
 
 def test_shares_of_missions_with_more_and_less_are_counted():
     text = what_if_answer.winners({"greedy": pd.Series([0.1, 0.0, -0.1, 0.4])})
-    assert text == "greedy is better in 50.0 % of the missions and worse in 25.0 %"
+    assert text == "greedy is better in 50.0 % and worse in 25.0 %"

@@ -21,15 +21,15 @@ from nbformat import from_dict
 
 from dess import InputError
 from dess.files.locks import temporary_folder
-from reports.pages import cells
-from reports.pages.cells import kill
 from reports.pages.notebook import Report
+from reports.pages.running import cells
+from reports.pages.running.cells import kill
 
 # Called after every cell, with the number of cells run so far and of all cells, and the report.
 Progress = Callable[[int, int, str], None]
 
 HOME = "dess-pages-"  # beginning of the name of the folder in which the notebooks run
-PACKAGES = Path(__file__).parents[2]  # the folder from which this package was imported
+PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
 
 
 def run(reports: Sequence[Report], progress: Progress | None = None) -> None:

@@ -15,7 +15,7 @@ from analysis.questions import decision_times, head_to_head
 from analysis.questions.missions import keep_logs
 from analysis.results.tables import load_results
 from analysis.verification import cross_check
-from reports.pages.kernels import Progress
+from reports.pages.running.kernels import Progress
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
 PLANNER, GAP = "planner", "gap"  # a page and its study

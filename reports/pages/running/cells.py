@@ -3,7 +3,7 @@
 The process imports what the notebooks import, once for all. It is the other end of ``kernels``, and
 imports nothing that only rendering needs::
 
-    python -m reports.pages.cells < notebooks.json
+    python -m reports.pages.running.cells < notebooks.json
 """
 
 import ast

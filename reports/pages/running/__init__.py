@@ -1,0 +1,1 @@
+"""What runs for a page: missions that it needs beside results, and its notebook."""
