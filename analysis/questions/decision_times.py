@@ -160,19 +160,14 @@ def _processor() -> str:
     return next(filter(None, [*models, platform.processor(), platform.machine()]), "unknown")
 
 
-def listed(times: Times, results: Results) -> pd.DataFrame:
-    """The times as a table to print, with a row per policy.
-
-    The last column is the speed of a UAV that crosses one cell in the time of a slow call.
-    """
-    cell_size = results.scenario().cell_size
+def listed(times: Times) -> pd.DataFrame:
+    """The times as a table to print, with a row per policy."""
     return pd.DataFrame(
         {
             "Policy": cost.policy,
             "Median": numbers.seconds(cost.median),
             "95 % below": numbers.seconds(cost.slow),
             "Calls": f"{cost.calls:,}",
-            "Fast enough up to [m/s]": f"{float(f'{cell_size / cost.slow:.2g}'):,.0f}",
         }
         for cost in times.costs
     )

@@ -154,7 +154,7 @@ html.table(
 )
 
 # %%
-html.table(decision_times.listed(times, study), "Time of a decision for the UAVs of a mission")
+html.table(decision_times.listed(times), "Time of a decision for the UAVs of a mission")
 
 # %% [markdown]
 # ## How this page was made

@@ -4,7 +4,7 @@ import pytest
 
 from analysis import run_study
 from analysis.questions import decision_times
-from analysis.questions.decision_times import CALLS, Cost, Times
+from analysis.questions.decision_times import CALLS
 from analysis.questions.head_to_head import Pair
 from dess import InputError, simulate
 from policies import load
@@ -82,14 +82,6 @@ def test_they_are_measured_once_for_the_same_results(results, tmp_path, monkeypa
     monkeypatch.delattr(decision_times, "measure")
     decision_times.make(tmp_path, results)
     assert decision_times.read(tmp_path, results) == kept
-
-
-def test_the_table_has_the_speed_at_which_a_cell_takes_as_long_as_a_slow_call(results):
-    """A cell is 800 m wide."""
-    times = Times(processor="Chip", costs=[Cost(policy="a", calls=4, median=5e-4, slow=1e-3)])
-    assert results.scenario().cell_size == 800
-    row = ["a", "500 µs", "1 ms", "4", "800,000"]
-    assert decision_times.listed(times, results).to_numpy().tolist() == [row]
 
 
 def test_remarks_compare_the_pair_and_name_what_was_not_timed(measured, results):

@@ -29,7 +29,7 @@ def _sea(folder: Path) -> Path:
 def test_the_page_names_the_cheapest_fleet(tmp_path: Path) -> None:
     sea = _sea(tmp_path)
     text = said_by(NAME, results=str(tmp_path), scenario=str(sea), **ASKED)
-    assert "3 sensor nodes on 8 x 8 cells with a side of 800 m" in text
+    assert "3 sensor nodes on 8 x 8 cells of 800 m" in text
     assert re.search(r"All conditions together, greedy: the cheapest setting .*is 1 UAV\b", text)
     assert "with probability at least 0.95" in text
     assert "--require success=0.5 --require collection_ratio=0.1" in text

@@ -65,7 +65,7 @@ def test_verdicts_are_those_of_the_scorecard(results: Path, text: str) -> None:
     judged = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
     assert len(judged) > 5
     for row in judged:
-        assert f"- {row.claim.text}: {row.findings[0].verdict}" in text
+        assert f"- {row.claim.text}: {row.findings[0].outcome}" in text
         assert row.rule in text
 
 
@@ -76,5 +76,5 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
         (folder / name).symlink_to(results / name)
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
     text = said_by("parameters", results=str(folder))
-    assert "if there is one, and the best heuristic: greedy." in text
-    assert "the verdicts for greedy" in text
+    assert "The product of greedy depends most on the" in text
+    assert "judged for greedy by the rules" in text

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from analysis import load_results, load_study, run_study
+from analysis import load_results, load_study, numbers, run_study
+from analysis.names import BOUND
 from analysis.questions import decision_times
 from analysis.questions.optimality import gap, planner
 from tests.reports.small import quick, run_small_studies, said_by, words
@@ -44,5 +45,5 @@ def test_the_performance_page_has_the_gap_where_the_study_was_run(
     text = said_by("performance", results=str(tmp_path))
     study = load_results(tmp_path / "gap")
     assert words(gap.in_words(study))[:60] in text
-    assert "Scorecard: at most so many points from the best possible" in text
-    assert gap.at_most(gap.by_fleet(study))["1 UAV"].iloc[0] in text
+    table = gap.by_fleet(study)
+    assert numbers.percent(table[BOUND].iloc[0]) in text or gap.useful(table).empty
