@@ -18,8 +18,17 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "sklearn", "SALib", "IPython", "jinja2"),
-        *("jupytext", "markupsafe", "nbconvert", "nbformat", "packaging", "pygments", "traitlets"),
+        *("matplotlib", "PIL", "seaborn", "sklearn", "SALib", "IPython", "bs4"),
+        *(
+            "jinja2",
+            "jupytext",
+            "markupsafe",
+            "nbconvert",
+            "nbformat",
+            "packaging",
+            "pygments",
+            "traitlets",
+        ),
     ),
     "distributed": ("distributed",),
     "tensorboard": ("tensorboard",),
