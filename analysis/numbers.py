@@ -1,7 +1,7 @@
 """How numbers are written on pages and in the terminal, such as shares in percent."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import pandas as pd
 
@@ -124,12 +124,6 @@ def span(values: Iterable[float], form: str = "{:,}") -> str:
 def words(names: Sequence[str]) -> str:
     """A list of names as ``a, b and c``."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-def headed(lines: Iterable[Mapping[tuple[str, str], str]]) -> pd.DataFrame:
-    """A table of text with two header rows: each line maps (upper, lower header) to its text."""
-    rows = [*lines]
-    return pd.DataFrame(rows, columns=pd.MultiIndex.from_tuples(rows[0] if rows else [("", "")]))
 
 
 def csv(frame: pd.DataFrame, form: str | None = None) -> str:

@@ -12,7 +12,6 @@ import seaborn as sns
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
-from analysis import numbers
 from analysis.figures import drawings, style
 from analysis.names import BOUND, METRICS, PRODUCT, metric_label, parameter
 from analysis.questions.head_to_head import Pair
@@ -69,29 +68,6 @@ def claims(table: pd.DataFrame) -> Figure:
         ax.set_yticks(range(len(names)), names)
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
         style.in_units(ax.xaxis, "points")
-    return figure
-
-
-def heat(table: pd.DataFrame, first: str, second: str) -> Figure:
-    """The mean difference over two parameters: blue where it is positive, orange where negative.
-
-    Args:
-        table: Rows of ``questions.regions.across``. Inconclusive means are in brackets.
-        first: The parameter of the rows.
-        second: The parameter of the columns.
-    """
-    names = [[*table.groupby(f"position{end}")[f"value{end}"].first()] for end in ("", "_2")]
-    widest = 1.4 * max(float(table["mean"].abs().max()), 0.01)
-    rows = table.rename(columns={"position": "row", "position_2": "column"})
-    texts = [numbers.difference(mean, 0) for mean in table["mean"]]
-    unsure = table["verdict"] == INCONCLUSIVE
-    rows["text"] = [f"({t})" if u else t for t, u in zip(texts, unsure, strict=True)]
-    with style.panels(1.5 + 0.55 * len(names[0])) as (figure, ax):
-        drawings.cells(rows, names, ax, cmap=diverging(), vmin=-widest, vmax=widest)
-        ax.invert_yaxis()
-        ax.set_xlabel(parameter(second).label, parse_math=True)
-        ax.set_ylabel(parameter(first).label, parse_math=True)
-        ax.set_title("Mean difference [points]")
     return figure
 
 

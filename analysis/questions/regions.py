@@ -1,11 +1,10 @@
-"""In which regions of the parameter space one policy is better than another, and where worse.
+"""For which parameters one policy is better than another, and for which worse.
 
 The missions of a design point that draws its parameters are a sample of the parameter space:
 
     missions = duels(results, pair)           # of questions.head_to_head
     lead = along(missions, pair.candidates)   # mean differences along every parameter
-    tally(lead)    # 'ahead in 15, behind in 0 and inconclusive in 3 of 18'
-    rules(missions, pair.candidates)          # regions of a regression tree
+    dependence(missions)                      # the share of the variance that each explains
 """
 
 from typing import Any
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from scipy import stats
-from sklearn.tree import DecisionTreeRegressor
 
 from analysis import numbers
 from analysis.names import PARAMETERS, PRODUCT, parameter, value_text
@@ -24,8 +22,6 @@ from analysis.stats.paired import paired
 from analysis.stats.verdict import ABOVE, BELOW, INCONCLUSIVE, position_by_test
 
 BINS = 5  # largest number of bins of a parameter
-# Of the regression tree: largest depth, and smallest number and share of missions in a leaf.
-DEPTH, LEAST, SHARE = 3, 20, 0.05
 
 AHEAD, BEHIND = "ahead", "behind"
 VERDICTS = {ABOVE: AHEAD, BELOW: BEHIND, INCONCLUSIVE: INCONCLUSIVE}
@@ -73,18 +69,6 @@ def along(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
     return _compared(pd.concat(parts), ["field", "position", "value"], candidates)
 
 
-def across(missions: pd.DataFrame, first: str, second: str, candidates: int = 1) -> pd.DataFrame:
-    """The mean difference over two parameters at once.
-
-    Returns:
-        A row per pair of bins with missions: ``position``, ``value`` (of the first), ``position_2``
-        and ``value_2`` (of the second), and the columns of a comparison, as in ``along``.
-    """
-    table = _binned(_binned(missions, second, "_2"), first)
-    columns = ["position", "value", "position_2", "value_2"]
-    return _compared(table.sort_values(columns[::2], kind="stable"), columns, candidates)
-
-
 def dependence(missions: pd.DataFrame) -> pd.DataFrame:
     """Whether the difference depends on each parameter.
 
@@ -107,68 +91,6 @@ def dependence(missions: pd.DataFrame) -> pd.DataFrame:
     )
 
 
-def strongest(missions: pd.DataFrame, candidates: int = 1) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The two parameters that explain most of the difference, and the difference over both.
-
-    The parameters are chosen by the missions of even replications. The differences come from those
-    of odd replications, which were not used for the choice.
-
-    Returns:
-        Up to two rows of ``dependence``, and rows of ``across``; both are empty if fewer than two
-        parameters vary, or there are no missions of odd replications.
-    """
-    even = missions["replication"] % 2 == 0
-    chosen, judged_on = dependence(missions[even]).head(2), missions[~even]
-    if len(chosen) < 2 or judged_on.empty:
-        return chosen[:0], judged_on[:0]
-    first, second = chosen["field"]
-    return chosen, across(judged_on, first, second, candidates)
-
-
-def rules(missions: pd.DataFrame, candidates: int = 1) -> pd.DataFrame:
-    """Regions of the parameter space with different mean differences, by a regression tree.
-
-    The tree is fitted to the missions of even replications. The estimates come from the missions of
-    odd replications, which were not used for the fit. Otherwise a region would seem to differ only
-    because it was chosen for its random deviations.
-
-    Args:
-        missions: Rows of ``duels``.
-        candidates: As for ``along``.
-
-    Returns:
-        A row per region with missions of odd replications, the lowest mean first: ``rule`` in
-        words, and the columns of a comparison, as in ``along``.
-    """
-    even, fields = missions["replication"] % 2 == 0, varied(missions) or [*PARAMETERS][:1]
-    if even.all() or not even.any():
-        return _compared(missions[:0].assign(rule=""), ["rule"], candidates)
-    least = max(LEAST, int(np.ceil(SHARE * even.sum())))
-    tree = DecisionTreeRegressor(max_depth=DEPTH, min_samples_leaf=least, random_state=0)
-    values = missions[fields].to_numpy(float)
-    tree.fit(values[even], missions.loc[even, "difference"])
-    leaves = pd.Series(tree.apply(values), missions.index)
-    splits = {leaf: tree.decision_path(values[leaves == leaf])[0].indices for leaf in {*leaves}}
-    asked = tree.tree_.feature  # of every node; negative for a leaf
-    split_by = {leaf: {fields[asked[n]] for n in path[:-1]} for leaf, path in splits.items()}
-    rules = {leaf: _rule(missions[leaves == leaf], split_by[leaf]) for leaf in {*leaves}}
-    table = _compared(missions.assign(rule=leaves.map(rules))[~even], ["rule"], candidates)
-    return table.sort_values("mean", kind="stable", ignore_index=True)
-
-
-def tally(table: pd.DataFrame) -> str:
-    """The verdicts of a table, as ``ahead in 15, behind in 0 and inconclusive in 3 of 18``."""
-    verdicts = (AHEAD, BEHIND, INCONCLUSIVE)
-    counts = [f"{each} in {(table['verdict'] == each).sum()}" for each in verdicts]
-    return f"{numbers.words(counts)} of {len(table)}"
-
-
-def lowest(cells: pd.DataFrame) -> str:
-    """The lowest mean of ``across``, as ``+3.3 [+1.4, +5.2] at 3 and 70–72 (n = 155)``."""
-    row, *_ = cells.sort_values("mean", kind="stable").itertuples()
-    return f"{_points(row)} at {row.value} and {row.value_2} (n = {row.n:,})"
-
-
 def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
     """How the difference depends on every parameter, as a table to print.
 
@@ -186,19 +108,6 @@ def spread(lead: pd.DataFrame, dependences: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=[*heads, "p, adjusted"])
 
 
-def listed(regions: pd.DataFrame, policy: str) -> pd.DataFrame:
-    """Rows of ``rules`` as a table to print, about a policy."""
-    columns = {
-        "Region": regions["rule"],
-        "Points": [_points(row) for row in regions.itertuples()],
-        "p, adjusted": regions["p_adjusted"].map(numbers.p_value),
-        f"{policy} is": regions["verdict"],
-        "Missions lost": numbers.estimates(regions, "behind"),
-        "n": regions["n"].map("{:,}".format),
-    }
-    return pd.DataFrame(columns)
-
-
 def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd.DataFrame:
     """A row for every group of missions with the same labels: the labels and the comparison."""
     rows = []
@@ -214,23 +123,16 @@ def _compared(missions: pd.DataFrame, columns: list[str], candidates: int) -> pd
     return table.assign(verdict=[VERDICTS[position_by_test(*side)] for side in sides])
 
 
-def _binned(missions: pd.DataFrame, field: str, end: str = "") -> pd.DataFrame:
+def _binned(missions: pd.DataFrame, field: str) -> pd.DataFrame:
     """The missions with ``position`` and ``value``, the number and the name of a field's bin."""
     codes, names = bins(missions[field])
-    return missions.assign(**{f"position{end}": codes, f"value{end}": np.array(names)[codes]})
+    return missions.assign(position=codes, value=np.array(names)[codes])
 
 
 def _equal_means(groups: Any) -> float:
     """The p-value of equal means; 1 if fewer than two groups have different values."""
     samples = [group.to_numpy() for _, group in groups if np.ptp(group) > 0]
     return float(stats.alexandergovern(*samples).pvalue) if len(samples) > 1 else 1.0
-
-
-def _rule(inside: pd.DataFrame, fields: set[str]) -> str:
-    """A region in words: the ranges of the fields that divide it from others."""
-    named = [field for field in PARAMETERS if field in fields]
-    sides = [f"{parameter(f).short} {_range_text(inside[f].to_numpy())}" for f in named]
-    return ", ".join(sides) or "all missions"
 
 
 def _range_text(values: np.ndarray) -> str:

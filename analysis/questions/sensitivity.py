@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import MEANS, SHARES, SUCCESS, parameter, value_text
+from analysis.names import MEANS, SHARES, parameter, value_text
 from analysis.names import METRICS as METRIC_NAMES
 from analysis.stats.intervals import LEVEL
 from analysis.study.design import NOISE, Saltelli
@@ -82,13 +82,6 @@ def index_table(indices: pd.DataFrame) -> pd.DataFrame:
         "With all interactions": numbers.estimates(rows, "total"),
     }
     return pd.DataFrame(columns)
-
-
-def failures_in_words(missions: pd.DataFrame) -> str:
-    """``the failed missions: 0 of greedy and 3 of ddqn``, what shares of the success rest on."""
-    failed = missions.groupby("policy", sort=False)[SUCCESS].agg(lambda of: int((of == 0).sum()))
-    counts = [f"{count:,} of {policy}" for policy, count in failed.items()]
-    return "the failed missions: " + numbers.words(counts)
 
 
 def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:

@@ -18,7 +18,7 @@ from dess.errors import InputError
 EXTRAS = {
     "learning": ("torch", "safetensors"),
     "reports": (
-        *("matplotlib", "PIL", "seaborn", "sklearn", "SALib", "IPython", "bs4"),
+        *("matplotlib", "PIL", "seaborn", "SALib", "IPython", "bs4"),
         *(
             "jinja2",
             "jupytext",
@@ -36,7 +36,6 @@ EXTRAS = {
 }
 _TITLES = {
     "torch": "PyTorch",
-    "sklearn": "scikit-learn",
     "PIL": "Pillow",
     "tensorboard": "TensorBoard",
 }

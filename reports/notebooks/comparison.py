@@ -72,19 +72,6 @@ html.gallery(
     ]
 )
 
-# %%
-chosen, cells = regions.strongest(missions, pair.candidates)
-if len(cells):
-    alt = f"Mean difference {title} over {numbers.words([*chosen['field']])}"
-    shares = numbers.words([*map(numbers.percent, chosen["explained"])])
-    caption = (
-        f"The two parameters that explain most, {shares} of the variance: {policy} is "
-        f"{regions.tally(cells)} cells, n = {numbers.span(cells['n'])} missions each; brackets are "
-        f"inconclusive. The lowest mean [points]: {regions.lowest(cells)}. Chosen by half of the "
-        "missions, drawn from the other half."
-    )
-    display(html.gallery([(figures.heat(cells, *chosen["field"]), alt, caption)]))
-
 # %% [markdown]
 # ## Its worst missions
 #
@@ -127,7 +114,6 @@ for caption, rows in found.items():
 # ## Tables
 
 # %%
-leaves = regions.rules(missions, pair.candidates)
 depleted = head_to_head.depleted(study, policy, worst["replication"])
 html.table(head_to_head.outcomes(missions, pair), "Outcomes of the missions")
 
@@ -136,12 +122,6 @@ html.table(
     regions.spread(lead, regions.dependence(missions)),
     "Lowest and highest mean difference [points] by parameter, the share of the variance that "
     "its bins explain, and the test of equal means (Alexander and Govern, Holm)",
-)
-
-# %%
-html.table(
-    regions.listed(leaves, policy),
-    f"{policy} is {regions.tally(leaves)} regions of a regression tree, fitted to the other half",
 )
 
 # %%
