@@ -32,6 +32,9 @@ class _Line(logging.Formatter):
         return _line(record.getMessage())
 
 
+WIDTH = 100  # of a table in the terminal [characters]
+
+
 def prepare() -> None:
     """Let stdout and stderr take any text, even if they are closed, and logs print lines."""
     for name in _STREAMS:
@@ -129,7 +132,10 @@ def print_list(entries: Iterable[tuple[str, str]]) -> None:
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> None:
-    """Print a table; its first columns are aligned to the left, the others to the right."""
+    """Print a table; its first columns are aligned to the left, the others to the right.
+
+    A table that is wider than ``WIDTH`` goes on below, with its first column again.
+    """
     lines = [[*map(printable, line)] for line in (header, *rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     aligns = [str.ljust if number < left else str.rjust for number in range(len(header))]
@@ -138,7 +144,20 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]], left: int 
         for line in lines
     ]
     aligned.insert(1, ["─" * width for width in widths])
-    print("", *("  ".join(cells).rstrip() for cells in aligned), "", sep="\n")
+    for columns in _blocks(widths):
+        shown = ("  ".join(line[number] for number in columns).rstrip() for line in aligned)
+        print("", *shown, "", sep="\n")
+
+
+def _blocks(widths: Sequence[int]) -> Iterator[list[int]]:
+    """The numbers of the columns that are printed side by side; the first one is in all."""
+    block = [0]
+    for number in range(1, len(widths)):
+        if len(block) > 1 and sum(widths[n] + 2 for n in (*block, number)) > WIDTH + 2:
+            yield block
+            block = [0]
+        block.append(number)
+    yield block
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from dess.errors import cut
 from reports.cli import completion, console
 from reports.cli.settings import JsonOption, SetOption, command, load_space
 
@@ -63,12 +64,14 @@ def list_scenarios(context: typer.Context) -> None:
 def show_scenario(
     name: Annotated[str, typer.Argument(metavar="NAME|FILE", autocompletion=completion.scenarios)],
     settings: SetOption = None,
+    everything: Annotated[bool, typer.Option("--all")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show every field of a scenario: its value, its default, what is allowed, what it is.
+    """Show every field of a scenario: its value and what it is.
 
     Args:
         name: A shipped scenario or a TOML file.
+        everything: Show the defaults and what is allowed as well, in full.
     """
     from analysis.names import fields
     from dess.scenario import scenario_description
@@ -80,12 +83,17 @@ def show_scenario(
         return
     if description:
         console.say(description)
-    heads = ["field", "value", "default", "unit", "allowed", "meaning"]
-    rows_ = [
-        [f.name, _value(f.value), _value(f.default), f.unit, f.allowed, f.meaning]
-        for f in fields(space)
-    ]
-    console.print_table(heads, rows_, left=len(heads))
+    if everything:
+        for f in fields(space):
+            default = f"default {_value(f.default)}" if f.default is not None else "no default"
+            console.say(f"{f.name} = {_value(f.value)} {f.unit}".rstrip())
+            console.say(f"    {f.meaning}; {default}; allowed: {f.allowed}")
+        return
+    heads = ["field", "value", "unit", "meaning"]
+    rows_ = [[f.name, cut(_value(f.value), 20), f.unit, f.meaning] for f in fields(space)]
+    columns = [*zip(*rows_, strict=True)][:-1]
+    rest = console.WIDTH - sum(max(map(len, column)) + 2 for column in columns)
+    console.print_table(heads, [[*row[:3], cut(row[3], rest)] for row in rows_], left=len(heads))
 
 
 @studies.callback()

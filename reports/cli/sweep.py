@@ -127,7 +127,15 @@ def _print(answer: "Sweep", metric: str) -> None:
     import pandas as pd
 
     from analysis import numbers
-    from analysis.names import COST, MEASURES, SHORT_METRICS, metric_label, metric_name, value_text
+    from analysis.names import (
+        COST,
+        PRODUCT,
+        SHORT_METRICS,
+        SUCCESS,
+        metric_label,
+        metric_name,
+        value_text,
+    )
     from analysis.questions.settings import varied
 
     table, fields, prices = answer.table(metric), [*varied(answer.results)], answer.study.costs
@@ -135,7 +143,10 @@ def _print(answer: "Sweep", metric: str) -> None:
     cells = pd.DataFrame({"rank": top["rank"], "": np.where(top["tied"], "≈", "")})
     cells["policy"] = top["policy"]
     cells[fields] = top[fields].map(value_text)
-    for name in [*([metric] if metric in MEASURES else []), *SHORT_METRICS]:
+    required = getattr(answer.study.selection, "requirements", {})
+    for name in dict.fromkeys([metric, SUCCESS, *required, PRODUCT]):
+        if name == COST:
+            continue
         head = SHORT_METRICS.get(name) or metric_label(name)
         cells[head] = numbers.estimates(top, name, numbers.written(name))
     if prices:

@@ -25,6 +25,7 @@ def show(
     policy: Annotated[str | None, typer.Option(metavar="P[,P...]")] = None,
     worst: Annotated[int, typer.Option(min=0)] = 5,
     target: Annotated[list[str] | None, typer.Option(metavar="METRIC=SHARE")] = None,
+    everything: Annotated[bool, typer.Option("--all")] = False,
     as_csv: Annotated[bool, typer.Option("--csv")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -36,6 +37,7 @@ def show(
         worst: How many of the worst missions.
         target: Show the policies and design points whose mean of a metric (success, ratio,
             product) is at least this, by the lower end of its interval; repeatable.
+        everything: Show the tables of all metrics, not of the product alone.
         as_csv: Print the means as CSV: a row per policy, design point and metric.
     """
     from analysis import numbers
@@ -63,7 +65,8 @@ def show(
             printed.print_meeting(results, means, targets)
             return
         printed.print_summary(results, folder, short=False)
-        printed.print_details(results, _tables(results, means, policy, worst, folder))
+        shown = _tables(results, means, policy, worst, folder)
+        printed.print_details(results, shown, everything)
 
 
 def _targets(texts: Iterable[str]) -> dict[str, float]:

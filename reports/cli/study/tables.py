@@ -61,18 +61,25 @@ def print_summary(results: Results, folder: Path, short: bool) -> None:
         _print_by_point(points, means, [PRODUCT])
 
 
-def print_details(results: Results, frames: Mapping[str, pd.DataFrame]) -> None:
-    """Print the tables of ``dess study show``, by their names in its JSON; none that is empty."""
-    points = settings(results)
+def print_details(
+    results: Results, frames: Mapping[str, pd.DataFrame], everything: bool = False
+) -> None:
+    """Print the tables of ``dess study show``, by their names in its JSON; none that is empty.
+
+    Args:
+        results: The study.
+        frames: The tables.
+        everything: Whether the means of all metrics are printed, not of the product alone.
+    """
+    points, measured = settings(results), measured_in({*frames["means"]["metric"]})
+    metrics = [*SHORT_METRICS, *measured] if everything else [PRODUCT]
     printers = {
         "sensitivities": lambda table: _print_titled(
             "shares of the collection ratio's variance:",
             index_table(table[table["metric"] == RATIO]).drop(columns="Metric"),
         ),
         "costs": lambda table: _print_costs(table, results.manifest["study"]["costs"]["currency"]),
-        "means": lambda means: _print_by_point(
-            points, means, [*SHORT_METRICS, *measured_in({*means["metric"]})]
-        ),
+        "means": lambda means: _print_by_point(points, means, metrics),
         "distributions": _print_distributions,
         "precisions": lambda table: _print_titled(
             "precision:",
@@ -225,4 +232,5 @@ def _print_worst(table: pd.DataFrame) -> None:
     console.say(f" worst missions of {policy}, by product:")
     for row in table.itertuples():
         outcome = "" if row.success else ", no success"
-        console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}: {row.command}")
+        console.say(f"   {numbers.percent(row.collection_ratio)} collected{outcome}:")
+        console.say(f"     {row.command}")

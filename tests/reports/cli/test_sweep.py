@@ -31,7 +31,7 @@ def test_a_line_leads_to_a_page(dess, tmp_path):
     assert "48 missions" in err
     name = re.search(r"sweeps/(uavs-quota-[0-9a-f]{16})\.toml", out)[1]
     assert len(load_results(tmp_path / "results" / "sweeps" / name).missions) == 48
-    assert re.search(r"rank +policy +uavs +quota +success +collection ratio +product +cost", out)
+    assert re.search(r"rank +policy +uavs +quota +product +success +cost", out)
     assert re.search(r"1 +≈ +(greedy|random) +[12] +(20|40) +.* [24]0,000 USD", out)
     assert "8 settings" in out
     page = re.search(r"page: (.*)", out)[1]
