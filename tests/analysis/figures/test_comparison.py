@@ -58,25 +58,6 @@ def test_all_parameters_have_the_same_axis_and_all_intervals_on_it(table):
     assert axes[-1].get_title(loc="left") == "Flying time [mission slots]"
 
 
-def test_a_cell_says_its_mean_and_shows_its_sign(missions):
-    cells = regions.across(missions, "uavs", "charge_start")
-    (ax,) = drawings.heat(cells, "uavs", "charge_start").axes
-    said = {(n.xy[1] - 0.5, n.xy[0] - 0.5): n.get_text() for n in ax.texts}
-    assert len(said) == len(cells)
-    mesh = ax.collections[0]
-    faces = mesh.to_rgba(mesh.get_array()).reshape(3, regions.BINS, 4)
-    for row in cells.itertuples():
-        text = said[row.position, row.position_2]
-        assert float(text.strip("()").replace("−", "-")) == pytest.approx(100 * row.mean, abs=0.05)
-        assert text.startswith("(") == (row.verdict == INCONCLUSIVE)
-        red, _, blue, _ = faces[row.position, row.position_2]
-        if row.verdict != INCONCLUSIVE:
-            assert (blue > red) == (row.verdict == AHEAD)
-    assert ax.get_ylim()[0] > ax.get_ylim()[1]  # the first on top
-    assert ax.get_ylabel() == "Number of UAVs"
-    assert ax.get_xlabel() == "Charging start capacity $C_S$ [%]"
-
-
 def test_the_curve_is_the_share_of_missions_up_to_a_difference(missions):
     (ax,) = drawings.distribution(missions, PAIR).axes
     (curve,) = (line for line in ax.lines if line.get_gid() == "shares")

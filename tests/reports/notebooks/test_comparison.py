@@ -68,8 +68,6 @@ def test_the_page_says_what_the_missions_say(text: str, results: Path) -> None:
         for _, row in table.iterrows():
             assert numbers.points(row["difference"], row["low"], row["high"]) in text
     missions = head_to_head.duels(study, pair)
-    for row in regions.rules(missions, pair.candidates).itertuples():
-        assert f"{row.rule} {numbers.points(row.mean, row.low, row.high)}" in text
     lead = regions.along(missions, pair.candidates)
     for row in lead.itertuples():
         assert f"n = {numbers.span(lead[lead['field'] == row.field]['n'])} missions per dot" in text
