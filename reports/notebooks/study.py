@@ -48,7 +48,7 @@ html.answer(words.answer(study, ranked, by))
 html.answer(words.of_variance(study, by))
 
 # %%
-html.lead(*drawings.leading(study, by))
+html.lead(*drawings.leading(study, next(iter(costs.required(study)), by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why

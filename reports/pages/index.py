@@ -92,13 +92,15 @@ def in_order(pages: Iterable[str], group: str | None = None) -> list[str]:
     return [name for name in order if name in known]
 
 
-def with_bar(content: str, page: str, pages: Iterable[str]) -> str:
+def with_bar(content: str, page: str, pages: Mapping[str, str]) -> str:
     """A page with the links to all pages of its folder in its bar, sealed again."""
     links = ['<a href="index.html">Overview</a>']
     for name in in_order(pages):
         here = ' aria-current="page"' if name == page else ""
-        label = name.removesuffix(".html").removeprefix(PREFIX).replace("-", " ").capitalize()
-        links.append(f'<a href="{Markup.escape(name)}"{here}>{Markup.escape(label)}</a>')
+        label = Markup.escape(name.removesuffix(".html").replace("-", " ").capitalize())
+        if _OF_STUDY.fullmatch(name):
+            label = Card.of(name, pages[name]).title
+        links.append(f'<a href="{Markup.escape(name)}"{here}>{label}</a>')
     bar = f'<nav class="bar" aria-label="All pages">{" ".join(links)}</nav>'
     return sealed(_BAR.sub(lambda _: bar, content, count=1))
 
