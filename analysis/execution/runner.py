@@ -184,9 +184,11 @@ class _Run:
             ChunkError: If some could not be computed, after all others.
         """
         failures: dict[Path, Failure] = {}
-        for kind, parts in works:
-            if needed := missions_in(parts):
-                jobs = [*self._jobs(kind, parts)]
+        needs = [(kind, missions_in(parts), [*self._jobs(kind, parts)]) for kind, parts in works]
+        for kind, _, jobs in needs:
+            self.store.check_places(kind.kind, (job.chunk for job in jobs))
+        for kind, needed, jobs in needs:
+            if needed:
                 self._begin(needed, needed - sum(job.missions for job in jobs), kind.work)
                 failures |= self._do(jobs)
         if failures:

@@ -32,7 +32,7 @@ from analysis.study.study import Study
 from dess import InputError
 from dess.files.locks import locked
 from dess.files.reading import paths_in
-from dess.files.writing import check_folder, delete, make_folder, write_file
+from dess.files.writing import check_folder, check_target, delete, make_folder, write_file
 
 _BUSY = "in use by another run; allowed: another --out, or wait for its end"
 
@@ -221,6 +221,25 @@ class Store:
             parts: The parts.
         """
         return absent(parts, self._present[kind])
+
+    def check_places(self, kind: str, chunks: Iterable[Chunk]) -> None:
+        """Refuse devices and the like in the places of chunks, before these are computed.
+
+        Args:
+            kind: ``missions``, ``bounds`` or ``events``.
+            chunks: The chunks that will be written; one of events has a single mission.
+
+        Raises:
+            InputError: If there are some.
+        """
+        folders = [*paths_in(self.folder, "*/policy=*"), self.folder / files.BOUNDS]
+        paths = (path for folder in folders for path in paths_in(folder, "*.parquet"))
+        others = {parquet.content_hash(path): path for path in paths if not path.is_file()}
+        for chunk in chunks if others else ():
+            part = chunk.parts[0]
+            log = f"{part.cell.key}-{part.replications.start:06}"
+            if path := others.get(log if kind == "events" else chunk.name):
+                check_target(path)
 
     def keep(self, kind: str, chunk: Chunk, tables: Sequence[pa.Table]) -> None:
         """Store the tables of a chunk.
