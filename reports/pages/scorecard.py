@@ -22,9 +22,9 @@ def answer(rows: Sequence[Row]) -> str:
     """How many claims hold for the best learned policy, diagnostic ones and all."""
     telling = [row for row in rows if row.is_diagnostic]
     held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
-    names = " or ".join(COLUMNS[2:])
+    names = numbers.words(COLUMNS[2:])
     return (
-        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {names} does not pass them. "
+        f"Of {len(rows)} claims, {len(telling)} are diagnostic: {names} do not pass them. "
         f"{_named(rows, 0)} passes {held} of these {len(telling)}, and {all_held} of all."
     )
 
