@@ -4,17 +4,16 @@ Each returns a figure of its own; nothing touches pyplot's state.
 """
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis import numbers
 from analysis.figures import style
 from analysis.names import METRICS, value_text
-from analysis.questions.learning.curves import ALPHA, BAND, FEWEST, REWARD, bands, smoothed
+from analysis.questions.learning.curves import ALPHA, REWARD, smoothed
 
 EVALUATED = {f"evaluation_{metric}": name for metric, name in METRICS.items()}
 # The metrics that are evaluated while training, and their names.
@@ -25,50 +24,41 @@ OFF = 0.5
 
 
 def trainings(curves: pd.DataFrame, metric: str, labels: Mapping[str, str]) -> Figure:
-    """A metric against the training step, over several trainings: Fig. 3.
+    """A metric against the training step, a line for each training: Fig. 3.
 
-    A thick line is the mean of the exponential moving averages over the trainings of a variant, a
-    band is its interval, and a thin line is one training. Phases before the last one are dotted,
-    and a vertical line marks the beginning of the last phase.
+    Phases before the last one are dotted, and a vertical line marks the beginning of the last
+    phase. The axis at the top shows the UAV-slots that have been simulated.
 
     Args:
         curves: Curves, see ``analysis.questions.learning.curves``.
         metric: One of ``NAMES``.
         labels: The variants to draw, with their names in the legend.
     """
-    averages = smoothed(curves[curves["variant"].isin(labels)], metric)
+    drawn = curves[curves["variant"].isin(labels)]
+    averages = smoothed(drawn, metric)
     looks = zip(labels.items(), style.palette(), style.LINES, strict=False)
     with style.panels(3.9, values="y", legend=2) as (figure, ax):
         for (variant, label), colour, line in looks:
-            own = averages[averages["variant"] == variant]
-            for _, curve in own.groupby(["seed", "phase"], sort=False):
-                ax.plot(curve["updates"], curve["value"], color=colour, linewidth=0.7, alpha=0.55)
-            rows = bands(own, share=metric in EVALUATED)
-            last = rows["phase"].iloc[-1]
-            for phase, part in rows.groupby("phase", sort=False):
-                name = f"{label}, n = {part['n'].iloc[-1]}" if phase == last else ""
-                ax.plot(part["updates"], part["mean"], line if name else ":", color=colour,
-                        linewidth=2.2, label=name)  # fmt: skip
-                ax.fill_between(part["updates"], part["low"], part["high"], color=colour,
-                                alpha=0.16, linewidth=0, gid=f"band-{phase}")  # fmt: skip
-            _last_phase(own, ax)
+            of_variant = averages[averages["variant"] == variant]
+            last, n = of_variant["phase"].iloc[-1], of_variant["seed"].nunique()
+            names = {last: f"{label}, n = {n}"}
+            for (_, phase), curve in of_variant.groupby(["seed", "phase"], sort=False):
+                ax.plot(curve["updates"], curve["value"], line if phase == last else ":",
+                        color=colour, linewidth=1.6, label=names.pop(phase, ""))  # fmt: skip
+            _last_phase(of_variant, ax)
         low, high = averages["value"].min(), averages["value"].max()
         room = 0.12 * (high - low) or 0.1
         style.in_units(ax.yaxis, "%" if metric in EVALUATED else "")
         ax.set(title=NAMES[metric], ylim=(low - room, high + room))
-        _steps_axis(averages["updates"].max(), ax)
+        _steps_axis(drawn, ax)
     return figure
 
 
-def trainings_caption(counts: Sequence[int]) -> str:
-    """The caption of ``trainings`` for the given numbers of trainings of the variants."""
-    level, n = numbers.level(BAND), numbers.words([str(count) for count in counts])
-    few = f"There is no band, since a band of {level} over n = {min(counts)} would be too wide."
-    band = few if min(counts) < FEWEST else f"Bands: {level} by Student's t over n = {n} trainings."
-    return (
-        f"Thick: mean of the exponential moving averages (weight of the newest evaluation {ALPHA:g}"
-        f"); thin: single trainings; dotted: phase I. {band}"
-    )
+# The caption of ``trainings``.
+TRAININGS = (
+    "A line is the exponential moving average of a training (weight of the newest evaluation "
+    f"{ALPHA:g}); dotted: phase I."
+)
 
 
 def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str) -> Figure:
@@ -79,12 +69,13 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
         last: Rows of ``analysis.questions.learning.ablation.finals``.
         metric: The column of the final metric, ``final_`` and one of ``METRICS``.
         baseline: The variant whose mean is drawn as a line. Variants of which no training reaches
-            ``OFF`` times as much are an arrow at the edge.
+            ``OFF`` times as much are an arrow at the edge, unless another has some that do.
     """
     values = last.groupby("variant")[metric]
     level = table.loc[table["variant"] == baseline, "mean"].item()
     drawn = pd.concat([last[metric], table["low"], table["high"]])
-    ends = drawn[drawn >= OFF * level].agg(["min", "max"])
+    split = ((values.min() < OFF * level) & (values.max() >= OFF * level)).any()
+    ends = drawn[drawn >= (0 if split else OFF * level)].agg(["min", "max"])
     room = 0.06 * (ends["max"] - ends["min"]) or 0.01
     left, right = max(ends["min"] - room, 0.0), min(ends["max"] + room, 1.02)
     with style.panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
@@ -127,7 +118,7 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
         _last_phase(curve, ax)
         style.in_units(ax.yaxis, "%")
         ax.set(title=name, ylim=(-0.02, 1.04))
-        _steps_axis(curve["updates"].max(), ax)
+        _steps_axis(curve, ax)
     return figure
 
 
@@ -177,6 +168,11 @@ def _last_phase(curve: pd.DataFrame, ax: Axes) -> None:
                     textcoords="offset points", fontsize=8.5, **style.OUTLINED)  # fmt: skip
 
 
-def _steps_axis(last: int, ax: Axes) -> None:
-    ax.set(xlim=(0, last * 1.02), xlabel="training step [1000 updates]")
+def _steps_axis(curves: pd.DataFrame, ax: Axes) -> None:
+    """The training step below the axes, and the UAV-slots simulated until then above them."""
+    longest = curves.sort_values("updates").iloc[-1]
+    ax.set(xlim=(0, longest["updates"] * 1.02), xlabel="training step [1000 updates]")
     ax.xaxis.set_major_formatter(lambda x, _: f"{x / 1000:g}")
+    slots = longest["uav_slots"] / longest["updates"] / 1e6
+    top = ax.secondary_xaxis("top", (lambda x: x * slots, lambda x: x / slots))
+    top.set_xlabel("UAV-slots [millions]")

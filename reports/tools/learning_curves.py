@@ -1,9 +1,9 @@
-"""Ablation of the learner's settings: trainings that differ in one setting, with equal budgets.
+"""Ablation of the learner's settings: trainings that differ in one setting.
 
 The tool trains every variant in ``VARIANTS``, a change of the shipped config ``quick``, with
 several training seeds, and writes the learning curves. A training whose curve exists is not run
-again. The final metrics are those of the selected weights, on missions that were used neither for
-training nor for selecting weights.
+again. Gathering adds the trainings of the shipped policy ``SHIPPED``. The final metrics are those
+of the selected weights, on missions that were used neither for training nor for selecting weights.
 
     export OMP_NUM_THREADS=1
     python -m reports.tools.learning_curves --out runs/learning --seeds 1 2 3
@@ -21,13 +21,17 @@ import pandas as pd
 import pyarrow as pa
 
 from analysis.names import METRICS, PRODUCT
+from analysis.questions.learning.ablation import SHIPPED
 from analysis.questions.learning.files import read_curves
+from analysis.questions.learning.trained import trained_policies
 from dess import simulate_batch
 from dess.files.reading import paths_in
 from dess.files.tables import read_table, write_table
+from policies.base import Policy
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.session import device_of
 from policies.ddqn.training import Training
+from policies.registry import TRAINED, load
 
 EVALUATION_SEED, MISSIONS = 900_000_001, 1000  # of the final evaluation
 
@@ -37,6 +41,15 @@ _ALONE: dict[str, Any] = {"phases": [_QUICK.phases[-1].model_dump() | {"ticks": 
 _NO_GUARD: dict[str, Any] = {"guard": False}
 _NO_STARTS, _NO_RETURNS = {"low_battery_starts": 0.0}, {"early_returns": 0.0}
 _NONE = _NO_GUARD | _NO_STARTS | _NO_RETURNS
+_TIMES = 8  # the length of the long trainings, as a multiple of ``quick``
+
+
+def _long(phases: list[dict[str, Any]]) -> dict[str, Any]:
+    """Phases that are longer, evaluated less often."""
+    longer = [phase | {"ticks": _TIMES * phase["ticks"]} for phase in phases]
+    return {"phases": longer, "evaluate_every": 4 * _QUICK.evaluate_every}
+
+
 # The settings that differ from ``quick``, by the name of the variant.
 VARIANTS: dict[str, dict[str, Any]] = {
     "quick": {},
@@ -48,6 +61,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "no low-battery starts, no early returns": _NO_STARTS | _NO_RETURNS,
     "none of the three": _NONE,
     "none of the three, no transfer": _NONE | _ALONE,
+    "none of the three, long": _NONE | _long([phase.model_dump() for phase in _QUICK.phases]),
+    "none of the three, no transfer, long": _NONE | _long(_ALONE["phases"]),
     "1-step returns": {"n_step": 1},
     "discount 0.99": {"discount": 0.99},
     "64 environments": {"num_envs": 64, "replay": 8000},
@@ -60,10 +75,27 @@ def run(config: TrainingConfig) -> pd.DataFrame:
     """Train once; the curve, with the metrics of the selected weights on new missions."""
     training = Training(config, device_of("cpu"))
     training.run(config.ticks)
-    policy = training.policy(training.best)
+    return _evaluated(pd.DataFrame(training.curve), training.policy(training.best), config)
+
+
+def shipped() -> pd.DataFrame:
+    """The curves of the trainings of the shipped policy, with its metrics on new missions."""
+    curves = []
+    for trained in trained_policies(TRAINED):
+        if trained.config.name == SHIPPED:
+            curve = trained.curve.assign(variant=SHIPPED, seed=trained.config.seed)
+            curves.append(_evaluated(curve, load(trained.name), trained.config))
+    return pd.concat(curves)
+
+
+def _evaluated(curve: pd.DataFrame, policy: Policy, config: TrainingConfig) -> pd.DataFrame:
     missions = simulate_batch(config.space, policy, EVALUATION_SEED, MISSIONS).missions
-    metrics = {f"final_{name}": float(missions[name].mean()) for name in METRICS}
-    return pd.DataFrame(training.curve).assign(**metrics)
+    return curve.assign(**{f"final_{name}": float(missions[name].mean()) for name in METRICS})
+
+
+def _place(curve: pa.Table) -> int:
+    """The place of a curve's variant among all."""
+    return [*VARIANTS].index(curve["variant"][0].as_py())
 
 
 def table(curves: pd.DataFrame) -> str:
@@ -72,7 +104,7 @@ def table(curves: pd.DataFrame) -> str:
         "| variant | training seeds | success | collection ratio | product | lowest, highest |",
         "| --- | --- | --- | --- | --- | --- |",
     ]
-    for variant in [name for name in VARIANTS if name in set(curves["variant"])]:
+    for variant in curves["variant"].unique():
         last = curves[curves["variant"] == variant].groupby("seed").last()
         means = [100 * last[f"final_{name}"].mean() for name in METRICS]
         products = 100 * last[f"final_{PRODUCT}"]
@@ -96,7 +128,9 @@ def main() -> None:
     if not arguments.out:
         parser.error("--out is needed")
     if arguments.gather:
-        curves = [read_table(path) for path in paths_in(arguments.out, "*.parquet")]
+        files = paths_in(arguments.out, "*.parquet")
+        curves = sorted((read_table(path) for path in files), key=_place)
+        curves.append(pa.Table.from_pandas(shipped(), preserve_index=False))
         write_table(arguments.gather, pa.concat_tables(curves, promote_options="permissive"))
         return
     for seed, variant in product(arguments.seeds, VARIANTS):

@@ -18,11 +18,35 @@ from analysis.stats.intervals import LEVEL, Interval, mean_interval
 from analysis.stats.verdict import MARKS, position
 
 BASELINE = "quick"  # the variant with which the others of the shipped curves are compared
+SHIPPED = "ddqn"  # the variant of the shipped policy, which is trained longer
+LEARNED = 0.5  # a training with at least this success has learned to charge
+# From the paper's methods to the shipped policy: variants, by what each adds to the one before.
+LADDER = {
+    "the paper's methods": "none of the three",
+    "the same, 8 times the updates": "none of the three, long",
+    "with the return guard": "no low-battery starts, no early returns",
+    "and low-battery starts": "no early returns",
+    "and early returns (quick)": BASELINE,
+    f"{SHIPPED}, wider and longer": SHIPPED,
+}
 
 
 def finals(curves: pd.DataFrame) -> pd.DataFrame:
     """The last row of every training, which has the metrics of the selected weights."""
     return curves.groupby(["variant", "seed"], sort=False, as_index=False).last()
+
+
+def of_equal_budget(last: pd.DataFrame, baseline: str) -> pd.DataFrame:
+    """Those of ``finals`` that have made as many updates as the trainings of the baseline."""
+    budget = last.loc[last["variant"] == baseline, "updates"].max()
+    return last[last["updates"] == budget]
+
+
+def ladder(last: pd.DataFrame) -> pd.DataFrame:
+    """Those of ``finals`` whose variants are in ``LADDER``, in its order, by what they add."""
+    rungs = {variant: rung for rung, variant in LADDER.items()}
+    named = last[last["variant"].isin(rungs)].replace({"variant": rungs})
+    return named.sort_values("variant", key=lambda names: names.map([*LADDER].index), kind="stable")
 
 
 def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVEL) -> pd.DataFrame:
@@ -61,31 +85,27 @@ def ablation(last: pd.DataFrame, metric: str, baseline: str, level: float = LEVE
     return table.sort_values("mean", ascending=False, kind="stable", ignore_index=True)
 
 
-def answer(table: pd.DataFrame, baseline: str) -> str:
-    """Without which method a training loses most, in a sentence.
+def answer(rungs: pd.DataFrame) -> str:
+    """What the methods add up to, and which adds most, in a sentence.
 
     Args:
-        table: Rows of ``ablation`` of the product.
-        baseline: The variant with which the others are compared.
+        rungs: Rows of ``ladder``.
     """
-    own = table.set_index("variant").loc[baseline]
-    lost = [
-        f"{row.variant} {numbers.percent(row.mean)} (n = {row.n})"
-        for row in table[table["variant"] != baseline].nsmallest(3, "mean").itertuples()
+    by_rung = rungs.groupby("variant", sort=False)
+    means = by_rung[f"final_{PRODUCT}"].mean()
+    reached = [f"{numbers.percent(mean)} ({rung})" for rung, mean in means.items()]
+    if len(reached) == 1:
+        return f"Trainings reach a product of {reached[0]}."
+    learned = by_rung[f"final_{SUCCESS}"].agg(lambda shares: (shares > LEARNED).sum())
+    counts = [
+        f"{count} of {n} ({rung})"
+        for rung, count, n in zip(means.index, learned, by_rung.size(), strict=True)
     ]
     return (
-        f"Trainings of {baseline} reach a product of {numbers.percent(own['mean'])} (n = "
-        f"{own['n']:.0f}); the changes that cost most: {numbers.words(lost)}."
+        f"The product rises from {reached[0]} to {reached[-1]}; the largest step: "
+        f"{means.diff().idxmax()}. "
+        f"Trainings that learn to charge: {numbers.words(counts[:3])}."
     )
-
-
-def within(interval: Interval) -> Interval:
-    """An interval of Student's t of results from 0 to 1, cut there.
-
-    The results of trainings are means of many missions each, so they spread far less than missions
-    do, and Student's t is fit for them where values of missions have ``bounded_interval``.
-    """
-    return Interval(interval.mean, max(interval.low, 0.0), min(interval.high, 1.0))
 
 
 def difference(

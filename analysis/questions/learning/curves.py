@@ -1,4 +1,4 @@
-"""Learning curves: smoothed, with bands over trainings, with and without transfer learning.
+"""Learning curves: smoothed, with and without transfer learning.
 
 A training is the unit: trainings of one variant differ in their seed alone. Intervals are about the
 expected curve, the mean over all trainings that the variant might have; a single new training may
@@ -19,8 +19,8 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.questions.learning.ablation import difference, within
-from analysis.stats.intervals import Interval, mean_interval
+from analysis.questions.learning.ablation import difference
+from analysis.stats.intervals import Interval
 from analysis.stats.verdict import INCONCLUSIVE, above, judged
 
 # The metric that is evaluated while training.
@@ -31,13 +31,15 @@ PAIRS = {
     "all methods of this project": ("quick", "no transfer"),
     "no return guard": ("no guard", "no guard, no transfer"),
     "the paper's methods alone": ("none of the three", "none of the three, no transfer"),
+    "the paper's methods alone, long": (
+        "none of the three, long",
+        "none of the three, no transfer, long",
+    ),
 }
 # Weight of the newest evaluation in the exponential moving average.
 ALPHA = 0.5
-# Level of the band of the paper's Fig. 3.
+# Level of the intervals of the paper's Fig. 3.
 BAND = 0.99
-# The smallest number of trainings with a band; for two, Student's band of 99 % is 64 errors wide.
-FEWEST = 3
 
 
 @dataclass(frozen=True)
@@ -82,29 +84,6 @@ def smoothed(curves: pd.DataFrame, metric: str) -> pd.DataFrame:
     keys = ["variant", "seed", "phase"]
     averages = curves.groupby(keys, sort=False)[metric].transform(_average)
     return curves[[*keys, "updates"]].assign(value=averages)
-
-
-def bands(averages: pd.DataFrame, level: float = BAND, share: bool = False) -> pd.DataFrame:
-    """Means with intervals over the trainings of a variant, at every training step.
-
-    Args:
-        averages: Rows of ``smoothed``.
-        level: Confidence level.
-        share: Whether the values lie between 0 and 1: the intervals are then cut there.
-
-    Returns:
-        A row per variant, phase and step: ``variant``, ``phase``, ``updates``, ``mean``, ``low``,
-        ``high`` (nan with fewer than ``FEWEST`` trainings) and ``n``, the number of trainings.
-    """
-    keys = ["variant", "phase", "updates"]
-    rows = []
-    for key, part in averages.groupby(keys, sort=False):
-        interval = mean_interval(part["value"].to_numpy(), level)
-        mean, *ends = within(interval) if share else interval
-        if len(part) < FEWEST:
-            ends = [np.nan, np.nan]
-        rows.append((*key, mean, *ends, len(part)))
-    return pd.DataFrame(rows, columns=[*keys, "mean", "low", "high", "n"])
 
 
 def pairs_in(curves: pd.DataFrame) -> dict[str, tuple[str, str]]:

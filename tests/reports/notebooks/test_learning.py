@@ -20,6 +20,8 @@ def test_the_table_of_variants_is_that_of_the_curves() -> None:
     curves = pd.read_parquet(TRAINED / "curves.parquet")
     ends = curves.sort_values("updates").groupby(["variant", "seed"])[f"final_{PRODUCT}"].last()
     text = said_by("learning")
+    equal = curves.groupby("variant")["updates"].transform("max") == 12_000
+    ends = ends[ends.index.get_level_values("variant").isin(curves[equal]["variant"])]
     for variant, values in ends.groupby("variant"):
         n, mean = len(values), 100 * values.mean()
         half = t.ppf(0.975, n - 1) * 100 * values.std(ddof=1) / np.sqrt(n) if n > 1 else 0
@@ -52,7 +54,7 @@ def test_the_learning_page_judges_by_the_curves_it_is_given(
         (tmp_path / name).symlink_to(TRAINED / name)
     text = said_by("learning", trained=str(tmp_path))
     assert text.count(f"{verdict} is above in all of phase II") == 2
-    assert f"The trainings have {length:,} steps;" in text
+    assert f"The longest of these pairs have {length:,} steps;" in text
     assert "ddqn and ddqn-2: trainings that differ only in their seed." in text
     # The mean of three trainings, the prediction interval of one more, and the difference.
     new = r"\[39\.[5-9], 40\.[5-9]\]"

@@ -8,7 +8,10 @@ from scipy import stats
 from analysis.questions.learning.ablation import (
     ablation,
     ablation_table,
+    answer,
     difference,
+    ladder,
+    of_equal_budget,
 )
 
 
@@ -67,3 +70,27 @@ def test_intervals_of_shares_end_where_these_do(last: pd.DataFrame) -> None:
     table = ablation(far, "final_success", "base").set_index("variant").loc["base"]
     assert (table["low"], table["high"]) == (0.0, 1.0)
     assert (table["new_low"], table["new_high"]) == (0.0, 1.0)
+
+
+def test_the_ladder_goes_from_the_paper_to_the_shipped_policy_and_counts_who_learns() -> None:
+    rows = [
+        ("ddqn", 1, 90, 0.9, 0.99),
+        ("quick", 1, 10, 0.7, 0.98),
+        ("other", 1, 10, 0.3, 1.0),
+        ("none of the three", 1, 10, 0.0, 0.0),
+        ("none of the three", 2, 10, 0.2, 0.6),
+    ]
+    product, success = "final_collection_ratio_and_communication", "final_success"
+    last = pd.DataFrame(rows, columns=["variant", "seed", "updates", product, success])
+    rungs = ladder(last)
+    assert [*rungs["variant"].unique()] == [
+        "the paper's methods",
+        "and early returns (quick)",
+        "ddqn, wider and longer",
+    ]
+    assert answer(rungs) == (
+        "The product rises from 10.0 % (the paper's methods) to 90.0 % (ddqn, wider and longer); "
+        "the largest step: and early returns (quick). Trainings that learn to charge: 1 of 2 "
+        "(the paper's methods), 1 of 1 (and early returns (quick)) and 1 of 1 (ddqn, wider and longer)."
+    )
+    assert {*of_equal_budget(last, "quick")["variant"]} == {"quick", "other", "none of the three"}

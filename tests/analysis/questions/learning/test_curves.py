@@ -1,9 +1,8 @@
-"""Learning curves: averages, bands over trainings, and transfer learning by the last difference."""
+"""Learning curves: averages, and transfer learning by the last difference."""
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from analysis.questions.learning import curves as learning
 from analysis.stats.verdict import HOLDS, INCONCLUSIVE, REFUTED
@@ -17,7 +16,8 @@ def training(variant, seed, values, before=0):
     phases = ["harvest"] * before + ["battery"] * (len(values) - before)
     steps = STEPS[: len(values)]
     columns = {"phase": phases, "updates": steps, METRIC: values, "final_product": values[-1]}
-    return pd.DataFrame({"variant": variant, "seed": seed} | columns)
+    same = {"variant": variant, "seed": seed}
+    return pd.DataFrame(same | columns).assign(uav_slots=500 * np.array(steps))
 
 
 def several(variant, ends, level=0.0, before=0):
@@ -38,20 +38,6 @@ def test_an_average_weighs_the_newest_and_begins_anew_with_every_phase():
     a = learning.ALPHA
     assert table["value"].tolist() == [4.0, 4.0 * (1 - a), 8.0, 8.0 * (1 - a) + 16.0 * a]
     assert table["updates"].tolist() == STEPS
-
-
-@pytest.mark.parametrize("n", [2, 3, 5])
-def test_a_band_is_students_over_the_trainings_and_none_for_too_few(n):
-    ends = np.linspace(1.0, 2.0, n)
-    rows = learning.bands(learning.smoothed(several("one", ends), METRIC), 0.99)
-    values = learning.smoothed(several("one", ends), METRIC).query("updates == 4000")["value"]
-    last = rows.iloc[-1]
-    assert (last["n"], last["mean"]) == (n, pytest.approx(values.mean()))
-    half = stats.t.ppf(0.995, n - 1) * values.std(ddof=1) / np.sqrt(n)
-    expected = (
-        [values.mean() - half, values.mean() + half] if n >= learning.FEWEST else [np.nan] * 2
-    )
-    assert [last["low"], last["high"]] == pytest.approx(expected, nan_ok=True)
 
 
 def test_transfer_is_judged_in_the_last_phase_alone():
