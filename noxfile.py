@@ -17,7 +17,8 @@ nox.options.sessions = ["tests"]
 STUDIES = {
     "table4 fig1 fig4 sensitivity pads failures verification": "",
     "fig5": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
-    "sweet-spot": "--policy ddqn --policy greedy --policy random",
+    "fig5-paper sweet-spot-paper": "",
+    "sweet-spot": "--policy ddqn --policy greedy --policy random --policy random-unguarded",
     "comparison": "--missions 1000",
     "explorer age": "--missions 50",
     "gap": "--missions 12",

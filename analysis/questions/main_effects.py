@@ -70,7 +70,12 @@ def effects(results: Results) -> pd.DataFrame:
 
 
 def changes(
-    results: Results, table: pd.DataFrame, policy: str, field: str, metric: str
+    results: Results,
+    table: pd.DataFrame,
+    policy: str,
+    field: str,
+    metric: str,
+    fewest_uavs: int = 1,
 ) -> pd.DataFrame:
     """Compare every two values of a parameter on the same missions.
 
@@ -80,6 +85,7 @@ def changes(
         policy: The policy.
         field: The parameter.
         metric: The metric.
+        fewest_uavs: Missions with fewer UAVs are left out.
 
     Returns:
         A row per pair: ``first`` and ``second`` (positions), ``difference`` (second - first) with
@@ -90,6 +96,7 @@ def changes(
     positions = table[table["field"] == field].groupby("point")["position"].first()
     missions = results.missions[results.missions["policy"] == policy]
     missions = missions[missions["point"].isin(positions.index)]
+    missions = missions[missions["uavs"] >= fewest_uavs]
     values = missions.pivot(index="replication", columns="point", values=metric).dropna()
     values = values.rename(columns=positions).astype(float)
     couples = [*combinations(sorted(values), 2)]

@@ -90,12 +90,14 @@ class EvidenceOfPolicy:
             raise MissingError(f"the study {self.study} has no such mission")
         return missions[chosen]
 
-    def pairs(self, field: str, metric: str) -> Pairs:
+    def pairs(self, field: str, metric: str, fewest_uavs: int = 1) -> Pairs:
         """The values of a parameter, compared mission by mission."""
         values = self.effects[self.effects["field"] == field].drop_duplicates("position")
         if len(values) < 2:
             raise MissingError(f"the study {self.study} does not vary {field}")
-        changes = main_effects.changes(self.results, self.effects, self.policy, field, metric)
+        changes = main_effects.changes(
+            self.results, self.effects, self.policy, field, metric, fewest_uavs
+        )
         return Pairs(changes, dict(zip(values["value"], values["position"], strict=True)))
 
     def logs(self, uavs: int) -> list[tuple[pd.DataFrame, np.ndarray]]:

@@ -159,10 +159,16 @@ def _division(
 
 
 def change(
-    evidence: EvidenceOfPolicy, field: str, metric: str, first: str, second: str
+    evidence: EvidenceOfPolicy,
+    field: str,
+    metric: str,
+    first: str,
+    second: str,
+    fewest_uavs: int = 1,
 ) -> Measured:
     """How much a metric changes from one value of a parameter to another."""
-    return Measured.of(_points(evidence.pairs(field, metric).change(first, second)))
+    pairs = evidence.pairs(field, metric, fewest_uavs)
+    return Measured.of(_points(pairs.change(first, second)))
 
 
 def lead(

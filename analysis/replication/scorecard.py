@@ -37,6 +37,7 @@ from policies.ddqn.config import TrainingConfig
 
 # The learner with the paper's observation, network and algorithm.
 PAPERS_NETWORK = "ddqn-paper"
+SMALLER = "-paper"  # ends the names of studies of it alone, with fewer missions
 # Policies that have learned nothing.
 NULLS = ("greedy", "random", "random-unguarded")
 COLUMNS = ("the best learned policy", PAPERS_NETWORK, *NULLS)
@@ -102,7 +103,7 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
 
     Args:
         studies: Results by the name of the study: ``table4``, ``fig4``, ``fig5``, ``sweet-spot``,
-            as far as they have been run.
+            and with ``SMALLER`` at the end, as far as they have been run.
         trainings: Learning curves, with the columns that ``questions.learning`` reads; may be
             empty.
 
@@ -115,6 +116,8 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
     ) -> Any:
         if study == TRAININGS:
             return evidence_of_trainings(trainings, variants)
+        if learner == PAPERS_NETWORK and study + SMALLER in studies:
+            study += SMALLER
         return evidence_of_policy(studies, study, learner, policy)
 
     policies = (

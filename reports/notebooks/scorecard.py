@@ -2,7 +2,7 @@
 # jupyter:
 #   dess:
 #     studies: [table4, fig4, fig5, sweet-spot]
-#     optional: [gap]
+#     optional: [gap, fig5-paper, sweet-spot-paper]
 #   jupytext:
 #     text_representation:
 #       extension: .py
@@ -28,6 +28,7 @@ from analysis import load_results, numbers
 from analysis.figures.comparison import claims
 from analysis.questions.learning.files import read_curves
 from analysis.replication import scorecard
+from analysis.results.files import MANIFEST
 from dess.files.reading import paths_in
 from policies.ddqn.description import read_description
 from reports.pages import html
@@ -35,7 +36,8 @@ from reports.pages import scorecard as page
 
 # %%
 folder = Path(trained or str(files("policies") / "trained"))
-names = ("table4", "fig4", "fig5", "sweet-spot")
+smaller = paths_in(Path(results), f"*{scorecard.SMALLER}/{MANIFEST}")
+names = ("table4", "fig4", "fig5", "sweet-spot", *(path.parent.name for path in smaller))
 studies = {name: load_results(Path(results) / name) for name in names}
 rows = scorecard.scorecard(studies, read_curves(folder / "curves.parquet"))
 telling = [row for row in rows if row.is_diagnostic]

@@ -229,10 +229,29 @@ def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Resu
 def test_the_lead_of_a_value_is_over_the_next(rows: list[Row], studies: dict[str, Results]) -> None:
     means = studies["fig5"].missions.query("policy == 'ddqn'").groupby("point")
     product, ratio = means[PRODUCT].mean()[:3], means["collection_ratio"].mean()[:3]  # 1, 2, 3 UAVs
-    ahead = learned(rows, "best with three UAVs").quantities[0]
+    ahead = learned(rows, "best, and the sweet spot").quantities[0]
     assert ahead.value == pytest.approx(product[2] - max(product[:2]))
-    below = learned(rows, "A lone UAV is an extreme").quantities[0]
-    assert below.value == pytest.approx(min(ratio[1:]) - ratio[0])
+    along = learned(rows, "The more UAVs").quantities[0]
+    assert along.value == pytest.approx(ratio[2] - ratio[0])
+
+
+def test_a_large_quota_is_judged_by_missions_of_several_uavs(
+    rows: list[Row], studies: dict[str, Results]
+) -> None:
+    points = enumerate(studies["fig5"].store.manifest.points)
+    by_quota = {point.values["quota"]: n for n, point in points if "quota" in point.values}
+    several = studies["fig5"].missions.query("policy == 'ddqn' and uavs > 1")
+    success = several.pivot(index="replication", columns="point", values="success").astype(float)
+    change = (success[by_quota[600]] - success[by_quota[440]]).dropna()
+    quantity = learned(rows, "With several UAVs, a large quota").quantities[0]
+    assert (quantity.value, quantity.n) == (pytest.approx(change.mean()), len(change))
+    assert 0 < len(change) < 3  # of three missions, some have one UAV
+
+
+def test_the_papers_network_has_studies_of_its_own(studies: dict[str, Results]) -> None:
+    smaller = scorecard({"fig5-paper": studies["fig5"]}, NONE)
+    notes = {row.findings[1].note for row in smaller if row.section is FIG_5}
+    assert notes == {"the study fig5-paper has no policy ddqn-paper"}
 
 
 def test_the_sweet_spot_is_judged_by_its_check(
@@ -333,7 +352,7 @@ def test_studies_of_another_kind_never_break_it(tmp_path: Path) -> None:
     }
     judged = scorecard(others, NONE)
     assert learned(judged, "dramatically").verdict == NO_RESULTS
-    assert learned(judged, "best with three UAVs").verdict == NO_RESULTS
+    assert learned(judged, "best, and the sweet spot").verdict == NO_RESULTS
     assert learned(judged, "two sectors").verdict in VERDICTS
     small = run_study(small_study(tmp_path, policies=["greedy"]), tmp_path / "small")
     assert all(row.findings[0].verdict == NO_RESULTS for row in scorecard({"fig4": small}, NONE))
