@@ -22,7 +22,6 @@ from analysis.numbers import level
 from analysis.stats.intervals import LEVEL
 from dess.record import EVENT_NAMES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace, fields_of
-from policies.registry import descriptions
 from reports.pages.html import Marked, code, marked, text
 from reports.pages.template import template
 
@@ -71,7 +70,7 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
             if ends[0] < ends[1]
         ],
         "swept": [code(field) for field in _swept([manifest, *others])],
-        "policies": _policies([manifest, *others]),
+        "policies": [code(name) for name in _policies([manifest, *others])],
         "events": [code(name) for name in EVENT_NAMES],
         "level": level(LEVEL),
         "python": libraries.pop("python"),
@@ -101,16 +100,10 @@ def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:
     )
 
 
-def _policies(manifests: Iterable[Manifest]) -> list[tuple[str, str]]:
-    """The policies of all teams of studies, and what each does."""
-    known = descriptions()
-    names = dict.fromkeys(
-        name.strip()
-        for manifest in manifests
-        for team in manifest["study"]["policies"]
-        for name in team.split(",")
-    )
-    return [(name, known.get(name, "not shipped with dess")) for name in names]
+def _policies(manifests: Iterable[Manifest]) -> dict[str, None]:
+    """The policies of all teams of studies."""
+    teams = [team for manifest in manifests for team in manifest["study"]["policies"]]
+    return dict.fromkeys(name.strip() for team in teams for name in team.split(","))
 
 
 def _parameters(space: ScenarioSpace) -> pd.DataFrame:
