@@ -122,13 +122,8 @@ def training(curve: pd.DataFrame, name: str) -> Figure:
     return figure
 
 
-def training_caption(seed: int, missions: int) -> str:
-    """The caption of ``training`` for a training seed and a number of missions per evaluation."""
-    return (
-        f"n = 1 training with seed {seed}, which has no interval. Every evaluation has "
-        f"{missions:,} missions. The star marks the selected weights, which have the best "
-        "moving average."
-    )
+# The caption of ``training``.
+TRAINING = "n = 1 training each. The star marks the selected weights: the best moving average."
 
 
 def courses(

@@ -142,11 +142,10 @@ def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> 
 
 
 def listed(rows: Iterable[Row]) -> str:
-    """Claims with the verdict for one policy and the rule, in a line of Markdown each."""
+    """Claims with the verdict for one policy, in a line of Markdown each."""
     lines = [
         f"- {row.claim.text}: **{row.findings[0].outcome}**"
         + (f"; {row.findings[0].note}" if row.findings[0].note else "")
-        + f". ({row.rule})"
         for row in rows
     ]
     return "\n".join(lines)

@@ -66,10 +66,11 @@ html.gallery(
         (
             figures.lead(lead, field, missions["difference"].mean()),
             f"Mean difference {title} against {field}",
-            f"{title}, n = {numbers.span(bins['n'])} missions per dot; bars are 95 % intervals.",
+            f"n = {numbers.span(bins['n'])} missions per dot.",
         )
         for field, bins in lead.groupby("field", sort=False)
-    ]
+    ],
+    f"{title}; bars are 95 % intervals.",
 )
 
 # %% [markdown]

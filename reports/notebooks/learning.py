@@ -81,13 +81,14 @@ html.figure(drawing, "The product that every variant reaches", DOTS.format(basel
 def with_and_without(name: str, metric: str) -> tuple[Figure, str, str]:
     labels = dict(zip(pairs[name], ("with transfer", "without"), strict=True))
     alt = f"{figures.NAMES[metric]} against training step, {name}, with and without transfer"
-    caption = f"Trainings with {name}. {figures.TRAININGS}"
+    caption = f"Trainings with {name}."
     return figures.trainings(trainings, metric, labels), alt, caption
 
 
 metrics = (learning.REWARD, learning.PRODUCT)
 drawn = dict.fromkeys([[*pairs][0], [*pairs][-1]])
-html.gallery([with_and_without(name, metric) for name in drawn for metric in metrics])
+drawings = [with_and_without(name, metric) for name in drawn for metric in metrics]
+html.gallery(drawings, figures.TRAININGS)
 
 # %% [markdown]
 # ## The shipped policies
@@ -100,7 +101,7 @@ def several(group: list[policies.Trained], metric: str) -> tuple[Figure, str, st
     names = numbers.words([policy.name for policy in group])
     drawing = figures.trainings(policies.curves_of(group, names), metric, {names: group[0].name})
     alt = f"{figures.NAMES[metric]} of {names} against training step"
-    return drawing, alt, f"{names}: trainings that differ only in their seed. {figures.TRAININGS}"
+    return drawing, alt, f"{names}: trainings that differ only in their seed."
 
 
 learners = policies.several_trainings(shipped)
@@ -109,12 +110,12 @@ html.gallery([several(group, metric) for group in learners for metric in metrics
 
 # %%
 def once(policy: policies.Trained) -> tuple[Figure, str, str]:
-    caption = figures.training_caption(policy.config.seed, policy.config.evaluation_missions)
     alt = f"Evaluations of {policy.name} against training step"
+    caption = f"Seed {policy.config.seed}; {policy.config.evaluation_missions} missions each."
     return figures.training(policy.curve, policy.name), alt, caption
 
 
-html.gallery([once(policy) for policy in shipped])
+html.gallery([once(policy) for policy in shipped], figures.TRAINING)
 
 # %% [markdown]
 # ## How far to trust it

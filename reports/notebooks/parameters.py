@@ -64,11 +64,10 @@ html.gallery(
         (
             figures.effect(effects, field, pairs, fig5.policies),
             f"The three metrics against the {names.parameter(field).within}",
-            f"n = {effects.groupby('field')['n'].min()[field]:,} missions per dot; bars are "
-            f"{level} intervals.",
         )
         for field, pairs in changes.items()
-    ]
+    ],
+    f"n = {numbers.span(effects['n'])} missions per dot; bars are {level} intervals.",
 )
 
 # %% [markdown]

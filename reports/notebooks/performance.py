@@ -65,10 +65,10 @@ html.gallery(
         (
             figures.performance(overall, metric, paper.TABLE_IV[metric]),
             f"{METRICS[metric]} of every policy, and the paper's number",
-            f"{caption} Dashed: the paper's number.",
         )
         for metric in (SUCCESS, RATIO)
-    ]
+    ],
+    f"{caption} Dashed: the paper's number.",
 )
 
 # %% [markdown]
@@ -82,10 +82,10 @@ html.gallery(
         (
             figures.by_fleet(fleets, metric),
             f"{name} against the number of UAVs",
-            f"n = {numbers.span(fleets['n'])} missions per dot; bars are 95 % intervals.",
         )
         for metric, name in METRICS.items()
-    ]
+    ],
+    f"n = {numbers.span(fleets['n'])} missions per dot; bars are 95 % intervals.",
 )
 
 # %% [markdown]

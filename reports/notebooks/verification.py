@@ -71,13 +71,12 @@ figures = [
     (
         drawings.fit(fit, name, "data units that arrived"),
         f"{name}: observed and expected numbers",
-        f"Dots should lie on the bars, and inside {band} n = {fit.n:,} counts; expected: Poisson "
-        f"with mean {mean:g}.",
+        f"n = {fit.n:,} counts; expected: Poisson with mean {mean:g}.",
     )
     for name, fit, mean in draws.arrival_fits(suite.arrivals, space.arrival_rate)
     if len(fit.table) > 1
 ]
-html.gallery(figures)
+html.gallery(figures, f"Dots should lie on the bars, and inside {band}")
 
 # %% [markdown]
 # ## The channel
@@ -122,7 +121,6 @@ figures = [
     (
         drawings.fit(fit, parameter(field).label, "value"),
         f"How often each value of the {parameter(field).within} was drawn",
-        f"All values should be drawn equally often, so the dots should lie inside {band} "
         f"n = {fit.n:,} missions.",
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
@@ -131,17 +129,18 @@ figures = [
 # %%
 if space.initial_data[0] < space.initial_data[1]:
     initial = suite.missions["initial"].to_numpy()
-    caption = "The bars should follow the curve, the density of a sum of uniform variables."
+    caption = "The curve is the density of a sum of uniform variables."
     alt = "Initial data per mission, and the density of their sum"
     caption += f" n = {len(initial):,} missions."
     figures.append((drawings.initial_data(initial, space), alt, caption))
-html.gallery(figures)
+html.gallery(figures, f"All values should be drawn equally often: dots should lie inside {band}")
 
 # %% [markdown]
 # ## Coverage of the confidence intervals
 #
-# The share of intervals of blocks of missions that contain the mean of all missions. For Wilson's
-# interval, used for success, the exact coverage is known (hypergeometric distribution).
+# The share of intervals of blocks of missions that contain the mean of all missions. Wilson's
+# interval, used for success, is too short where nearly all missions succeed: its exact coverage
+# (hypergeometric distribution) is the known value in the table.
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))
@@ -152,14 +151,13 @@ figures = [
     (
         drawings.caterpillar(rows, name),
         f"{name}: intervals of blocks of missions",
-        f"The first {min(len(rows), drawings.SHOWN)} of {len(rows):,} blocks; the line is the mean "
-        f"of all missions, which {rows['holds'].sum():,} of the {len(rows):,} intervals contain. "
-        f"n = {block:,} missions per interval, at {level}.",
+        f"{rows['holds'].sum():,} of the {len(rows):,} intervals contain the mean of all.",
     )
     for metric, name in METRICS.items()
     if len(rows := suite.blocks(metric, block))
 ]
-html.gallery(figures)
+note = f"The first blocks, at most {drawings.SHOWN}; the line is the mean of all missions."
+html.gallery(figures, f"{note} n = {block:,} missions per interval, at {level}.")
 
 # %% [markdown]
 # ## Tables

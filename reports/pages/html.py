@@ -35,7 +35,7 @@ SHORT = 12  # characters of a hash that are shown
 STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contain evidence
 
 # A figure, its alternative text, its caption and, if the page links to them, its data.
-Drawing = tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
+Drawing = tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
 DIGITS = "%.6g"  # format of numbers in files with data
@@ -238,9 +238,16 @@ def lead(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = No
     return HTML(_figure(drawing, alt, caption, data, "lead"))
 
 
-def gallery(drawings: Sequence[Drawing]) -> HTML:
-    """Several figures side by side where there is room; each has the arguments of ``figure``."""
-    return HTML(f'<div class="gallery">{"".join(_figure(*parts) for parts in drawings)}</div>')
+def gallery(drawings: Sequence[Drawing], note: str = "") -> HTML:
+    """Several figures side by side where there is room.
+
+    Args:
+        drawings: The arguments of ``figure`` of each; the caption may be left out.
+        note: What holds for all of them, in a paragraph below.
+    """
+    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    figures = "".join(_figure(*parts) for parts in drawings)
+    return HTML(f'<div class="gallery">{figures}</div>{below}')
 
 
 def svg(drawing: Figure) -> bytes:
@@ -259,7 +266,7 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 
 def _figure(
-    drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None, look: str = ""
+    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None, look: str = ""
 ) -> str:
     source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
     image = f'<img alt="{escape(alt)}" src="{source}">'

@@ -16,14 +16,12 @@ from reports.pages.template import template
 from reports.player.playback import Playback
 
 READING = (
-    "A disc shows the data that is left at a node, and the ring around it the largest amount that "
-    "the node ever had. A numbered dot is a UAV. Its last moves are drawn behind it, and a line "
-    "leads to the node that it served in most communication slots of the slot. The dot turns pale "
-    "when the mission of the UAV is over. A full yellow square is a UAV that charges, an empty "
-    "square a UAV that waits for a pad. The vertical lines in the panels mark the slot that is "
-    "shown; a click there goes to another slot. At the end of the row of a UAV, a tick means that "
-    "it filled its quota, a cross that it did not. Keys: space plays and pauses, the arrows, Home "
-    "and End change the slot."
+    "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot is "
+    "a UAV, with its last moves and a line to the node that it serves in most communication slots; "
+    "it turns pale when its mission is over. A full yellow square is a UAV that charges, an empty "
+    "one a UAV that waits for a pad. A click in the panels goes to another slot. At the end of a "
+    "row, a tick means that the quota was filled, a cross that it was not. Keys: space plays and "
+    "pauses, the arrows, Home and End change the slot."
 )
 
 AGE_READING = (

@@ -66,7 +66,6 @@ def test_verdicts_are_those_of_the_scorecard(results: Path, text: str) -> None:
     assert len(judged) > 5
     for row in judged:
         assert f"- {row.claim.text}: {row.findings[0].outcome}" in text
-        assert row.rule in text
 
 
 def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_path: Path) -> None:
