@@ -27,11 +27,6 @@ def table(results: Results) -> pd.DataFrame:
             if checks
         }
         effort = {"Missions": f"{row.missions:,}", "Settings left": str(row.left)}
+        effort["Guarantee"] = row.guarantee
         rows.append({"Policy": row.policy, **setting(results, row.point), **means, **effort})
     return pd.DataFrame(rows)
-
-
-def guarantees(results: Results) -> str:
-    """What is guaranteed about the selection for every policy: a list in Markdown."""
-    rows = summary.selections(results).itertuples()
-    return "\n".join(f"- **{row.policy}**: {row.guarantee}." for row in rows)

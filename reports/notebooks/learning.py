@@ -166,10 +166,7 @@ html.table(policies.settings_table(shipped), "The settings of the shipped polici
 
 # %%
 html.say(
-    "Each training makes {updates} updates and simulates {slots} million UAV-slots. From which "
-    "step on the moving average of the product does not improve any more:\n\n{courses}",
-    updates=numbers.span(last["updates"]),
-    slots=numbers.span(last["uav_slots"] / 1e6, "{:.1f}"),
+    "Where the moving average of the product ends, and from when on it is near:\n\n{courses}",
     courses=html.composed(
         "\n".join(policies.course_in_words(policy, verdict_rules.MARGIN) for policy in shipped)
     ),

@@ -126,12 +126,6 @@ html.gallery(
 # all pairs of values. A metric *rises* if all differences that are significant are increases.
 # Estimates of small Sobol indices may be negative.
 
-# %%
-html.say(
-    "The guarantees of the selections:\n\n{known}",
-    known=html.composed(sweet_spot.guarantees(sweet)),
-)
-
 # %% [markdown]
 # ## Tables
 
@@ -146,7 +140,8 @@ html.table(
     sweet_spot.table(sweet),
     f"The selected settings and their checks: means with {level} intervals, the difference "
     "from the paper in points (▲ above, ▼ below, ≈ contains it), missions, settings not ruled "
-    "out",
+    "out, and what the selection guarantees",
+    wrap=True,
 )
 
 # %%

@@ -174,7 +174,9 @@ html.table(checks.as_text(judged), caption, wrap=True)
 
 # %%
 model = stress_des.describe(suite.study.manifest, [s.manifest for s in suite.others.values()])
-display(Markdown("\n\n".join(model.sections[number] for number in "12")))
+display(Markdown(model.sections["1"]))
+display(html.table(model.studies, "The studies of these pages (1.3)", wrap=True))
+display(Markdown(model.sections["2"]))
 html.figure(
     drawings.slot(*model.overview),
     "Boxes, one below the other: what happens before the first mission slot and in each",

@@ -25,8 +25,8 @@ TERMS = {
     "replication": "the number of a mission, which fixes all its random draws",
     "paired": "taken in missions with the same random draws",
     "upper bound": "no policy can expect to collect more",
-    "95 % intervals": "Wilson's for success; of a bounded mean for the other shares, which is wider "
-    "and lopsided; Student's t for differences",
+    "95 % intervals": "Wilson's for success; that of a bounded mean for the other shares, which is "
+    "wider and lopsided; Student's t for differences",
     "Holm": "a correction of p-values for the number of comparisons",
 }
 _TERM = re.compile(rf"\b({'|'.join(TERMS)})\b")

@@ -35,12 +35,14 @@ class Description(NamedTuple):
 
     Attributes:
         sections: The sections as Markdown, by their number: ``"1"`` to ``"6"``.
+        studies: The studies, the table of item 1.3.
         overview: The order of events in a slot (Section III-C of the paper, item 2.1 of the
             checklist), which ``figures.verification.slot`` draws.
         parameters: All input parameters with their values, the table of item 3.3.
     """
 
     sections: dict[str, str]
+    studies: pd.DataFrame
     overview: tuple[list[tuple[str, str]], str, str]
     parameters: pd.DataFrame
 
@@ -58,7 +60,6 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
     ranges = {field: getattr(space, field) for field in SAMPLED}
     values = {
         "base": manifest,
-        "manifests": [manifest, *others],
         "space": space,
         "m": space.communication_slots,
         "pads": space.charging_pads,
@@ -82,12 +83,29 @@ def describe(manifest: Manifest, others: Sequence[Manifest] = ()) -> Description
     )
     module: Any = page.make_module(values)
     sections = {part[4]: part.strip() for part in _HEADING.split(str(module)) if part.strip()}
-    return Description(sections, (module.steps, module.repeated, module.end), _parameters(space))
+    overview = module.steps, module.repeated, module.end
+    studies = pd.DataFrame(_study(each) for each in (manifest, *others))
+    return Description(sections, studies, overview, _parameters(space))
 
 
 def _words(names: Iterable[str]) -> Marked:
     """A list of names as ``a, b and c`` in Markdown."""
     return Marked(numbers.words([n if isinstance(n, Marked) else text(n) for n in names]))
+
+
+def _study(manifest: Manifest) -> dict[str, str]:
+    """A study as a row of the table of item 1.3."""
+    study = manifest["study"]
+    rules = {"by a stopping rule": study["precision"], "by a selection": study["selection"]}
+    missions = [_span([n for counts in manifest["missions"] for n in counts])]
+    return {
+        "Study": study["name"],
+        "Aim": study["description"] or "",
+        "Design": f"{study['design']['kind'] if study['design'] else 'one point'}",
+        "Design points": _number(len(manifest["points"])),
+        "Missions per policy and point": ", ".join(missions + [r for r, on in rules.items() if on]),
+        "Policies": numbers.words(study["policies"]),
+    }
 
 
 def _swept(manifests: Iterable[Manifest]) -> dict[str, None]:

@@ -63,12 +63,10 @@ def course_in_words(policy: Trained, margin: float) -> str:
     averages = last_phase(smoothed(curves_of([policy], ""), PRODUCT), "")[policy.config.seed]
     near = policy.curve.iloc[settled(averages, margin) - len(averages)]
     return (
-        f"- **{policy.name}** ends at {numbers.percent(averages.iloc[-1])} after "
-        f"{end['updates']:,} updates, {end['uav_slots'] / 1e6:.1f} million UAV-slots "
-        f"and {end['seconds'] / 60:.0f} minutes. "
-        f"From update {near['updates']:,} on ({near['seconds'] / 60:.0f} minutes) it stays within "
-        f"{numbers.margin(margin)} of that: the other "
-        f"{numbers.percent(1 - near['updates'] / end['updates'])} of the updates moved it by less."
+        f"- **{policy.name}**: {numbers.percent(averages.iloc[-1])} after {end['updates']:,} "
+        f"updates ({end['uav_slots'] / 1e6:.1f} million UAV-slots, {end['seconds'] / 60:.0f} "
+        f"minutes); within {numbers.margin(margin)} of it from update {near['updates']:,} on "
+        f"({near['seconds'] / 60:.0f} minutes)."
     )
 
 

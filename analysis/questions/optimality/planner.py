@@ -15,7 +15,7 @@ from analysis.names import PRODUCT, SUCCESS
 from analysis.questions.decision_times import Times
 from analysis.questions.missions import LoggedMission, logged_mission
 from analysis.questions.node_shares import collected, held
-from analysis.questions.optimality.gap import ALL, fleet
+from analysis.questions.optimality.gap import ALL
 from analysis.results.event_log import uav_slots
 from analysis.results.tables import Results
 from analysis.stats.front import on_front
@@ -53,7 +53,7 @@ def differences(results: Results, planners: Sequence[str], learner: str) -> pd.D
 
 
 def answer(table: pd.DataFrame, planner: str) -> str:
-    """Whether the planner is better than the learner, by how much, and for which fleets.
+    """Whether the planner is better than the learner, and by how much.
 
     Args:
         table: Rows of ``differences``.
@@ -61,12 +61,9 @@ def answer(table: pd.DataFrame, planner: str) -> str:
     """
     rows = _of_product(table, planner)
     (overall,) = rows[rows["uavs"] == ALL].itertuples()
-    parts = [
-        f"{_points(row)} with {fleet(row.uavs)}" for row in rows.itertuples() if row.uavs != ALL
-    ]
     return (
         f"{_CLAIMS[position(overall)]}: the product of {planner} minus that of {overall.baseline} "
-        f"is {_points(overall)} points over {overall.n:,} missions ({numbers.words(parts)})."
+        f"is {_points(overall)} points over {overall.n:,} missions."
     )
 
 

@@ -30,10 +30,6 @@ def test_the_paper_is_the_first_row_and_policies_follow(results: Results) -> Non
         assert cell.startswith(f"{100 * mean:.1f} % [{100 * low:.1f}, {100 * high:.1f}]")
         assert cell[-1] == ("▲" if low > 0.93 else "▼" if high < 0.93 else "≈")
         assert table.loc[policy, "Initial data"] in ("5–7.5", "10")
+        assert table.loc[policy, "Guarantee"]
         (point,) = checks["point"].unique()
         assert table.loc[policy, "UAVs"] == ("1", "1", "3", "3")[point]
-
-
-def test_every_selection_says_what_is_known_of_it(results: Results) -> None:
-    lines = sweet_spot.guarantees(results).splitlines()
-    assert [line.split("**")[1] for line in lines] == results.policies

@@ -108,12 +108,15 @@ def test_no_number_of_the_model_is_typed() -> None:
 
 def test_studies_say_what_they_are_about() -> None:
     others = [Manifest.of(load_study(name)).data for name in ("fig5", "sweet-spot")]
-    texts = items(manifest(), *others)
+    rows = stress_des.describe(manifest(), others).studies.set_index("Study")
     for data in others:
         study = data["study"]
-        assert f"`{study['name']}`: {study['description']}" in texts["1.3"]
-        assert f"{len(data['points'])} design points ({study['design']['kind']})" in texts["1.3"]
-    assert "by `kn-bounded`" in texts["1.3"]
+        row = rows.loc[study["name"]]
+        assert (row["Aim"], row["Design"]) == (study["description"], study["design"]["kind"])
+        assert row["Design points"] == str(len(data["points"]))
+        assert "ddqn" in row["Policies"]
+    assert "by a selection" in rows.loc["sweet-spot", "Missions per policy and point"]
+    texts = items(manifest(), *others)
     assert "`initial_data`" in texts["2.3"] and "`uavs`" in texts["2.3"]
     assert "`ddqn`" in texts["2.4"]
 
@@ -121,9 +124,8 @@ def test_studies_say_what_they_are_about() -> None:
 def test_missions_are_those_of_the_manifests() -> None:
     one = manifest() | {"missions": [[1234], [1234]]}
     two = manifest() | {"missions": [[20, 7], [31, 1500]]}
-    two["study"] = two["study"] | {"name": "other"}
-    assert "1,234 missions; " in items(one)["1.3"]
-    assert "7 to 1,500 missions; " in items(two)["1.3"]
+    missions = stress_des.describe(one, [two]).studies["Missions per policy and point"]
+    assert missions.tolist() == ["1,234", "7 to 1,500"]
 
 
 def test_scarce_pads_make_a_queue() -> None:

@@ -58,7 +58,7 @@ def test_the_answer_says_which_is_better_and_by_how_much(results):
     assert text.startswith(
         f"The planner is better: the product of greedy minus that of random is {points}"
     )
-    assert "over 30 missions (+" in text and "with 3 UAVs" in text
+    assert text.endswith("over 30 missions.")
     assert planner.ahead(table, "greedy") == f"{points[:-2]} points"
     turned = table.assign(low=-table["high"], high=-table["low"], difference=-table["difference"])
     assert planner.answer(turned, "greedy").startswith("The learner is better: the product")
