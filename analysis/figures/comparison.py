@@ -5,6 +5,7 @@ orange worse, and a hollow mark inconclusive.
 """
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 
 import numpy as np
 import pandas as pd
@@ -39,9 +40,9 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
         ax.axhline(0, **style.ZERO)
         ax.axhline(overall, color=style.MUTED, linestyle="--", zorder=1, gid="overall")
         for verdict, part in rows.groupby("verdict"):
-            fill = "none" if verdict == INCONCLUSIVE else "full"
+            fillstyle = "none" if verdict == INCONCLUSIVE else "full"
             ax.errorbar(part["position"], part["mean"], yerr=style.arms(part), linestyle="",
-                        **style.dot((COLOURS[verdict], "o")), fillstyle=fill)  # fmt: skip
+                        **style.dot((COLOURS[verdict], "o")), fillstyle=fillstyle)  # fmt: skip
         ax.set_title(parameter(field).label, parse_math=True)
         ax.set(ylabel="mean difference [points]", ylim=style.ends(table, zero=True))
         ax.set_xticks(rows["position"], rows["value"])
@@ -49,11 +50,12 @@ def lead(table: pd.DataFrame, field: str, overall: float) -> Figure:
     return figure
 
 
-def claims(table: pd.DataFrame) -> Figure:
+def claims(table: pd.DataFrame, width: int = 60) -> Figure:
     """Results minus the numbers that the paper prints: a row per number, a colour per policy.
 
     Args:
         table: Rows with ``claim``, ``policy``, and the difference ``mean``, ``low`` and ``high``.
+        width: The characters in a line of a name.
     """
     names = [*table["claim"].unique()]
     looks = style.policy_colours(table["policy"])
@@ -65,7 +67,7 @@ def claims(table: pd.DataFrame) -> Figure:
             ax.errorbar(rows["mean"], places, xerr=style.arms(rows), linestyle="", label=policy,
                         **style.dot(looks[str(policy)]))  # fmt: skip
         ax.axvline(0, **style.ZERO)
-        ax.set_yticks(range(len(names)), names)
+        ax.set_yticks(range(len(names)), [fill(name, width) for name in names])
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
         style.in_units(ax.xaxis, "points")
     return figure

@@ -172,17 +172,23 @@ def answer(table: pd.DataFrame, policy: str) -> str:
     """
     rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
     by_field = rows.sort_values("mean", kind="stable").groupby("field", sort=False)
-    spans = (by_field["mean"].max() - by_field["mean"].min()).sort_values(ascending=False)
     ends = [
         f"{parameter(str(field)).within} ({numbers.percent(low['mean'])} at {low['value']}, "
         f"{numbers.percent(high['mean'])} at {high['value']})"
-        for field in spans.index[:2]
+        for field in strongest(table, policy)
         for low, high in [(by_field.get_group(field).iloc[0], by_field.get_group(field).iloc[-1])]
     ]
     return (
         f"The product of {policy} depends most on the {' and on the '.join(ends)}; "
         f"n = {numbers.span(rows['n'])} missions per value."
     )
+
+
+def strongest(table: pd.DataFrame, policy: str, count: int = 2) -> list[str]:
+    """The parameters along whose values the product of a policy changes most; as ``answer``."""
+    rows = table[(table["metric"] == PRODUCT) & (table["policy"] == policy)]
+    by_field = rows.groupby("field", sort=False)["mean"]
+    return [*(by_field.max() - by_field.min()).nlargest(count).index]
 
 
 def listed(table: pd.DataFrame, changes: ByField, ratios: ByField) -> pd.DataFrame:

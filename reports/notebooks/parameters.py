@@ -45,11 +45,13 @@ level, checks = numbers.level(LEVEL), summary.checks(sweet)
 html.answer(main_effects.answer(effects, leading))
 
 # %%
+most = effects[effects["field"].isin(main_effects.strongest(effects, leading))]
 html.lead(
     figures.one_by_one(effects, fig5.policies),
     "The product against every parameter",
     f"n = {numbers.span(effects['n'])} missions per dot, with all other parameters drawn from "
     f"Table II; bars are {level} intervals.",
+    narrow=figures.one_by_one(most, fig5.policies),
 )
 
 # %% [markdown]

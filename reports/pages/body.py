@@ -72,6 +72,8 @@ class Body:
         for count, figure in enumerate(soup.find_all("figure"), 1):
             _number(soup, figure, count)
         _explain(soup)
+        for scrolling in soup.find_all("pre"):
+            scrolling["tabindex"] = "0"
         for text in [*soup.find_all(string=_INDEX)]:
             if not text.find_parent(["code", "pre", "script", "style"]):
                 text.replace_with(*_with_indices(soup, text))

@@ -38,6 +38,7 @@ STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contai
 Drawing = tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
+LEAD_ON_PHONE = (4.3, 4.4)
 DIGITS = "%.6g"  # format of numbers in files with data
 # Characters that LaTeX cannot print directly.
 _IN_LATEX = str.maketrans(
@@ -51,6 +52,7 @@ _MARKUP = re.compile(
 )
 # The coordinates in a figure, a number with many decimals, the space around a command of a path.
 _PLACES, _DIGITS = re.compile(rb' (?:d|x|y)="[^"]*"'), re.compile(rb"(\.\d)\d+")
+_EMPTY_HEADER = re.compile(r"<th[^>]*></th>")  # which is no header for a screen reader
 _BREAKS = re.compile(rb"\s+([LCQz]) ?")
 _NO_METADATA: dict = {key: None for key in ("Creator", "Date", "Format", "Type")}
 
@@ -200,6 +202,7 @@ def table(
     """
     look = ["table", "wrap"] if wrap else "table"
     html = frame.to_html(index=False, border=0, classes=look, escape=True, na_rep="")
+    html = _EMPTY_HEADER.sub("<td></td>", html)
     if caption:
         html = html.replace(">", f"><caption>{escape(caption)}</caption>", 1)
     below = "" if data is None else _downloads(caption, data, frame)
@@ -232,10 +235,22 @@ def figure(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = 
     return HTML(_figure(drawing, alt, caption, data))
 
 
-def lead(drawing: Figure, alt: str, caption: str, data: pd.DataFrame | None = None) -> HTML:
-    """The figure that shows the answer, as wide as the page; with the arguments of ``figure``."""
+def lead(
+    drawing: Figure,
+    alt: str,
+    caption: str,
+    data: pd.DataFrame | None = None,
+    narrow: Figure | None = None,
+) -> HTML:
+    """The figure that shows the answer, as wide as the page; with the arguments of ``figure``.
+
+    Narrow windows show ``narrow`` in its place, or the same figure drawn for their width.
+    """
+    on_phone = narrow or drawing
+    on_phone.set_size_inches(LEAD_ON_PHONE)
+    source = f'<source media="(max-width: 45rem)" srcset="{_source(on_phone)}">'
     drawing.set_size_inches(LEAD)
-    return HTML(_figure(drawing, alt, caption, data, "lead"))
+    return HTML(_figure(drawing, alt, caption, data, source))
 
 
 def gallery(drawings: Sequence[Drawing], note: str = "") -> HTML:
@@ -266,13 +281,20 @@ def _shorter(coordinates: re.Match[bytes]) -> bytes:
 
 
 def _figure(
-    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None, look: str = ""
+    drawing: Figure, alt: str, caption: str = "", data: pd.DataFrame | None = None, narrow: str = ""
 ) -> str:
-    source = f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
-    image = f'<img alt="{escape(alt)}" src="{source}">'
+    """A figure; with ``narrow``, what narrow windows show instead, it is one that leads."""
+    image = f'<img alt="{escape(alt)}" src="{_source(drawing)}">'
     below = "" if data is None else _downloads(alt, data, data)
-    kind = f' class="{look}"' if look else ""
-    return f"<figure{kind}>{image}<figcaption>{escape(caption)}{below}</figcaption></figure>"
+    caption = f"<figcaption>{escape(caption)}{below}</figcaption>"
+    if narrow:
+        return f'<figure class="lead"><picture>{narrow}{image}</picture>{caption}</figure>'
+    return f"<figure>{image}{caption}</figure>"
+
+
+def _source(drawing: Figure) -> str:
+    """The address of a figure, which contains it."""
+    return f"data:image/svg+xml;base64,{b64encode(svg(drawing)).decode()}"
 
 
 def _downloads(title: str, data: pd.DataFrame, shown: pd.DataFrame) -> str:

@@ -30,8 +30,11 @@ TILES = {  # pages whose number has a tile, and what it is
     "planner": "Planning against learning",
     "own-sea": "The cheapest fleet of the example",
 }
+_DATA = r"data:image/svg\+xml;base64,[\w+/=]+"
 _IMAGE = re.compile(
-    """<img alt=("[^"<>]*"|'[^'<>]*') src="data:image/svg\\+xml;base64,[\\w+/=]+"/?>""", re.ASCII
+    rf"""<picture><source media="[^"<>]*" srcset="{_DATA}"/?>"""
+    rf"""<img alt=("[^"<>]*"|'[^'<>]*') src="{_DATA}"/?></picture>""",
+    re.ASCII,
 )
 _TITLE = re.compile("<h1>([^<]*)</h1>")
 _LEAD = re.compile('<p class="lead"(?: data-number="([^"<>]*)")?>([^<]*)</p>')
