@@ -59,7 +59,9 @@ def claims(table: pd.DataFrame, width: int = 60) -> Figure:
     """
     names = [*table["claim"].unique()]
     looks = style.policy_colours(table["policy"])
-    with style.panels(0.3 * len(names), values="x", legend=5) as (figure, ax):
+    lines = [fill(name, width) for name in names]
+    height = 0.3 * len(names) if width > max(map(len, names)) else 0.52 * len(names)
+    with style.panels(height, values="x", legend=5) as (figure, ax):
         for shift, (policy, rows) in zip(
             style.shifts(len(looks), 0.3), table.groupby("policy", sort=False), strict=True
         ):
@@ -67,7 +69,7 @@ def claims(table: pd.DataFrame, width: int = 60) -> Figure:
             ax.errorbar(rows["mean"], places, xerr=style.arms(rows), linestyle="", label=policy,
                         **style.dot(looks[str(policy)]))  # fmt: skip
         ax.axvline(0, **style.ZERO)
-        ax.set_yticks(range(len(names)), [fill(name, width) for name in names])
+        ax.set_yticks(range(len(names)), lines)
         ax.set(ylim=(len(names) - 0.5, -0.5), xlabel="ours minus the paper's [points]")
         style.in_units(ax.xaxis, "points")
     return figure

@@ -29,10 +29,10 @@ from analysis import load_results, numbers
 from analysis.figures.missions import mission_figure
 from analysis.names import RATIO
 from analysis.questions import missions
-from analysis.questions.summary import best_policy
+from analysis.questions.summary import best_policy, ranked_policies
 from analysis.replication import paper
 from reports.pages import html
-from reports.player import READING, library, player
+from reports.player import READING, library, player, together
 
 # %%
 fig1, fig4 = (load_results(Path(results) / name) for name in ("fig1", "fig4"))
@@ -51,18 +51,17 @@ library()
 
 
 # %%
-def played(number: int) -> html.HTML:
-    mission = shown[number]
-    title = f"{mission.fleet}: {numbers.percent(mission.row[RATIO])} collected"
+def played(mission: missions.LoggedMission, name: str) -> html.HTML:
+    flown_by = mission.row["policy"]
+    title = f"{mission.fleet}, {flown_by}: {numbers.percent(mission.row[RATIO])} collected"
     caption = (
-        f"n = 1 mission of {shown_policy}, replication {replication} of seed {seed}, "
+        f"n = 1 mission of {flown_by}, replication {replication} of seed {seed}, "
         f"{mission.row['slots']} mission slots."
     )
-    name = f"player-{mission.scenario.uavs}"
     return player(mission.log, mission.scenario, name, title, caption)
 
 
-played(-1)
+played(shown[-1], "player")
 
 # %% [markdown]
 # ## How to read it
@@ -76,10 +75,20 @@ html.say("{reading}", reading=READING)
 # the start, a dot the end. The y axis points south.
 
 # %% [markdown]
+# ## Two policies in step
+#
+# The same mission, flown by the best policy and by the next one.
+
+# %%
+second = next((p for p in ranked_policies(fig4.missions) if p != shown_policy), shown_policy)
+other = missions.logged_mission(fig4, second, points[-1], replication)
+together([played(shown[-1], "player-first"), played(other, "player-second")])
+
+# %% [markdown]
 # ## With fewer UAVs
 
 # %%
-display(*map(played, range(len(shown) - 1)))
+display(*(played(mission, f"player-{mission.scenario.uavs}") for mission in shown[:-1]))
 
 # %% [markdown]
 # ## <a id="fig-4"></a>The paper's Fig. 4

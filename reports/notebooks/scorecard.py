@@ -53,7 +53,7 @@ html.lead(
     f"n = {numbers.span(against['n'])} missions per dot. Bars are 95 % intervals, with that of the "
     "paper's number where the paper says over how many missions it is a mean.",
     against,
-    claims(against, width=19),
+    claims(against, width=23),
 )
 
 # %% [markdown]

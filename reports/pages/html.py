@@ -38,7 +38,7 @@ STUDY, FILES = "dess-study", "dess-files"  # classes of the elements that contai
 Drawing = tuple[Figure, str] | tuple[Figure, str, str] | tuple[Figure, str, str, pd.DataFrame]
 
 LEAD = (10.2, 4.4)  # the size of the figure that shows the answer [inches]
-LEAD_ON_PHONE = (4.3, 4.4)
+LEAD_ON_PHONE = (4.3, 4.4)  # at least so high
 DIGITS = "%.6g"  # format of numbers in files with data
 # Characters that LaTeX cannot print directly.
 _IN_LATEX = str.maketrans(
@@ -247,7 +247,7 @@ def lead(
     Narrow windows show ``narrow`` in its place, or the same figure drawn for their width.
     """
     on_phone = narrow or drawing
-    on_phone.set_size_inches(LEAD_ON_PHONE)
+    on_phone.set_size_inches(LEAD_ON_PHONE[0], max(LEAD_ON_PHONE[1], on_phone.get_figheight()))
     source = f'<source media="(max-width: 45rem)" srcset="{_source(on_phone)}">'
     drawing.set_size_inches(LEAD)
     return HTML(_figure(drawing, alt, caption, data, source))

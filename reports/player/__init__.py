@@ -7,6 +7,8 @@ drawn is in ``templates/player.js``.
     display(player(log, scenario, "player-1", "One UAV"))
 """
 
+from collections.abc import Iterable
+
 from IPython.display import HTML
 
 from analysis.figures import style
@@ -39,6 +41,12 @@ def reading(scenario: Scenario) -> str:
 def library() -> HTML:
     """The script of all players, which a page needs once, before its players."""
     return HTML(f"<script>{template('player.js').render(style=style)}</script>")
+
+
+def together(players: Iterable[HTML]) -> HTML:
+    """Several players side by side, which show the same slot."""
+    shown = "".join(player.data for player in players)
+    return HTML(f'<div class="gallery together">{shown}</div>')
 
 
 def player(

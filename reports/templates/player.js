@@ -221,8 +221,18 @@ function playMission(id, mission) {
         slider.value = slot;
     }
 
+    // Players in the same element that is marked so show the same slot.
+    const together = figure.closest(".together");
     function show(next) {
         slot = Math.max(0, Math.min(end, Math.round(next)));
+        draw();
+        if (together) together.dispatchEvent(new CustomEvent("shown", { detail: { id, next } }));
+    }
+
+    function join({ detail }) {
+        if (detail.id === id) return;
+        pause();
+        slot = Math.max(0, Math.min(end, Math.round(detail.next)));
         draw();
     }
 
@@ -276,6 +286,7 @@ function playMission(id, mission) {
         if (asked) show(Number(asked[1]));
     }
     canvas.style.width = "100%";
+    if (together) together.addEventListener("shown", join);
     window.addEventListener("resize", arrange);
     window.addEventListener("hashchange", follow);
     arrange();

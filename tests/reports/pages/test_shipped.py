@@ -188,7 +188,11 @@ def test_pages_fit_the_paper(
 @pytest.mark.usefixtures("files")
 def test_a_mission_is_played_in_its_page(visit: Callable[[Path, int], Visit], out: Path) -> None:
     opened = visit(out / "mission.html", 1280)
-    opened.page.locator("#player-3 button").click()
-    opened.page.wait_for_function("document.querySelector('#player-3 input').value >= 3")
+    opened.page.locator("#player button").click()
+    opened.page.wait_for_function("document.querySelector('#player input').value >= 3")
+    opened.page.locator("#player-second canvas").press("End")
+    opened.page.locator("#player-first canvas").press("ArrowLeft")
+    first, second = (opened.page.locator(f"#player-{n} output") for n in ("first", "second"))
+    assert first.inner_text().split(" of ")[0] == second.inner_text().split(" of ")[0]
     assert opened.requests == [(out / "mission.html").as_uri()]
     assert opened.complaints == []
