@@ -19,11 +19,11 @@ import dess
 import policies
 from analysis import load_study
 from analysis.replication import paper
+from benchmarks import learning_curves
 from dess import load_scenario
 from dess.record import EVENT_NAMES, MISSION_RECORD, UAV_RECORD, EventLog
 from reports import cli
 from reports.cli import commands, ranges, settings
-from reports.tools import learning_curves
 
 ROOT = Path(__file__).parents[1]
 TOP = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")

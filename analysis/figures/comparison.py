@@ -9,8 +9,6 @@ from textwrap import fill
 
 import numpy as np
 import pandas as pd
-import seaborn as sns
-from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from analysis.figures import drawings, style
@@ -186,11 +184,6 @@ def gaps(table: pd.DataFrame) -> Figure:
             style.in_units(ax.xaxis, "%")
         ax.set_xlabel(METRICS[PRODUCT])
     return figure
-
-
-def diverging() -> Colormap:
-    """Colours from worse over white to better."""
-    return sns.blend_palette([style.WORSE, "white", style.BETTER], as_cmap=True)
 
 
 def _differences(rows: pd.DataFrame, names: pd.Series, title: str) -> Figure:

@@ -99,33 +99,6 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     return figure
 
 
-def training(curve: pd.DataFrame, name: str) -> Figure:
-    """The evaluations of one training by training step, with a mark at the selected weights.
-
-    Args:
-        curve: The curve of the training, with ``is_best`` where weights were selected.
-        name: The name of the policy.
-    """
-    kept = curve[curve["is_best"]].iloc[-1]
-    with style.panels(3.9, values="y", legend=2) as (figure, ax):
-        looks = zip(EVALUATED.items(), style.palette()[2:], ("--", ":", "-"), strict=False)
-        for (metric, label), colour, line in looks:
-            for n, (_, phase) in enumerate(curve.groupby("phase", sort=False)):
-                ax.plot(phase["updates"], phase[metric], line, color=colour, linewidth=1.5,
-                        label="" if n else label)  # fmt: skip
-        ax.plot(kept["updates"], kept[metric], "*", color=style.INK, markersize=13, zorder=5,
-                label=f"selected weights: {kept[metric]:.1%}")  # fmt: skip
-        _last_phase(curve, ax)
-        style.in_units(ax.yaxis, "%")
-        ax.set(title=name, ylim=(-0.02, 1.04))
-        _steps_axis(curve, ax)
-    return figure
-
-
-# The caption of ``training``.
-TRAINING = "n = 1 training each. The star marks the selected weights: the best moving average."
-
-
 def courses(
     rows: pd.DataFrame, line: str, unit: str, titles: Mapping[object, str], heading: str = ""
 ) -> Figure:

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 from scipy import stats
 
 from analysis.figures import style
@@ -17,7 +16,6 @@ from analysis.verification.fits import Fit
 from dess.scenario import ScenarioSpace
 
 SEEN, MISS, KNOWN = "#0072b2", "#d55e00", "#c9d3da"
-SHOWN = 60  # number of blocks in a caterpillar plot
 _ABOVE: dict = {"rows": 2, "values": "y", "sharex": True, "height_ratios": (2, 1), "legend": 2}
 
 
@@ -71,50 +69,6 @@ def rates(table: pd.DataFrame, space: ScenarioSpace) -> Figure:
         _deviations(below, table["distance"], (table["mean"] - table["known"]) / error)
         below.xaxis.set_major_formatter("{x:,.0f}")
         below.set_xlabel("distance [m]")
-    return figure
-
-
-def initial_data(values: np.ndarray, space: ScenarioSpace) -> Figure:
-    """The initial data of missions, and the density of the sum over their nodes.
-
-    Args:
-        values: (n,) initial data of missions [data units].
-        space: The scenario, with a range of initial data.
-    """
-    law = closed_forms.initial_total(space)
-    reach = law.mean() + 3 * law.std() * np.array([-1, 1])
-    spots = np.linspace(min(values.min(), reach[0]), max(values.max(), reach[1]), 120)
-    with style.panels(3.4, legend=2) as (figure, ax):
-        bins = int(np.clip(np.sqrt(len(values)), 8, 50))
-        ax.hist(values, bins, density=True, color=KNOWN, label="observed")
-        ax.plot(spots, law.pdf(spots), color=SEEN, linewidth=1.8, label="known density")
-        ax.set(title="Initial data of a mission", ylabel="density")
-        ax.set_xlabel("data units, all nodes together")
-    return figure
-
-
-def caterpillar(blocks: pd.DataFrame, title: str) -> Figure:
-    """The intervals of the first blocks; those that do not contain the mean of all are marked.
-
-    Args:
-        blocks: The result of ``analysis.verification.coverage.blocks``.
-        title: The title of the figure.
-    """
-    shown = blocks.head(SHOWN)
-    looks = (
-        (True, SEEN, "o", "contains the mean of all"),
-        (False, MISS, "X", "does not contain it"),
-    )
-    with style.panels(3.6, values="y", legend=2) as (figure, ax):
-        for holds, colour, marker, name in looks:
-            rows = shown[shown["holds"] == holds]
-            ax.vlines(rows.index + 1, rows["low"], rows["high"], color=colour)
-            ax.scatter(rows.index + 1, rows["mean"], s=10 if holds else 34, color=colour,
-                       marker=marker, zorder=3, label=name)  # fmt: skip
-        ax.axhline(blocks["reference"].iloc[0], color=style.INK, linewidth=1.1, zorder=1)
-        ax.set(title=title, xlabel="block of missions", xlim=(0, len(shown) + 1))
-        style.in_units(ax.yaxis, "%")
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=7, integer=True))
     return figure
 
 

@@ -110,10 +110,6 @@ class Suite:
         """(n,) a metric of the missions of the best policy."""
         return self._missions_of(self.best)[metric].to_numpy()
 
-    def blocks(self, metric: str, size: int) -> pd.DataFrame:
-        """Intervals of blocks of missions, as ``coverage.blocks`` returns them."""
-        return coverage.blocks(self.values(metric), size, metric == SUCCESS)
-
     def _missions_of(self, policy: str) -> pd.DataFrame:
         missions = self.study.missions
         return missions[(missions["policy"] == policy) & (missions["point"] == 0)]

@@ -95,27 +95,15 @@ html.gallery(drawings, figures.TRAININGS)
 
 # %%
 shipped = policies.trained_policies(folder)
-
-
-def several(group: list[policies.Trained], metric: str) -> tuple[Figure, str, str]:
-    names = numbers.words([policy.name for policy in group])
-    drawing = figures.trainings(policies.curves_of(group, names), metric, {names: group[0].name})
-    alt = f"{figures.NAMES[metric]} of {names} against training step"
-    return drawing, alt, f"{names}: trainings that differ only in their seed."
-
-
-learners = policies.several_trainings(shipped)
-html.gallery([several(group, metric) for group in learners for metric in metrics])
-
-
-# %%
-def once(policy: policies.Trained) -> tuple[Figure, str, str]:
-    alt = f"Evaluations of {policy.name} against training step"
-    caption = f"Seed {policy.config.seed}; {policy.config.evaluation_missions} missions each."
-    return figures.training(policy.curve, policy.name), alt, caption
-
-
-html.gallery([once(policy) for policy in shipped], figures.TRAINING)
+curves = policies.curves_by_learner(shipped)
+labels = {name: name for name in curves["variant"].unique()}
+html.gallery(
+    [
+        (figures.trainings(curves, m, labels), f"{figures.NAMES[m]} of the shipped policies")
+        for m in metrics
+    ],
+    figures.TRAININGS,
+)
 
 # %% [markdown]
 # ## How far to trust it
@@ -158,9 +146,6 @@ html.table(
     "in points)",
 )
 
-# %%
-html.table(policies.settings_table(shipped), "The settings of the shipped policies")
-
 # %% [markdown]
 # ## How this page was made
 
@@ -176,8 +161,8 @@ html.say(
 # The curves are shipped with the policies, in `policies/trained`. These commands make them again:
 
 # %%
-curves = "python -m reports.tools.learning_curves --out runs/learning"
-html.say("{lines}", lines=html.commands([curves, *policies.commands(shipped)]))
+again = "python -m benchmarks.learning_curves --out runs/learning"
+html.say("{lines}", lines=html.commands([again, *policies.commands(shipped)]))
 
 # %%
 html.weights(folder)

@@ -23,7 +23,7 @@ from IPython.display import Markdown, display
 
 from analysis import numbers
 from analysis.figures import verification as drawings
-from analysis.names import METRICS, parameter
+from analysis.names import parameter
 from analysis.stats.intervals import LEVEL
 from analysis.verification import checks, draws
 from analysis.verification.suite import Suite
@@ -125,14 +125,6 @@ figures = [
     )
     for field, fit in draws.parameter_fits(suite.missions, space).items()
 ]
-
-# %%
-if space.initial_data[0] < space.initial_data[1]:
-    initial = suite.missions["initial"].to_numpy()
-    caption = "The curve is the density of a sum of uniform variables."
-    alt = "Initial data per mission, and the density of their sum"
-    caption += f" n = {len(initial):,} missions."
-    figures.append((drawings.initial_data(initial, space), alt, caption))
 html.gallery(figures, f"All values should be drawn equally often: dots should lie inside {band}")
 
 # %% [markdown]
@@ -145,19 +137,6 @@ html.gallery(figures, f"All values should be drawn equally often: dots should li
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))
 html.say("{verdicts} The blocks have missions of {best}.", verdicts=verdicts, best=suite.best)
-
-# %%
-figures = [
-    (
-        drawings.caterpillar(rows, name),
-        f"{name}: intervals of blocks of missions",
-        f"{rows['holds'].sum():,} of the {len(rows):,} intervals contain the mean of all.",
-    )
-    for metric, name in METRICS.items()
-    if len(rows := suite.blocks(metric, block))
-]
-note = f"The first blocks, at most {drawings.SHOWN}; the line is the mean of all missions."
-html.gallery(figures, f"{note} n = {block:,} missions per interval, at {level}.")
 
 # %% [markdown]
 # ## Tables

@@ -1,7 +1,7 @@
 """The trained policies in a folder: how each was trained, and where more training stops paying.
 
 policies = trained_policies(Path("policies/trained"))
-several_trainings(policies)  # {"ddqn": ["ddqn", "ddqn-2", "ddqn-3"]}
+curves_by_learner(policies)["variant"].unique()  # "ddqn, ddqn-2 and ddqn-3" and "ddqn-paper"
 """
 
 from collections.abc import Iterable
@@ -44,44 +44,33 @@ def trained_policies(folder: Path) -> list[Trained]:
     ]
 
 
-def several_trainings(policies: Iterable[Trained]) -> list[list[Trained]]:
-    """The policies of each learner of several trainings, which differ in their seed alone."""
+def curves_by_learner(policies: Iterable[Trained]) -> pd.DataFrame:
+    """The curves of trainings, as in ``learning.curves``.
+
+    A variant is a learner, the trainings that differ in their seed alone, by its policies' names.
+    """
     learners: dict[str, list[Trained]] = {}
     for policy in policies:
         learners.setdefault(learner_of(policy.config), []).append(policy)
-    return [trainings for trainings in learners.values() if len(trainings) > 1]
-
-
-def curves_of(trainings: Iterable[Trained], variant: str) -> pd.DataFrame:
-    """The curves of trainings as those of one variant, as in ``learning.curves``."""
-    return pd.concat(t.curve.assign(variant=variant, seed=t.config.seed) for t in trainings)
+    return pd.concat(
+        policy.curve.assign(variant=numbers.words([p.name for p in group]), seed=policy.config.seed)
+        for group in learners.values()
+        for policy in group
+    )
 
 
 def course_in_words(policy: Trained, margin: float) -> str:
     """Where a training ends, and since when it has stayed within a margin: a Markdown item."""
     end = policy.curve.iloc[-1]
-    averages = last_phase(smoothed(curves_of([policy], ""), PRODUCT), "")[policy.config.seed]
+    averages = last_phase(smoothed(curves_by_learner([policy]), PRODUCT), policy.name)[
+        policy.config.seed
+    ]
     near = policy.curve.iloc[settled(averages, margin) - len(averages)]
     return (
         f"- **{policy.name}**: {numbers.percent(averages.iloc[-1])} after {end['updates']:,} "
         f"updates ({end['uav_slots'] / 1e6:.1f} million UAV-slots, {end['seconds'] / 60:.0f} "
         f"minutes); within {numbers.margin(margin)} of it from update {near['updates']:,} on "
         f"({near['seconds'] / 60:.0f} minutes)."
-    )
-
-
-def settings_table(policies: Iterable[Trained]) -> pd.DataFrame:
-    """How policies were trained, a row each."""
-    return pd.DataFrame(
-        {
-            "Policy": policy.name,
-            "Observation": policy.config.observation,
-            "Phases": ", ".join(f"{p.name} ({p.ticks:,} ticks)" for p in policy.config.phases),
-            "Seed": policy.config.seed,
-            "Discount": f"{policy.config.discount:g}",
-            "Steps of return": policy.config.n_step,
-        }
-        for policy in policies
     )
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.colors import to_hex
 
 from analysis.figures import learning as learning_figures
 from analysis.names import METRICS
@@ -82,22 +81,6 @@ def test_the_ablation_shows_trainings_means_and_intervals(ended):
     assert [label.get_text() for label in ax.get_yticklabels()] == ["base", "once", "lost"]
     (line,) = [line for line in ax.lines if line.get_gid() == "baseline"]
     assert set(line.get_xdata()) == {base["mean"]}
-
-
-def test_a_training_shows_its_evaluations_and_the_weights_kept():
-    curve = training("one", 1, [0.1, 0.2, 0.5, 0.4], before=1)
-    values = {name: curve["evaluation_reward"] / n for n, name in enumerate(METRICS, 1)}
-    curve = curve.assign(is_best=[True, False, True, False])
-    curve = curve.assign(**{f"evaluation_{name}": value for name, value in values.items()})
-    (ax,) = learning_figures.training(curve, "one").axes
-    for name, title in METRICS.items():
-        (last,) = [line for line in ax.lines if line.get_label() == title]
-        colour = to_hex(last.get_color())
-        own = [line for line in ax.lines if to_hex(line.get_color()) == colour]
-        drawn = np.concatenate([line.get_ydata() for line in own])
-        assert sorted(drawn) == sorted(curve[f"evaluation_{name}"])
-    (star,) = [line for line in ax.lines if line.get_marker() == "*"]
-    assert (star.get_xdata().tolist(), star.get_ydata().tolist()) == ([3000], [0.5 / 3])
 
 
 def test_a_course_is_a_line_per_value_in_the_panel_of_its_rows():

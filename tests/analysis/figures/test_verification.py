@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from scipy import stats
 
 from analysis.figures import verification as drawings
 from analysis.figures.verification import MISS, SEEN
-from analysis.verification import closed_forms, coverage, lone_uav
+from analysis.verification import closed_forms, lone_uav
 from analysis.verification.fits import Fit
 from dess import load_scenario
 
@@ -61,31 +60,6 @@ def test_rates_stand_beside_their_curve() -> None:
     assert curve.get_ydata()[[0, -1]] == pytest.approx(ends)
     z = (table["mean"] - table["known"]) / table["error"]
     assert sorted(dots(figure, 1)[:, 1]) == pytest.approx(sorted(z))
-
-
-def test_initial_data_are_bars_below_the_density_of_their_sum() -> None:
-    values = np.random.default_rng(1).uniform(5, 20, (4000, 25)).sum(axis=1)
-    figure = drawings.initial_data(values, SPACE)
-    bars = figure.axes[0].patches
-    assert sum(bar.get_height() * bar.get_width() for bar in bars) == pytest.approx(1)
-    (curve,) = figure.axes[0].lines
-    # Almost normal, with the variance of 25 uniform variables.
-    density = stats.norm(312.5, 15 * np.sqrt(25 / 12)).pdf(312.5)
-    assert curve.get_ydata().max() == pytest.approx(density, rel=0.01)
-
-
-def test_blocks_that_miss_the_mean_are_marked() -> None:
-    values = np.random.default_rng(2).normal(size=900)
-    blocks = coverage.blocks(values, 10, share=False)
-    figure = drawings.caterpillar(blocks, "Title")
-    shown = blocks.head(drawings.SHOWN)
-    missing = shown.index[~shown["holds"]] + 1
-    assert len(missing) > 0
-    assert dots(figure, 0, MISS)[:, 0].tolist() == missing.tolist()
-    assert len(dots(figure, 0, SEEN)) == len(shown) - len(missing)
-    assert dots(figure, 0, MISS)[:, 1] == pytest.approx(
-        shown.loc[~shown["holds"], "mean"].to_numpy()
-    )
 
 
 def test_the_order_of_events_goes_down_and_back_up() -> None:

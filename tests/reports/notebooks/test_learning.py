@@ -55,7 +55,6 @@ def test_the_learning_page_judges_by_the_curves_it_is_given(
     text = said_by("learning", trained=str(tmp_path))
     assert text.count(f"{verdict} is above in all of phase II") == 2
     assert f"The longest of these pairs have {length:,} steps;" in text
-    assert "ddqn and ddqn-2: trainings that differ only in their seed." in text
     # The mean of three trainings, the prediction interval of one more, and the difference.
     new = r"\[39\.[5-9], 40\.[5-9]\]"
     assert re.search(

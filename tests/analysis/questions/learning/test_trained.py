@@ -44,11 +44,8 @@ def folder(tmp_path: Path) -> Path:
 def test_trainings_that_differ_in_their_seed_are_of_one_learner(folder: Path) -> None:
     policies = trained.trained_policies(folder)
     assert [policy.name for policy in policies] == ["one", "other", "two"]
-    (group,) = trained.several_trainings(policies)
-    assert [policy.name for policy in group] == ["one", "two"]
-    curves = trained.curves_of(group, "learner")
-    assert curves.groupby("seed").size().to_dict() == {1: 4, 2: 4}
-    assert set(curves["variant"]) == {"learner"}
+    sizes = trained.curves_by_learner(policies).groupby(["variant", "seed"]).size()
+    assert sizes.to_dict() == {("one and two", 1): 4, ("one and two", 2): 4, ("other", 1): 4}
 
 
 def test_the_course_of_a_training(folder: Path) -> None:
@@ -60,8 +57,6 @@ def test_the_course_of_a_training(folder: Path) -> None:
     )
 
 
-def test_settings_and_commands(folder: Path) -> None:
+def test_every_training_has_its_command(folder: Path) -> None:
     policies = trained.trained_policies(folder)
-    table = trained.settings_table(policies).set_index("Policy")
-    assert table.loc["other", ["Seed", "Discount"]].tolist() == [1, "0.9"]
     assert trained.commands(policies)[-1] == "dess train tiny --seed 2 --out runs/two"

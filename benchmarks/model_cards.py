@@ -2,7 +2,7 @@
 
 The tool replaces the text between two marks in the file, and keeps the text around them.
 
-    python -m reports.tools.model_cards policies/trained/ddqn --command "dess train ddqn --out DIR"
+    python -m benchmarks.model_cards policies/trained/ddqn --command "dess train ddqn --out DIR"
 """
 
 import argparse
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from analysis import load_study, numbers
 from analysis.names import METRICS, PRODUCT
@@ -55,7 +55,7 @@ def card(folder: Path, command: str, missions: int) -> str:
         for n in paper.FIG_4
     }
     environment = Environment(
-        loader=PackageLoader("reports", "templates"), undefined=StrictUndefined, trim_blocks=True
+        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters |= {"percent": numbers.percent, "whole": "{:,.0f}".format}
     evaluated = {"success": "evaluation_success", "product": f"evaluation_{PRODUCT}"}

@@ -6,10 +6,10 @@ again. Gathering adds the trainings of the shipped policy ``SHIPPED``. The final
 of the selected weights, on missions that were used neither for training nor for selecting weights.
 
     export OMP_NUM_THREADS=1
-    python -m reports.tools.learning_curves --out runs/learning --seeds 1 2 3
-    python -m reports.tools.learning_curves --out runs/learning \\
+    python -m benchmarks.learning_curves --out runs/learning --seeds 1 2 3
+    python -m benchmarks.learning_curves --out runs/learning \\
         --gather policies/trained/curves.parquet
-    python -m reports.tools.learning_curves --table policies/trained/curves.parquet
+    python -m benchmarks.learning_curves --table policies/trained/curves.parquet
 """
 
 import argparse

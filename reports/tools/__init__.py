@@ -1,1 +1,0 @@
-"""Tools that make the shipped learning curves and model cards; run them with ``python -m``."""
