@@ -24,10 +24,8 @@ from analysis.stats.intervals import summary
 from dess import InputError
 from dess.files.reading import paths_in
 from dess.scenario import SAMPLED, Scenario
-from dess.sections.fleet import type_of
 
 FOLDER = "cross-check"  # folder of missions simulated again, beside the results folders
-ENDS = {"quota": "quota filled", "battery": "battery empty", "truncated": "out of time"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,11 +180,6 @@ def outcome_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
     return pd.DataFrame([_outcome(mission) for mission in missions])
 
 
-def uav_table(missions: Sequence[LoggedMission]) -> pd.DataFrame:
-    """A table to print with a row per UAV of some missions."""
-    return pd.concat([_uavs(mission) for mission in missions], ignore_index=True)
-
-
 def _outcome(mission: LoggedMission) -> dict[str, Any]:
     row, log = mission.row, mission.log
     served = log.loc[log["event"] == "communication", "node"].nunique()
@@ -204,20 +197,3 @@ def _outcome(mission: LoggedMission) -> dict[str, Any]:
         "Data left": f"{max(float(total) - float(collected), 0.0):.1f}",  # as they are printed
         "Fullest node left": f"{fullest['value']:.1f} at ({fullest['x']:.0f}, {fullest['y']:.0f})",
     }
-
-
-def _uavs(mission: LoggedMission) -> pd.DataFrame:
-    uavs, scenario = mission.uavs, mission.scenario
-    quotas = [type_of(scenario.fleet, uav).quota or scenario.quota for uav in uavs["uav"]]
-    columns = {
-        "UAVs": scenario.uavs,
-        "UAV": uavs["uav"] + 1,
-        "Communications": uavs["quota"].astype(str) + [f" of {quota}" for quota in quotas],
-        "Data collected": uavs["collected"].map("{:.1f}".format),
-        "Slots flying": uavs["slots_flying"],
-        "Slots charging": uavs["slots_charging"],
-        "Slots waiting": uavs["slots_waiting"],
-        "Battery at the end": uavs["battery"].map("{} %".format),
-        "End": uavs["end"].map(ENDS),
-    }
-    return pd.DataFrame(columns)

@@ -133,11 +133,7 @@ html.gallery([(mission_figure(example.log, example.scenario), alt, caption)])
 # ## Tables
 
 # %%
-uavs = "Every UAV; communications are the communication slots that count towards the quota"
-display(
-    html.table(missions.outcome_table(shown), "The missions; data in data units"),
-    html.table(missions.uav_table(shown), uavs),
-)
+html.table(missions.outcome_table(shown), "The missions; data in data units")
 
 # %% [markdown]
 # ## How this page was made

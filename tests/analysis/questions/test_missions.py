@@ -90,11 +90,3 @@ def test_outcomes_are_those_of_the_record(shown: list[missions.LoggedMission]) -
         x, y = mission.scenario.nodes[int(ends.idxmax())]
         assert row["Fullest node left"].endswith(f"({x}, {y})")
         assert row["Success"] == ("yes" if mission.row["success"] else "no")
-
-
-def test_uavs_have_a_row_each(results: Results, shown: list[missions.LoggedMission]) -> None:
-    table = missions.uav_table(shown)
-    kept = results.uavs.query("policy == 'greedy' and replication == 1")
-    assert table[["UAVs", "UAV"]].to_numpy().tolist() == [[1, 1], [3, 1], [3, 2], [3, 3]]
-    assert table["Communications"].tolist() == [f"{n} of 60" for n in kept["quota"]]
-    assert table["Battery at the end"].tolist() == [f"{n} %" for n in kept["battery"]]

@@ -33,8 +33,8 @@ def test_missions_and_their_means(results: Path, text: str) -> None:
         total = mission.initial + mission.arrived
         assert f"{mission.slots} slots; {mission.collected:.1f} of {total:.1f} data units" in text
         assert (
-            f"{point + 1} UAV{'s' * (point > 0)}: {100 * mission.collection_ratio:.1f} % collected"
-            in text
+            f"{point + 1} UAV{'s' * (point > 0)}, greedy: {100 * mission.collection_ratio:.1f} % "
+            "collected" in text
         )
 
 
