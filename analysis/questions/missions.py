@@ -34,13 +34,11 @@ class LoggedMission:
 
     Attributes:
         row: The row of the mission in ``Results.missions``.
-        uavs: The rows of its UAVs in ``Results.uavs``.
         scenario: The scenario with the parameters that the mission drew.
         log: The event log.
     """
 
     row: pd.Series
-    uavs: pd.DataFrame
     scenario: Scenario
     log: pd.DataFrame
 
@@ -160,7 +158,7 @@ def _mission(
     row = results.missions.query(of_mission).iloc[0]
     sampled = {key: int(row[key]) for key in SAMPLED}
     scenario = results.scenario(point).scenario_at(**sampled)
-    return LoggedMission(row, results.uavs.query(of_mission), scenario, log)
+    return LoggedMission(row, scenario, log)
 
 
 def estimate(results: Results, policy: str, metric: str = PRODUCT, point: int | None = None) -> Any:

@@ -130,27 +130,6 @@ def scorecard(studies: Mapping[str, Results], trainings: pd.DataFrame) -> list[R
     ]
 
 
-def of_policy(studies: Mapping[str, Results], policy: str, section: Section) -> list[Row]:
-    """The claims of a section with what the results of one policy say, whatever it is.
-
-    Raises:
-        InputError: If the study of the section is there, and without the policy.
-    """
-    if section.study in studies:
-        studies[section.study].check_policy(policy)
-    return _rows(section, margin(studies), [partial(evidence_of_policy, studies, policy=policy)])
-
-
-def listed(rows: Iterable[Row]) -> str:
-    """Claims with the verdict for one policy, in a line of Markdown each."""
-    lines = [
-        f"- {row.claim.text}: **{row.findings[0].outcome}**"
-        + (f"; {row.findings[0].note}" if row.findings[0].note else "")
-        for row in rows
-    ]
-    return "\n".join(lines)
-
-
 def margin(studies: Mapping[str, Results]) -> float:
     """The difference that does not matter: the indifference of the sweet spot's selection."""
     rule = studies["sweet-spot"].manifest["study"]["selection"] if "sweet-spot" in studies else None

@@ -25,8 +25,6 @@ from analysis import load_results, names, numbers
 from analysis.figures import settings as figures
 from analysis.questions import main_effects, sensitivity, summary
 from analysis.replication import paper, scorecard, sweet_spot
-from analysis.replication.claims import SECTIONS
-from analysis.replication.verdict_rules import NO_RESULTS
 from analysis.stats.intervals import LEVEL
 from reports.pages import html
 
@@ -77,7 +75,6 @@ html.gallery(
 
 # %%
 rule = sweet.manifest["study"]["selection"]
-studies = {"fig5": fig5, "sweet-spot": sweet}
 html.say(
     "Of {n:,} settings, the best by product was selected for every policy by "
     "<code>{rule[procedure]}</code>, with an indifference of {margin}, and simulated in "
@@ -85,7 +82,7 @@ html.say(
     "{paper:,}.",
     n=len(sweet.manifest["points"]),
     rule=rule,
-    margin=numbers.margin(scorecard.margin(studies)),
+    margin=numbers.margin(scorecard.margin({"sweet-spot": sweet})),
     paper=paper.SWEET_SPOT_MISSIONS,
 )
 
@@ -153,15 +150,8 @@ html.table(
     data=indices,
 )
 
-# %%
-rows = scorecard.of_policy(studies, leading, SECTIONS["fig-5"])
-rows = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
-html.say(
-    "The paper's claims about its Fig. 5, judged for {leading} by the rules of the "
-    "[scorecard](scorecard.html):\n\n{claims}",
-    leading=leading,
-    claims=html.composed(scorecard.listed(rows)),
-)
+# %% [markdown]
+# The [scorecard](scorecard.html) judges what the paper claims about its Fig. 5.
 
 # %% [markdown]
 # ## How this page was made

@@ -112,13 +112,6 @@ html.gallery(
 # does not give all constants, such as the place of the charging zone or the transmit power.
 
 # %%
-html.say(
-    "The 95 % interval of the paper's success over its {n:,} missions is {interval}.",
-    n=paper.TABLE_IV_MISSIONS,
-    interval=numbers.interval(*paper.spread(paper.TABLE_IV[SUCCESS], paper.TABLE_IV_MISSIONS)),
-)
-
-# %%
 html.say("{text}", text=html.composed(gap.in_words(bounded) if bounded else gap.NOT_RUN))
 
 # %%

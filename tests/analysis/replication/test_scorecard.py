@@ -14,7 +14,7 @@ from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS
 from analysis.replication import paper
 from analysis.replication import scorecard as module
 from analysis.replication.claims import SECTIONS
-from analysis.replication.scorecard import NULLS, Finding, Row, departures, of_policy, scorecard
+from analysis.replication.scorecard import NULLS, Finding, Row, departures, scorecard
 from analysis.replication.verdict_rules import (
     EXCEEDS,
     FALLS_SHORT,
@@ -208,19 +208,7 @@ def test_missions_that_collect_everything(studies: dict[str, Results]) -> None:
     assert row.findings[0].verdict == REFUTED
 
 
-def test_any_policy_is_judged_by_the_same_rules(
-    rows: list[Row], studies: dict[str, Results]
-) -> None:
-    of_ddqn = of_policy(studies, "ddqn", FIG_5)
-    expected = [row for row in rows if row.section is FIG_5]
-    assert [row.findings for row in of_ddqn] == [row.findings[:1] for row in expected]
-    others = of_policy(studies, "greedy", FIG_5)
-    assert {row.findings[0].policy for row in others} == {"greedy"}
-
-
 def test_a_policy_that_is_not_in_the_study_is_not_judged(studies: dict[str, Results]) -> None:
-    with pytest.raises(InputError, match=r"policy: 'gredy' is not in the study \(did you mean gre"):
-        of_policy(studies, "gredy", FIG_5)
     for ask in (studies["sweet-spot"].choice, studies["sweet-spot"].cheapest):
         with pytest.raises(InputError, match="policy: 'absent' is not in the study"):
             ask("absent")

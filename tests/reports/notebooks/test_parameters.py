@@ -3,13 +3,9 @@
 import json
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from analysis import load_results, load_study, run_study
-from analysis.replication.claims import SECTIONS
-from analysis.replication.scorecard import scorecard
-from analysis.replication.verdict_rules import NO_RESULTS
 from tests.by_hand import bounded
 from tests.reports.small import POLICIES, run_small_studies, said_by
 
@@ -59,15 +55,6 @@ def test_the_sweet_spot_is_checked_by_missions_of_its_own(results: Path, text: s
         assert shown.replace("-", "−") in text
 
 
-def test_verdicts_are_those_of_the_scorecard(results: Path, text: str) -> None:
-    studies = {name: load_results(results / name) for name in ("fig5", "sweet-spot")}
-    rows = [row for row in scorecard(studies, pd.DataFrame()) if row.section == SECTIONS["fig-5"]]
-    judged = [row for row in rows if row.findings[0].verdict != NO_RESULTS]
-    assert len(judged) > 5
-    for row in judged:
-        assert f"- {row.claim.text}: {row.findings[0].outcome}" in text
-
-
 def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_path: Path) -> None:
     folder = tmp_path / "results"
     folder.mkdir()
@@ -76,4 +63,3 @@ def test_without_a_learned_policy_the_heuristics_are_shown(results: Path, tmp_pa
     run_study(load_study("fig5", policies=["random", "greedy"], missions=4), folder / "fig5")
     text = said_by("parameters", results=str(folder))
     assert "The product of greedy depends most on the" in text
-    assert "judged for greedy by the rules" in text
