@@ -124,7 +124,7 @@ def check_slotted(spaces: Iterable[ScenarioSpace]) -> None:
 def work_of(space: ScenarioSpace) -> int:
     """The most work of a slot of a mission: the loops of the engine, the guard and the policies."""
     nodes, fleet = len(space.nodes), space.uavs[1]
-    each = nodes * (nodes + space.communication_slots) + fleet * space.zone_cells
+    each = nodes * (nodes + space.communication_slots) + fleet * len(space.chart.parking)
     return fleet * each + teeth_lengths([space])
 
 
@@ -145,8 +145,9 @@ def _by_world(spaces: list[ScenarioSpace]) -> list[np.ndarray]:
         s = spaces[index]
         channel = (s.edge_snr, s.path_loss_exponent, s.cell_size, s.altitude)
         speeds = tuple(kind.slots_per_cell for kind in s.fleet)
-        way_home = (s.zone, *s.wind.model_dump().values()) if s.wind.is_on or speeds else ()
-        return (s.is_extended, s.grid, s.communication_slots, channel, s.nodes, speeds, way_home)
+        wind = tuple(s.wind.model_dump().values())
+        geometry = (s.size, s.rectangles, s.no_fly, s.nodes)
+        return (s.is_extended, geometry, s.communication_slots, channel, speeds, wind)
 
     ordered = sorted(range(len(spaces)), key=key)
     return [np.array(sorted(members)) for _, members in groupby(ordered, key)]
@@ -189,7 +190,7 @@ def _next_mission(b, job_of, queue, source, state):
 @kernel
 def _advance(job_of, queue, source, state, world, scratch, records):
     """Advance every mission by one slot; a mission that ends is recorded and replaced."""
-    nodes, mean_snr, order, means = world
+    nodes, mean_snr, order, means, chart = world
     batches, search = scratch
     missions, uavs, residual, sensors, teeth = state
     arrivals = np.empty(len(nodes), np.int64)
@@ -199,7 +200,7 @@ def _advance(job_of, queue, source, state, world, scratch, records):
         mission, team, data = missions[b], uavs[b], residual[b]
         rules.advance(
             mission, team, data, sensors[b], teeth[b], arrivals,
-            nodes, mean_snr, order, means, batches, search,
+            nodes, mean_snr, order, means, chart, batches, search,
         )  # fmt: skip
         if mission.active == 0:
             job = job_of[b]

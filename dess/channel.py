@@ -17,6 +17,7 @@ from dess import streams
 from dess.code.kernels import inlined, kernel
 from dess.code.portable import log10
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import Chart
 from dess.sections import fleet
 from dess.state import STEP_X, STEP_Y
 
@@ -47,20 +48,22 @@ class World(NamedTuple):
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
-        mean_snr: (M, F * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis
+        mean_snr: (M, F * (M - 1) + 1), M cells along the longer side, mean SNR [dB] at a distance of ``a`` cells along one axis
             and ``b / F`` cells along the other. These are all relative positions from which a UAV
             can serve a node. F is m, or a multiple of it if a move may take several slots.
-        order: (5 * M * M, K + 1) for each step, the nodes in descending order of their highest
+        order: (5 * W * H, K + 1) for each step on a grid of W x H cells, the nodes in descending order of their highest
             mean SNR in the slot; the last column tells whether the row is filled. If a move may
             take several slots, there are such rows for each leg (``fleet.leg``).
-        means: (5 * M * M, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
+        means: (5 * W * H, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
             communication slot; rows as in ``order``.
+        chart: The zones, the no-fly cells and the ways between cells.
     """
 
     nodes: np.ndarray
     mean_snr: np.ndarray
     order: np.ndarray
     means: np.ndarray
+    chart: Chart
 
 
 class Scratch(NamedTuple):
@@ -98,21 +101,22 @@ def world_of(scenario: ScenarioSpace) -> World:
 
 @lru_cache(maxsize=8)
 def _world_of(scenario: ScenarioSpace, thread: int) -> World:
-    m, grid = scenario.communication_slots, scenario.grid
-    places = m * fleet.places_per_slot(scenario.fleet)
-    fine = np.arange(places * (grid - 1) + 1) / places
-    edge = np.sqrt(2) / 2 * grid * scenario.cell_size
-    mean_snr = np.empty((grid, len(fine)))
-    for row in range(grid):  # each takes a moment, all of a large grid may take seconds
+    m, (columns, rows) = scenario.communication_slots, scenario.size
+    places, longest = m * fleet.places_per_slot(scenario.fleet), max(columns, rows)
+    fine = np.arange(places * (longest - 1) + 1) / places
+    diagonal = np.sqrt(2) * np.sqrt((columns**2 + rows**2) / 2) * scenario.cell_size
+    edge = diagonal / 2
+    mean_snr = np.empty((longest, len(fine)))
+    for row in range(longest):  # each takes a moment, all of a large grid may take seconds
         horizontal = scenario.cell_size * np.hypot(row, fine)
         distance = np.hypot(horizontal, scenario.altitude)
         loss = 10 * scenario.path_loss_exponent * log10(distance / edge)
         mean_snr[row] = scenario.edge_snr - loss
     nodes = np.array(scenario.nodes, np.int64)
-    steps = 5 * grid * grid * fleet.legs(scenario.fleet)
+    steps = 5 * columns * rows * fleet.legs(scenario.fleet)
     # The operating system allocates memory page by page as the rows are filled.
     order = np.zeros((steps, len(nodes) + 1), np.int16)
-    return World(nodes, mean_snr, order, np.zeros((steps, len(nodes), m)))
+    return World(nodes, mean_snr, order, np.zeros((steps, len(nodes), m)), scenario.chart)
 
 
 @kernel
@@ -156,13 +160,14 @@ def _is_before(high, k, other):
 
 
 @inlined
-def open_slot(mission, uavs, nodes, mean_snr, order, means, search):
+def open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search):
     """Begin a mission slot: find the rows of the UAVs' steps, and fill them where they are new."""
+    rows, columns = chart.zones.shape
     for i in range(mission.uavs):
         u = uavs[i]
         if u.active:
             leg = fleet.leg(u)
-            row = ((leg * 5 + u.executed) * mission.grid + u.y) * mission.grid + u.x
+            row = ((leg * 5 + u.executed) * rows + u.y) * columns + u.x
             search[i, ROW] = row
             if order[row, mission.nodes] == 0:
                 _fill_row(u, row, nodes, mean_snr, order, means)

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, Any, Self
 
+import numpy as np
 import tomli_w
 from pydantic import (
     BaseModel,
@@ -17,7 +18,7 @@ from pydantic import (
 )
 
 from dess.errors import InputError, validation_line
-from dess.sea import Cell
+from dess.sea.chart import FAR, Cell, Chart, Rectangle, chart_at, parking_of, spread, zones_of
 from dess.sections.age import MOST_TEETH, Age
 from dess.sections.arrivals import Arrivals
 from dess.sections.charging import Charging
@@ -32,6 +33,9 @@ PAPER_NODES = tuple((x, y) for x in (3, 8, 13, 18, 23) for y in (6, 11, 16, 21, 
 # The largest scenario: cells along a side of the grid, nodes, mission slots and UAVs.
 MOST_CELLS, MOST_NODES, MOST_SLOTS, MOST_UAVS = 256, 1024, 100_000, 64
 
+# The most charging zones, and the most cells of a grid with no-fly cells: 200 MB of distances.
+MOST_ZONES, MOST_CHARTED = 8, 10_000
+
 # Largest amount of initial data of a node [data units].
 MOST_DATA = 10**9
 
@@ -44,6 +48,8 @@ MOST_ENTRIES = 2**30
 
 # The fields that go beyond the paper.
 EXTENSIONS = ("arrivals", "age", "charging", "failures", "wind", "fleet")
+# The fields of seas that the paper does not have; records are the same with and without them.
+GEOMETRY = ("rows", "zones", "no_fly")
 
 # A reward per event. Sums of many of them are still finite, and so are their squares.
 Reward = Annotated[Number, Field(ge=-(10**9), le=10**9)]
@@ -58,12 +64,28 @@ def is_number(value: Any) -> bool:
 AS_RANGE = BeforeValidator(lambda value: (value, value) if is_number(value) else value)
 
 
+class Zone(Strict):
+    """A further charging zone."""
+
+    cells: Rectangle = Field(description="[x, y, width, height] in cells")
+    pads: Integer | None = Field(
+        None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+
+
 class Constants(Strict):
     """The constants that are never sampled: the common base of both kinds of scenario."""
 
     # World
     grid: Integer = Field(
-        32, ge=2, le=MOST_CELLS, description="cells along one side of the square grid (M)"
+        32, ge=2, le=MOST_CELLS, description="cells of the grid from west to east (M)"
+    )
+    rows: Integer | None = Field(
+        None,
+        ge=2,
+        le=MOST_CELLS,
+        description="cells of the grid from north to south; without it, as many as from west to "
+        "east",
     )
     cell_size: Number = Field(800.0, ge=0.01, le=100_000, description="side of a cell [m] (c)")
     altitude: Number = Field(10.0, ge=0.01, le=100_000, description="flying altitude [m] (h)")
@@ -73,11 +95,19 @@ class Constants(Strict):
         max_length=MOST_NODES,
         description="cells of the sensor nodes: [x, y] for each",
     )
-    zone: tuple[int, int, int, int] = Field(
+    zone: Rectangle = Field(
         (26, 2, 4, 4), description="start and charging zone (L): [x, y, width, height] in cells"
     )
     pads: Integer | None = Field(
         None, ge=1, description="charging pads; without it, as many as the zone has cells"
+    )
+    zones: tuple[Zone, ...] = Field(
+        (),
+        max_length=MOST_ZONES - 1,
+        description="further charging zones: a table of cells and pads for each",
+    )
+    no_fly: tuple[Cell, ...] = Field(
+        (), description="cells that no UAV may enter, such as islands: [x, y] for each"
     )
     forbid_swaps: bool = Field(False, description="cancel the moves of two UAVs that swap cells")
 
@@ -156,7 +186,7 @@ class Constants(Strict):
     def _without_what_is_off(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out the sections that are off: so scenarios without them are stored as before."""
         values = handler(self)
-        return {n: v for n, v in values.items() if n not in EXTENSIONS or self.has(n)}
+        return {n: v for n, v in values.items() if n not in (*EXTENSIONS, *GEOMETRY) or self.has(n)}
 
     @model_validator(mode="after")
     def _is_consistent(self) -> Self:
@@ -168,6 +198,7 @@ class Constants(Strict):
         """What does not fit together, as no field can check alone."""
         yield from _off_the_grid(self)
         yield from _too_large(self)
+        yield from _unreachable(self)
         yield from _unfit(self)
 
     @classmethod
@@ -181,14 +212,36 @@ class Constants(Strict):
         return validated(cls, merged(base, values), "scenario")
 
     @property
+    def size(self) -> tuple[int, int]:
+        """The cells of the grid from west to east, and from north to south."""
+        return self.grid, self.grid if self.rows is None else self.rows
+
+    @property
+    def rectangles(self) -> tuple[Rectangle, ...]:
+        """The cells of all charging zones, the start zone first."""
+        return (self.zone, *(zone.cells for zone in self.zones))
+
+    @property
+    def chart(self) -> Chart:
+        """The zones, the no-fly cells and the ways between cells."""
+        return chart_at(*self.size, self.rectangles, self.no_fly)
+
+    @property
     def zone_cells(self) -> int:
         """Number of cells of the start and charging zone."""
         return self.zone[2] * self.zone[3]
 
     @property
+    def zone_pads(self) -> tuple[int, ...]:
+        """The charging pads of each zone; by default, as many as the zone has cells."""
+        pads = self.pads, *(zone.pads for zone in self.zones)
+        cells = zip(self.rectangles, pads, strict=True)
+        return tuple(width * height if n is None else n for (*_, width, height), n in cells)
+
+    @property
     def charging_pads(self) -> int:
-        """Number of charging pads: ``pads``, or as many as the zone has cells."""
-        return self.zone_cells if self.pads is None else self.pads
+        """Number of charging pads of all zones together."""
+        return sum(self.zone_pads)
 
     @property
     def is_extended(self) -> bool:
@@ -265,26 +318,41 @@ def validated(model: type[BaseModel], values: dict[str, Any], where: str) -> Any
 
 
 def _off_the_grid(c: Constants) -> Iterator[str]:
-    (x, y, width, height), grid = c.zone, c.grid
-    if min(x, y) < 0 or min(width, height) < 1 or max(x + width, y + height) > grid:
-        yield (
-            f"zone: {[*c.zone]} does not lie on the {grid} x {grid} grid; "
-            "allowed: [x, y, width, height] with 0 <= x, y and x + width, y + height <= grid"
-        )
-    for node, count in Counter(c.nodes).items():
-        if not all(0 <= coordinate < grid for coordinate in node):
-            yield f"nodes: {[*node]} is off the grid; allowed: 0 <= x, y < {grid}"
+    columns, rows = c.size
+    cells: Counter[Cell] = Counter()
+    for number, (x, y, width, height) in enumerate(c.rectangles):
+        name = f"zones.{number - 1}.cells" if number else "zone"
+        if min(x, y) < 0 or min(width, height) < 1 or x + width > columns or y + height > rows:
+            yield (
+                f"{name}: {[x, y, width, height]} does not lie on the {columns} x {rows} grid; "
+                "allowed: [x, y, width, height] with 0 <= x, y and x + width, y + height <= grid"
+            )
+            return
+        cells.update((x + i % width, y + i // width) for i in range(width * height))
+    for cell, count in cells.items():
         if count > 1:
-            yield f"nodes: {[*node]} is listed twice; allowed: distinct cells"
+            yield f"zones: two zones have the cell {[*cell]}; allowed: zones without common cells"
+    size = f"0 <= x < {columns}, 0 <= y < {rows}" if c.rows else f"0 <= x, y < {columns}"
+    for name in ("nodes", "no_fly"):
+        for (x, y), count in Counter(getattr(c, name)).items():
+            if not (0 <= x < columns and 0 <= y < rows):
+                yield f"{name}: {[x, y]} is off the grid; allowed: {size}"
+            if count > 1:
+                yield f"{name}: {[x, y]} is listed twice; allowed: distinct cells"
 
 
 def _too_large(c: Constants) -> Iterator[str]:
     """The tables of a mission fit into memory."""
-    ways = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet))
-    if c.grid**2 * c.communication_slots * ways > MOST_ENTRIES:
+    ways, (columns, rows) = max(5 * len(c.nodes) * legs(c.fleet), places_per_slot(c.fleet)), c.size
+    if columns * rows * c.communication_slots * ways > MOST_ENTRIES:
         yield (
             "grid, nodes, communication_slots, fleet: too large together; allowed: 5 * grid^2 * "
             f"nodes * communication_slots <= {MOST_ENTRIES}, and less with slots_per_cell"
+        )
+    if c.no_fly and columns * rows > MOST_CHARTED:
+        yield (
+            f"no_fly: the {columns} x {rows} grid is too large; allowed: at most "
+            f"{MOST_CHARTED:,} cells where some are no-fly cells"
         )
     has_teeth = c.age.measured and not c.needs_events
     if has_teeth and c.max_slots * c.communication_slots > MOST_TEETH:
@@ -299,13 +367,32 @@ def _too_large(c: Constants) -> Iterator[str]:
         )
 
 
+def _unreachable(c: Constants) -> Iterator[str]:
+    """The first of the cells of zones and nodes that no UAV can reach from the start zone."""
+    if not c.no_fly:
+        return
+    zones = zones_of(*c.size, (), c.no_fly)
+    x, y, *_ = c.zone
+    ways = spread(zones, np.array([[x, y]]))[0].reshape(zones.shape)
+    for name, cells in (("zone", parking_of(c.rectangles)), ("nodes", c.nodes)):
+        for cell in cells:
+            if ways[cell[::-1]] == FAR:
+                is_in = "is a no-fly cell" if cell in c.no_fly else "cannot be reached"
+                yield f"{name}: {[*cell]} {is_in}; allowed: cells with a way from the start zone"
+                return
+
+
 def _unfit(c: Constants) -> Iterator[str]:
-    """The rates, the pads and the initial data fit to the nodes and the zone."""
+    """The rates, the pads and the initial data fit to the nodes and the zones."""
     rates, (low, high) = c.arrivals.rates, c.initial_data
     if rates and len(rates) != len(c.nodes):
         yield f"arrivals.rates: there are {len(rates)}; allowed: {len(c.nodes)}, a rate per node"
-    if c.charging_pads > c.zone_cells:
-        yield f"pads: {c.pads} is more than the zone has cells; allowed: 1..{c.zone_cells}"
+    for number, ((*_, width, height), pads) in enumerate(
+        zip(c.rectangles, c.zone_pads, strict=True)
+    ):
+        name, cells = f"zones.{number - 1}.pads" if number else "pads", width * height
+        if pads > cells:
+            yield f"{name}: {pads} is more than the zone has cells; allowed: 1..{cells}"
     if c.failures.pad_rate > 0 and c.charging_pads > MOST_PADS:
         yield f"pads: {c.charging_pads} are too many to fail; allowed: {MOST_PADS} at most"
     if not 0 <= low <= high <= MOST_DATA:

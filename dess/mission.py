@@ -2,7 +2,7 @@
 
 This module decides when things happen; ``rules.py`` decides what they change. One SimPy process,
 the mission clock, opens each mission slot t, runs its communication slots at the times t + n/m, and
-adds the arrivals at its end. The charging zone is a ``simpy.Resource`` (dess.sections.zone): a UAV
+adds the arrivals at its end. A charging zone is a ``simpy.Resource`` (dess.sections.zone): a UAV
 that may charge asks for a pad, and gives it back when it may not any more.
 
     record = simulate(load_scenario("paper"), policies.load("greedy"), seed=1, events=True)
@@ -80,7 +80,7 @@ def simulate(
 
 
 class MissionModel:
-    """The SimPy model of one mission: a clock, and a charging zone with its requests for pads."""
+    """The SimPy model of one mission: a clock, and charging zones with their requests for pads."""
 
     def __init__(
         self,
@@ -102,7 +102,10 @@ class MissionModel:
         self.packets = Packets(scenario, self.state, log) if scenario.needs_events else None
         self.fleet = range(int(self.mission["uavs"]))
         self.env = simpy.Environment()
-        self.zone = ChargingZone(self.env, self.mission, self.uavs)
+        self.zones = [
+            ChargingZone(self.env, self.mission, self.uavs, zone)
+            for zone in range(len(scenario.rectangles))
+        ]
 
     def run(self) -> MissionRecord:
         """Run the mission to its end."""
@@ -128,7 +131,7 @@ class MissionModel:
         slot, active, allowed = 0, len(self.fleet), 0
         while active:
             decide(self.team, self.state, self.world)
-            may_charge, granted = _resolve(missions, uavs), _NOBODY
+            may_charge, granted = _resolve(missions, uavs, self.world.chart), _NOBODY
             if may_charge != allowed or pads_fail:
                 allowed = may_charge
                 self._request_pads(slot, may_charge)
@@ -159,22 +162,23 @@ class MissionModel:
     def _request_pads(self, slot: int, may_charge: int) -> None:
         """Ask for pads and give them back; bit i of ``may_charge`` tells if UAV i may charge."""
         for i in self.fleet:
-            u, has_asked = self.uavs[i], self.zone.requests[i] is not None
+            u = self.uavs[i]
+            asked = next((zone for zone in self.zones if zone.requests[i] is not None), None)
             if may_charge >> i & 1:
-                if not has_asked:
-                    self.zone.ask(i)
+                if asked is None:
+                    self.zones[u["zone"]].ask(i)
                     u["pad_request"] = slot
                     self.mission["pad_requests"] += 1
                     self._log_uav("charge_request", slot, i)
-            elif has_asked:
-                if not self.zone.holds_pad(i):
+            elif asked is not None:
+                if not asked.holds_pad(i):
                     self._log_uav("charge_withdrawal", slot, i)
-                self.zone.leave(i)
+                asked.leave(i)
                 u["pad_request"] = -1
 
     def _grant_pads(self, slot: int) -> np.ndarray:
         """Grant the free pads; return the UAVs that charge from this slot on, in their order."""
-        granted = self.zone.grant()
+        granted = [i for zone in self.zones for i in zone.grant()]
         for i in granted:
             self._log_uav("charge_start", slot, i)
         return np.array(granted, np.int64)
@@ -189,7 +193,7 @@ class MissionModel:
             if before.uavs[0, i]["charging"] and not self.uavs[i]["charging"]:  # its pad has failed
                 self._log_uav("charge_end", slot, i)
                 self._log_uav("charge_request", slot, i)
-                self.zone.ask(i)
+                self.zones[self.uavs[i]["zone"]].ask(i)
         if self.packets is not None:
             self.packets.fall_silent(float(slot))
         return int(self.mission["active"])
@@ -261,10 +265,10 @@ class MissionModel:
 
 
 @kernel
-def _resolve(missions, uavs):
+def _resolve(missions, uavs, chart):
     """Resolve the moves; bit i of the result tells whether UAV i may charge now."""
     mission, team = missions[0], uavs[0]
-    rules.resolve(mission, team)
+    rules.resolve(mission, team, chart)
     may_charge = 0
     for i in range(mission.uavs):
         may_charge |= np.int64(rules.may_charge(mission, team[i])) << i
@@ -281,10 +285,11 @@ def _spend(missions, uavs, granted):
 
 @kernel
 def _communicate(
-    missions, uavs, residual, sensors, teeth, nodes, mean_snr, order, means, batches, search, n
+    missions, uavs, residual, sensors, teeth,
+    nodes, mean_snr, order, means, chart, batches, search, n,
 ):  # fmt: skip
     if n == 1:
-        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, search)
+        channel.open_slot(missions[0], uavs[0], nodes, mean_snr, order, means, chart, search)
     rules.communicate(
         missions[0], uavs[0], residual[0], sensors[0], teeth[0],
         order, means, batches, search, n,

@@ -4,7 +4,7 @@ The module holds compiled functions that change the arrays of one mission in pla
 the environments call these functions, which use no random generator object and no global state.
 The batch engine runs a slot in the order of Section III-C (see ``advance``):
 
-    resolve(mission, uavs)               # moves, safety controller
+    resolve(mission, uavs, chart)        # moves, safety controller
     grant_pads(mission, uavs)            # the SimPy engine has a simpy.Resource instead
     spend(mission, uavs)                 # energy
     channel.open_slot(mission, uavs, ...)
@@ -18,6 +18,7 @@ import math
 
 from dess import channel, streams
 from dess.code.kernels import inlined, kernel
+from dess.sea.chart import is_open
 from dess.sections import age, fleet, wind
 from dess.sections.charging import is_before, share_power
 from dess.sections.failures import strike_if_on, take_pad, working_pads
@@ -33,35 +34,6 @@ from dess.state import (
     TRUNCATED,
     draw_parameters,
 )
-
-
-@inlined
-def on_grid(mission, x, y):
-    """Whether cell ``x, y`` is on the grid."""
-    return 0 <= x < mission.grid and 0 <= y < mission.grid
-
-
-@inlined
-def in_zone(mission, x, y):
-    """Whether cell ``x, y`` is in the start and charging zone."""
-    return (
-        mission.zone_x <= x < mission.zone_x + mission.zone_width
-        and mission.zone_y <= y < mission.zone_y + mission.zone_height
-    )
-
-
-@inlined
-def zone_cell(mission, number):
-    """``x, y`` of cell ``number`` of the zone, counted row by row from its north-west corner."""
-    x = mission.zone_x + number % mission.zone_width
-    y = mission.zone_y + number // mission.zone_width
-    return x, y
-
-
-@inlined
-def zone_number(mission, x, y):
-    """The number of cell ``x, y`` of the zone: the inverse of ``zone_cell``."""
-    return (y - mission.zone_y) * mission.zone_width + x - mission.zone_x
 
 
 @kernel
@@ -96,7 +68,7 @@ def launch(state, b, starts, number, replication):
 
 @kernel
 def _launch_uavs(mission, types, uavs):
-    """Put the active UAVs on distinct cells of the zone, drawn at random."""
+    """Put the active UAVs on distinct cells of the start zone, drawn at random."""
     for i in range(len(uavs)):
         uavs[i] = types[i]
         u = uavs[i]
@@ -106,14 +78,17 @@ def _launch_uavs(mission, types, uavs):
             continue
         if u.battery == 0:
             u.battery = mission.flying_time
-        u.x, u.y = zone_cell(mission, _start_cell(mission, i))
+        cell = _start_cell(mission, i)
+        u.x = mission.zone_x + cell % mission.zone_width
+        u.y = mission.zone_y + cell // mission.zone_width
+        u.zone = 0
         u.from_x, u.from_y = u.x, u.y
         _update_latch(mission, u)  # a UAV may start at or below C_S
 
 
 @inlined
 def _start_cell(mission, i):
-    """The number of the start cell of UAV ``i``, drawn without replacement.
+    """The number of the start cell of UAV ``i`` in its zone, drawn without replacement.
 
     UAV i takes the cell at its place of a list of all cells, and the cell at place i of the list
     takes that place. Since all draws can be repeated, there need be no such list.
@@ -141,11 +116,11 @@ def _update_latch(mission, u):
 
 
 @inlined
-def resolve(mission, uavs):
+def resolve(mission, uavs, chart):
     """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at the same time.
 
-    A move off the grid becomes Hover, and so does a move into a cell that another active UAV will
-    occupy. A cancelled move can block the move of another UAV, so the check is repeated until no
+    A move off the grid or into a no-fly cell becomes Hover, and so does a move into a cell that
+    another active UAV will occupy. A cancelled move can block the move of another UAV, so the check is repeated until no
     move is cancelled. The result does not depend on the numbering of the UAVs. A UAV in the middle
     of a move flies on; the cell that it flies to is its own.
     """
@@ -164,12 +139,10 @@ def resolve(mission, uavs):
         u.slots_left = u.slots_per_cell - 1 if u.executed != HOVER else 0
         u.x += STEP_X[u.action]
         u.y += STEP_Y[u.action]
-        if not on_grid(mission, u.x, u.y):
+        if not is_open(chart, u.x, u.y):
             _cancel(u)
             u.overruled_by = -1
-    if count == 1:
-        return
-    changed = True
+    changed = count > 1
     while changed:
         changed = False
         # Mark all collisions first, then cancel, so that the order of the UAVs does not matter.
@@ -186,6 +159,9 @@ def resolve(mission, uavs):
             if u.active and u.overruled and u.executed != HOVER:
                 _cancel(u)
                 changed = True
+    for i in range(count):
+        if uavs[i].active:
+            uavs[i].zone = chart.zones[uavs[i].y, uavs[i].x]
 
 
 @inlined
@@ -224,11 +200,11 @@ def may_act(u):
 
 
 @inlined
-def legal_moves(mission, u):
-    """The actions that keep a UAV on the grid, a bit for each."""
+def legal_moves(chart, u):
+    """The actions that keep a UAV on the grid and out of no-fly cells, a bit for each."""
     legal = 0
     for action in range(5):
-        if on_grid(mission, u.x + STEP_X[action], u.y + STEP_Y[action]):
+        if is_open(chart, u.x + STEP_X[action], u.y + STEP_Y[action]):
             legal |= 1 << action
     return legal
 
@@ -237,42 +213,43 @@ def legal_moves(mission, u):
 def may_charge(mission, u):
     """Whether a UAV meets the charging condition (eq. 4).
 
-    The UAV flies, is in the zone, has its charging latch set, and its policy chose Hover. A move
+    The UAV flies, is in a zone, has its charging latch set, and its policy chose Hover. A move
     that the safety controller turned into Hover does not start charging.
     """
     is_ready = u.active and not u.grounded and u.latch
-    return is_ready and u.action == HOVER and in_zone(mission, u.x, u.y)
+    return is_ready and u.action == HOVER and u.zone >= 0
 
 
 @inlined
 def grant_pads(mission, uavs):
-    """Grant free charging pads in the order of ``is_before``; on a tie, in that of the indices.
+    """Grant the free pads of each zone in the order of ``is_before``; on a tie, of the indices.
 
     This is the compiled equivalent of the SimPy resource. A UAV that meets the charging condition
     requests a pad or stays in the queue. A UAV that no longer meets it leaves the queue. A UAV that
     has a pad keeps it until it is charged.
     """
-    free = working_pads(mission)
-    waiting = 0
-    for i in range(mission.uavs):
-        u = uavs[i]
-        if u.charging:
-            free -= 1
-        elif not may_charge(mission, u):
-            u.pad_request = -1
-        else:
-            waiting += 1
-            if u.pad_request < 0:
-                u.pad_request = mission.slot
-                mission.pad_requests += 1
-    for _ in range(min(free, waiting)):
-        first = -1
+    for zone in range(mission.zones):
+        free = working_pads(mission, zone)
+        waiting = 0
         for i in range(mission.uavs):
             u = uavs[i]
-            waits = u.pad_request >= 0 and not u.charging
-            if waits and (first < 0 or is_before(mission, u, uavs[first])):
-                first = i
-        start_charging(mission, uavs, first)
+            if u.charging:
+                free -= u.zone == zone
+            elif not may_charge(mission, u):
+                u.pad_request = -1
+            elif u.zone == zone:
+                waiting += 1
+                if u.pad_request < 0:
+                    u.pad_request = mission.slot
+                    mission.pad_requests += 1
+        for _ in range(min(free, waiting)):
+            first = -1
+            for i in range(mission.uavs):
+                u = uavs[i]
+                waits = u.pad_request >= 0 and not u.charging and u.zone == zone
+                if waits and (first < 0 or is_before(mission, u, uavs[first])):
+                    first = i
+            start_charging(mission, uavs, first)
 
 
 @inlined
@@ -434,13 +411,13 @@ def data_left(mission, residual):
 @inlined
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, batches, search,
+    nodes, mean_snr, order, means, chart, batches, search,
 ):  # fmt: skip
     """Run one mission slot with the actions in ``uavs``, in the order of Section III-C."""
-    resolve(mission, uavs)
+    resolve(mission, uavs, chart)
     grant_pads(mission, uavs)
     spend(mission, uavs)
-    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, search)
+    channel.open_slot(mission, uavs, nodes, mean_snr, order, means, chart, search)
     for n in range(1, mission.communication_slots + 1):
         communicate(
             mission, uavs, residual, sensors, teeth, order, means, batches, search, n,

@@ -30,7 +30,7 @@ from dess.constants import (
 )
 from dess.errors import InputError, one_of
 from dess.files.shipped import Shipped
-from dess.sea import nodes_in
+from dess.sea.files import nodes_in
 from dess.sections.section import Integer, Number, Section
 
 __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
@@ -162,7 +162,7 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
 
     Args:
         name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
-            ``nodes`` may be the name of a file in the same folder, which ``dess.sea`` reads.
+            ``nodes`` may be the name of a file in the same folder, which ``dess.sea.files`` reads.
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
@@ -173,9 +173,10 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     read.pop("description", None)
     values = merged(read, overrides)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
-        without = validated(ScenarioSpace, values | {"nodes": [[0, 0]], "arrivals": {}}, where)
+        placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
+        without = validated(ScenarioSpace, values | placeless, where)
         path = _SCENARIOS.beside(name_or_path, "nodes", read["nodes"])
-        values["nodes"] = nodes_in(path, without.grid, without.cell_size)
+        values["nodes"] = nodes_in(path, without.size, without.cell_size)
     return validated(ScenarioSpace, values, where)
 
 

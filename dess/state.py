@@ -15,6 +15,7 @@ import numpy as np
 from dess import streams
 from dess.code.kernels import kernel
 from dess.errors import InputError
+from dess.constants import MOST_ZONES
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS
@@ -40,8 +41,11 @@ MISSION = np.dtype(
     [
         ("seed", np.uint64),
         ("replication", np.int64),
-        # World; ``is_extended`` tells whether a section of the scenario is on.
+        # World: the start zone, and the pads of all zones together and of each; ``is_extended``
+        # tells whether a section of the scenario is on.
         *fields(np.int64, "grid nodes zone_x zone_y zone_width zone_height pads forbid_swaps"),
+        ("zones", np.int64),
+        ("zone_pads", np.int64, MOST_ZONES),
         ("is_extended", np.int64),
         # Time, fleet and energy.
         *fields(np.int64, "communication_slots max_slots uavs flying_time charge_start"),
@@ -99,6 +103,7 @@ UAV = np.dtype(
         ("end", np.int64),
         ("pad_request", np.int64),  # slot of the pending or granted pad request, -1 if none
         ("pad", np.int64),  # index of the pad held, where pads may fail
+        ("zone", np.int64),  # number of the charging zone that it is in, negative for none
         *fields(np.int64, "slots_flying slots_charging slots_waiting"),
         ("overruled_by", np.int64),  # if overruled: the UAV in its way, -1 at the edge of the grid
         ("served", np.int64),  # node served in the present communication slot, -1 for none
@@ -179,18 +184,20 @@ def _constants_of(scenario: ScenarioSpace) -> np.ndarray:
         **{name: getattr(scenario, name)[0] for name in SAMPLED},
         **dict(zip(("zone_x", "zone_y", "zone_width", "zone_height"), scenario.zone, strict=True)),
         **{"nodes": len(scenario.nodes), "pads": scenario.charging_pads},
+        "zones": len(scenario.rectangles),
         **{"initial_low": low, "initial_high": high, "slowest": fleet.slowest(scenario.fleet)},
         "communication_slot_length": scenario.slot_length / scenario.communication_slots,
         "shadowing_deviation": np.sqrt(scenario.shadowing_variance),
         **{"continuous": scenario.needs_events, "age_measured": slotted_age},
         "age_reward": scenario.age.reward,
-        **wind.constants(scenario.wind, scenario.grid),
+        **wind.constants(scenario.wind, scenario.size),
         **scenario.charging.constants(),
         **scenario.failures.constants(),
     }
     mission = np.zeros(1, MISSION)
     for name in set(values).intersection(MISSION.names or ()):
         mission[name] = values[name]
+    mission["zone_pads"][0, : len(scenario.zone_pads)] = scenario.zone_pads
     return mission if scenario.is_extended else mission.view(PLAIN_MISSION)
 
 

@@ -14,6 +14,7 @@ from dess.code.kernels import inlined, kernel
 from dess.observations import guard
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
+from dess.sea.chart import distance, spread
 from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
 
@@ -61,11 +62,13 @@ class _Heuristic:
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
-        state, nodes = view.state, view.world.nodes
-        circuit = _circuit(nodes.tobytes()) if self._kind == _TOUR else _NO_CIRCUIT
+        state, nodes, chart = view.state, view.world.nodes, view.world.chart
+        circuit = _NO_CIRCUIT
+        if self._kind == _TOUR:
+            circuit = _circuit(nodes.tobytes(), chart.zones.tobytes(), chart.zones.shape)
         return _decide(
             self._kind, state.missions, state.uavs, state.residual, state.sensors, nodes, circuit,
-            reach_of(state.missions), view.mission, view.uav,
+            chart, reach_of(state.missions, chart), view.mission, view.uav,
         )  # fmt: skip
 
 
@@ -132,37 +135,38 @@ def _choose(missions, uavs, allowed, rows_mission, rows_uav):
 
 @kernel
 def _decide(
-    kind, missions, uavs, residual, sensors, nodes, circuit, reach, rows_mission, rows_uav
+    kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
-    taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
+    taken = np.empty(len(chart.parking), np.bool_)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         actions[row] = _action(
-            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, reach, taken
-        )
+            kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, chart, reach,
+            taken,
+        )  # fmt: skip
     return actions
 
 
 @inlined
-def _action(kind, mission, team, i, data, sensors, nodes, circuit, reach, taken):
+def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach, taken):
     """The action of UAV ``i``; ``taken`` is working memory."""
     u = team[i]
     charge = guard.must_charge(mission, u, data_left(mission, data))
     home_x, home_y = u.x, u.y
     if charge:
-        home_x, home_y, _ = guard.parking_cell(mission, team, i, taken)
-    safe = guard.safe_moves(mission, team, i, charge, home_x, home_y, reach)
+        home_x, home_y, _ = guard.parking_cell(mission, team, i, chart, taken)
+    safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, reach)
     node = _goal(
-        kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
+        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, reach
     )
     if node >= 0:
         home_x, home_y = nodes[node, 0], nodes[node, 1]
-    return step_towards(mission, team, i, safe, home_x, home_y)
+    return step_towards(mission, team, i, chart, safe, home_x, home_y)
 
 
 @inlined
-def step_towards(mission, team, i, safe, goal_x, goal_y):
+def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
     """The safe action that brings UAV ``i`` nearest to its goal; contested cells cost more."""
     u = team[i]
     best, least = HOVER, 1e18
@@ -170,7 +174,7 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
         if not safe >> action & 1:
             continue
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        cost = guard.path_length(mission, team, i, x, y, goal_x, goal_y)
+        cost = guard.path_length(mission, team, i, chart, x, y, goal_x, goal_y)
         cost += _CONTEST_COST[guard.contest(mission, team, i, x, y)]
         if cost < least:
             best, least = action, cost
@@ -179,21 +183,24 @@ def step_towards(mission, team, i, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, sensors, nodes, circuit, charge, home_x, home_y, reach
+    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, reach
 ):  # fmt: skip
     """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
     u = team[i]
     spare = guard.slots_needed(mission, u)
     if charge:
-        spare = u.battery - 1 - guard.margin(mission, u) - guard.waiting_time(mission, team, i)
+        waiting = guard.waiting_time(mission, team, i, chart)
+        spare = u.battery - 1 - guard.margin(mission, u) - waiting
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):
         if data[k] <= 0.0:
             continue
         x, y = nodes[k, 0], nodes[k, 1]
-        slots = _slots(u, x, y)
-        spent = guard.round_trip(mission, u, x, y, home_x, home_y, reach) if charge else slots
+        slots = _slots(u, chart, x, y)
+        spent = slots
+        if charge:
+            spent = guard.round_trip(mission, u, chart, x, y, home_x, home_y, reach)
         if spent > spare:
             continue
         if kind == _NEAREST:
@@ -201,10 +208,10 @@ def _goal(
         elif kind == _GREEDY:
             score = data[k] / (slots + _SLOTS_AT_NODE)
         elif kind == _AGE:
-            score = _staleness(mission, data, sensors, nodes, k, slots)
+            score = _staleness(mission, data, sensors, nodes, chart, k, slots)
         else:
             score = 1.0 / (1.0 + _circuit_position(mission, i, circuit[k]))
-        if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, x, y, slots):
+        if kind in (_GREEDY, _AGE) and _teammate_is_nearer(mission, team, i, chart, x, y, slots):
             score *= _SHARED
         if kind != _AGE and data[k] < worth:
             score *= 1e-3
@@ -214,13 +221,13 @@ def _goal(
 
 
 @inlined
-def _staleness(mission, data, sensors, nodes, k, slots):
+def _staleness(mission, data, sensors, nodes, chart, k, slots):
     """The age per slot of distance of node ``k``, and a share of that of all nodes beyond it."""
     here = beyond = 0.0
     for other in range(len(nodes)):
         if data[other] > 0.0:
             age = mission.slot + 1 - sensors[other].newest  # at the end of this slot
-            further = abs(nodes[k, 0] - nodes[other, 0]) + abs(nodes[k, 1] - nodes[other, 1])
+            further = distance(chart, nodes[other, 0], nodes[other, 1], nodes[k, 0], nodes[k, 1])
             score = age / (slots + further + _SLOTS_AT_NODE)
             if other == k:
                 here = score
@@ -230,17 +237,17 @@ def _staleness(mission, data, sensors, nodes, k, slots):
 
 
 @inlined
-def _slots(u, x, y):
+def _slots(u, chart, x, y):
     """The slots that UAV ``u`` takes to a cell."""
-    return (abs(u.x - x) + abs(u.y - y)) * u.slots_per_cell
+    return distance(chart, u.x, u.y, x, y) * u.slots_per_cell
 
 
 @inlined
-def _teammate_is_nearer(mission, team, i, x, y, slots):
+def _teammate_is_nearer(mission, team, i, chart, x, y, slots):
     for j in range(mission.uavs):
         o = team[j]
         if j != i and flies(o):
-            other = _slots(o, x, y)
+            other = _slots(o, chart, x, y)
             if other < slots or (other == slots and j < i):
                 return True
     return False
@@ -257,10 +264,12 @@ _NO_CIRCUIT = np.zeros(0, np.int64)
 
 
 @lru_cache(maxsize=64)
-def _circuit(nodes: bytes) -> np.ndarray:
+def _circuit(nodes: bytes, zones: bytes, shape: tuple[int, int]) -> np.ndarray:
     """The (K,) position of each node on a short round trip (nearest neighbour, then 2-opt)."""
-    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
-    return _round_trip(np.abs(cells[:, None] - cells[None]).sum(2))
+    cells, chart = np.frombuffer(nodes, np.int64).reshape(-1, 2), np.frombuffer(zones, np.int8)
+    places = cells @ [1, shape[1]]
+    ways = [spread(chart.reshape(shape), cell[None])[0][places] for cell in cells]
+    return _round_trip(np.stack(ways).astype(np.int64))
 
 
 @kernel

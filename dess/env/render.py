@@ -6,10 +6,12 @@ import numpy as np
 
 from dess.code.libraries import needs
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import NO_FLY
 from dess.state import State
 
 _CELL = 16  # pixels
 _SEA, _LINES, _ZONE = (233, 241, 247), (212, 224, 234), (190, 205, 190)
+_LAND = (214, 205, 186)
 _NO_DATA, _FULL = np.array((255, 255, 255)), np.array((31, 78, 121))
 _IDLE, _CHARGING = (255, 255, 255), (0, 0, 0)
 # Colours for colour-blind readers, after Okabe and Ito.
@@ -17,7 +19,7 @@ _FLEET = ((213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180,
 
 
 def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray:
-    """Draw the zone, the nodes and the active UAVs of one mission.
+    """Draw the zones, the no-fly cells, the nodes and the active UAVs of one mission.
 
     A node is darker the more data it has. A UAV that charges has a black frame.
 
@@ -27,12 +29,13 @@ def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray
         environment: The index of the mission in the state.
 
     Returns:
-        An image of shape (16 M, 16 M, 3) and type uint8 with north on top; M is the grid.
+        An image of shape (16 H, 16 W, 3) and type uint8 with north on top; the grid has W x H cells.
     """
     uavs, residual = state.uavs[environment], state.residual[environment]
-    image = np.full((space.grid * _CELL, space.grid * _CELL, 3), _SEA, np.uint8)
-    x, y, width, height = (value * _CELL for value in space.zone)
-    image[y : y + height, x : x + width] = _ZONE
+    cells = np.full((*space.chart.zones.shape, 3), _SEA, np.uint8)
+    cells[space.chart.zones >= 0] = _ZONE
+    cells[space.chart.zones == NO_FLY] = _LAND
+    image = cells.repeat(_CELL, 0).repeat(_CELL, 1)
     image[::_CELL] = image[:, ::_CELL] = _LINES
     full = max(space.initial_data[1], float(residual.max()), 1.0)
     for (x, y), data in zip(space.nodes, residual, strict=True):

@@ -120,7 +120,7 @@ def _launch(state, environments, starts, first):
 @kernel
 def _step(state, world, scratch, actions, out):
     """Run one slot of every mission and write the ``OUTCOME`` records."""
-    nodes, mean_snr, order, means = world
+    nodes, mean_snr, order, means, chart = world
     batches, search = scratch
     fleet = state.uavs.shape[1]
     arrivals = np.empty(len(world.nodes), np.int64)
@@ -134,7 +134,7 @@ def _step(state, world, scratch, actions, out):
             charged[i], collected[i] = u.slots_charging, u.collected
         rules.advance(
             mission, uavs, state.residual[b], state.sensors[b], state.teeth[b], arrivals,
-            nodes, mean_snr, order, means, batches, search,
+            nodes, mean_snr, order, means, chart, batches, search,
         )  # fmt: skip
         for i in range(fleet):
             u, to = uavs[i], out[b, i]

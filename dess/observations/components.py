@@ -3,8 +3,8 @@
 import numpy as np
 
 from dess.code.kernels import kernel
-from dess.rules import on_grid
 from dess.scenario import Scenario, ScenarioSpace
+from dess.sea.chart import is_open
 from dess.sections.wind import move_surcharge
 from dess.state import ACTION_NAMES, HOVER, STEP_X, STEP_Y, State, spaces_of
 
@@ -19,7 +19,7 @@ _OWN = (
     "latch",
     "charging",
     "waiting",  # for a pad
-    "zone_dx",  # to the nearest cell of the zone
+    "zone_dx",  # to the nearest cell of a zone
     "zone_dy",
     "charge_start",
     "charge_complete",
@@ -31,7 +31,7 @@ _MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 after th
 def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
-    Positions and distances are divided by the largest cell index of the grid, battery, C_S and C_C
+    Positions and distances are divided by the largest cell index of the grid in that direction, battery, C_S and C_C
     by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
     end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has fewer
     UAVs than the largest fleet, the other rows are zeros.
@@ -80,6 +80,7 @@ class Components:
 
     def __init__(self, space: ScenarioSpace):
         groups = _beyond_the_paper(space)
+        self._chart = space.chart
         self.shapes = ((len(component_names(space)),),)
         self._has = tuple(len(group) > 0 for group in groups)
         self._common = self.shapes[0][0] - sum(map(len, groups))
@@ -92,35 +93,36 @@ class Components:
         Where ``uavs[r]`` is -1, they are zeros.
         """
         out = np.zeros((len(missions), *self.shapes[0]), np.float32)
-        _encode(state, missions, uavs, self._has, self._common, out)
+        _encode(state, self._chart, missions, uavs, self._has, self._common, out)
         return (out,)
 
 
 @kernel
-def _encode(state, missions, uavs, has, common, out):
+def _encode(state, chart, missions, uavs, has, common, out):
     for row in range(len(missions)):
         b, i = missions[row], uavs[row]
         if i >= 0:
             mission, team = state.missions[b], state.uavs[b]
-            _encode_uav(mission, team, i, state.residual[b], out[row])
-            _encode_beyond(has, mission, team, i, state.sensors[b], out[row, common:])
+            _encode_uav(mission, chart, team, i, state.residual[b], out[row])
+            _encode_beyond(has, mission, chart, team, i, state.sensors[b], out[row, common:])
 
 
 @kernel
-def _encode_uav(mission, uavs, i, residual, out):
+def _encode_uav(mission, chart, uavs, i, residual, out):
     """What every observation has of one UAV, in the order of ``component_names``."""
-    u = uavs[i]
-    cell = 1.0 / (mission.grid - 1)
+    u, home = uavs[i], chart.parking[chart.nearest[uavs[i].y, uavs[i].x]]
+    rows, columns = chart.zones.shape
+    column, row = 1.0 / (columns - 1), 1.0 / (rows - 1)
     out[0] = u.active
-    out[1] = u.x * cell
-    out[2] = u.y * cell
+    out[1] = u.x * column
+    out[2] = u.y * row
     out[3] = u.battery / 100.0
     out[4] = _quota_share(u)
     out[5] = u.latch
     out[6] = u.charging
     out[7] = u.pad_request >= 0 and not u.charging
-    out[8] = (_nearest(u.x, mission.zone_x, mission.zone_width) - u.x) * cell
-    out[9] = (_nearest(u.y, mission.zone_y, mission.zone_height) - u.y) * cell
+    out[8] = (home[0] - u.x) * column
+    out[9] = (home[1] - u.y) * row
     out[10] = mission.charge_start / 100.0
     out[11] = mission.charge_complete / 100.0
     out[12] = mission.slot / mission.max_slots
@@ -135,8 +137,8 @@ def _encode_uav(mission, uavs, i, residual, out):
         mate = uavs[j]
         if mate.active:
             out[at] = 1.0
-            out[at + 1] = (mate.x - u.x) * cell
-            out[at + 2] = (mate.y - u.y) * cell
+            out[at + 1] = (mate.x - u.x) * column
+            out[at + 2] = (mate.y - u.y) * row
             out[at + 3] = mate.battery / 100.0
             out[at + 4] = _quota_share(mate)
             out[at + 5] = mate.charging
@@ -150,13 +152,7 @@ def _quota_share(u):
 
 
 @kernel
-def _nearest(value, first, count):
-    """The coordinate nearest to ``value`` among the ``count`` coordinates from ``first`` on."""
-    return min(max(value, first), first + count - 1)
-
-
-@kernel
-def _encode_beyond(has, mission, uavs, i, sensors, out):
+def _encode_beyond(has, mission, chart, uavs, i, sensors, out):
     """Write the components of UAV ``i`` in the order of ``_beyond_the_paper``."""
     can_be_grounded, pads_fail, nodes_fail, has_wind, has_age = has
     u, at = uavs[i], 0
@@ -177,7 +173,7 @@ def _encode_beyond(has, mission, uavs, i, sensors, out):
     if has_wind:
         for action in range(HOVER):
             x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-            if on_grid(mission, x, y):
+            if is_open(chart, x, y):
                 extra = move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
                 out[at + action] = mission.flight_cost * extra / 100.0
         at += HOVER

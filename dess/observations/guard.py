@@ -6,14 +6,15 @@
 A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
 charging zone, with a margin of some slots for detours around teammates. The rules are described in
 ``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
-mission; ``reach`` is the table of ``dess.observations.reach``.
+mission; ``chart`` is that of ``dess.sea.chart``, ``reach`` the table of ``dess.observations.reach``.
 """
 
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
-from dess.rules import data_left, flies, in_zone, on_grid, zone_cell, zone_number
+from dess.rules import data_left, flies
+from dess.sea.chart import distance, distance_home, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -50,9 +51,18 @@ def must_charge(mission, u, data):
     # A UAV collects some 0.2 data units in a slot near an average node.
     if data < 0.2 * needed * mission.active:
         needed += SCARCE_SLOTS
-    if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and working_pads(mission) == 0:
+    if mission.pad_rate > 0.0 and mission.pad_repair == 0.0 and _all_pads(mission) == 0:
         return False
     return u.battery < mission.flight_cost * (needed + _most_wind(mission, u, needed))
+
+
+@inlined
+def _all_pads(mission):
+    """The working pads of all zones together."""
+    pads = 0
+    for zone in range(mission.zones):
+        pads += working_pads(mission, zone)
+    return pads
 
 
 @extension
@@ -62,47 +72,51 @@ def _most_wind(mission, u, slots):
 
 
 @inlined
-def is_parked(mission, u):
+def is_parked(u):
     """Whether a UAV blocks its cell: it charges or is about to charge, or is grounded."""
-    return u.active and (u.grounded or (u.latch and in_zone(mission, u.x, u.y)))
+    return u.active and (u.grounded or (u.latch and u.zone >= 0))
 
 
 @inlined
-def path_length(mission, uavs, i, x, y, to_x, to_y):
-    """Cells that UAV ``i`` flies from one to another, with a detour around a parked teammate."""
-    length = abs(x - to_x) + abs(y - to_y)
-    if x == to_x or y == to_y:
+def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
+    """Cells that UAV ``i`` flies from one to another, with a detour around a parked teammate.
+
+    A way that neither follows a line nor leads around a no-fly cell has others of the same length.
+    """
+    length = distance(chart, x, y, to_x, to_y)
+    if x == to_x or y == to_y or length > abs(x - to_x) + abs(y - to_y):
         for j in range(mission.uavs):
             o = uavs[j]
-            if j != i and is_parked(mission, o):
-                between = abs(x - o.x) + abs(y - o.y) + abs(to_x - o.x) + abs(to_y - o.y)
-                if between == length:
+            if j != i and is_parked(o):
+                before = distance(chart, x, y, o.x, o.y)
+                if before + distance(chart, o.x, o.y, to_x, to_y) == length:
                     return length + 2
     return length
 
 
 @kernel
-def parking_cell(mission, uavs, i, taken):
+def parking_cell(mission, uavs, i, chart, taken):
     """The zone cell where UAV ``i`` will charge: the nearest one that no teammate takes.
 
-    Teammates in the zone keep their cells. The other UAVs choose one after another, the lowest
+    Teammates in a zone keep their cells. The other UAVs choose one after another, the lowest
     battery first (ties in index order), so that no two UAVs fly to the same cell.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
+        chart: ``Chart``.
         taken: (zone cells,) working memory.
 
     Returns:
         The x and y of the cell and how many cells away it is; the UAV's own cell if all are taken.
     """
     u = uavs[i]
-    taken[: mission.zone_width * mission.zone_height] = False
+    taken[:] = False
     for j in range(mission.uavs):
         o = uavs[j]
-        if j != i and o.active and in_zone(mission, o.x, o.y):
-            taken[zone_number(mission, o.x, o.y)] = True
+        if j != i and o.active and o.zone >= 0:
+            taken[chart.nearest[o.y, o.x]] = True
     last_battery, last = -1, -1
     while True:
         # the next UAV to choose
@@ -118,35 +132,37 @@ def parking_cell(mission, uavs, i, taken):
             if chooser < 0 or o.battery < uavs[chooser].battery:
                 chooser = j
         last_battery, last = uavs[chooser].battery, chooser
-        if chooser != i and is_parked(mission, uavs[chooser]):
+        if chooser != i and is_parked(uavs[chooser]):
             continue
-        x, y, slots = _nearest_free(mission, uavs, chooser, taken)
+        cell, slots = _nearest_free(mission, uavs, chooser, chart, taken)
         if chooser == i:
-            return (u.x, u.y, 0) if slots < 0 else (x, y, slots)
-        if slots >= 0:
-            taken[zone_number(mission, x, y)] = True
+            if cell < 0:
+                return u.x, u.y, 0
+            return chart.parking[cell, 0], chart.parking[cell, 1], slots
+        if cell >= 0:
+            taken[cell] = True
 
 
 @inlined
-def _nearest_free(mission, uavs, i, taken):
-    """The nearest zone cell that is not taken (-1 if none), and the slots to reach it."""
+def _nearest_free(mission, uavs, i, chart, taken):
+    """The number of the nearest parking cell that is not taken (-1 if none), and the way to it."""
     u = uavs[i]
-    # No other cell is as near as the nearest of the zone, so this one is tried first.
-    x = min(max(u.x, mission.zone_x), mission.zone_x + mission.zone_width - 1)
-    y = min(max(u.y, mission.zone_y), mission.zone_y + mission.zone_height - 1)
-    slots = abs(u.x - x) + abs(u.y - y)
-    free = slots == 0 or not taken[zone_number(mission, x, y)]
-    if free and path_length(mission, uavs, i, u.x, u.y, x, y) == slots:
-        return x, y, slots
-    best_x, best_y, best = -1, -1, -1
-    for cell in range(mission.zone_width * mission.zone_height):
-        x, y = zone_cell(mission, cell)
+    # The nearest cell of all is free most of the time, so this one is tried first.
+    cell = np.int64(chart.nearest[u.y, u.x])
+    x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+    slots = distance(chart, u.x, u.y, x, y)
+    free = slots == 0 or not taken[cell]
+    if free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
+        return cell, slots
+    best, least = -1, -1
+    for cell in range(len(chart.parking)):
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         if taken[cell] and not (u.x == x and u.y == y):
             continue
-        slots = path_length(mission, uavs, i, u.x, u.y, x, y)
-        if best < 0 or slots < best:
-            best_x, best_y, best = x, y, slots
-    return best_x, best_y, best
+        slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
+        if best < 0 or slots < least:
+            best, least = cell, slots
+    return best, least
 
 
 @inlined
@@ -159,22 +175,24 @@ def margin(mission, u):
 
 
 @inlined
-def waiting_time(mission, uavs, i):
-    """The slots for which UAV ``i`` must expect to wait for a pad.
+def waiting_time(mission, uavs, i, chart):
+    """The slots for which UAV ``i`` must expect to wait for a pad of the zone nearest to it.
 
-    Before it, pads are given to the teammates that have asked, and to those in the air that must
-    charge and have less battery (on a tie, a lower index). If they take all pads that work, it
-    waits until they are charged. More than C_S is of no use, since a UAV may ask for a pad only at
+    Before it, pads are given to the teammates there that have asked, and to those in the air that
+    must charge, are nearest to this zone and have less battery (on a tie, a lower index). If they
+    take all pads that work, it waits until they are charged. More than C_S is of no use, since a UAV may ask for a pad only at
     or below C_S.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
+        chart: ``Chart``.
     """
     u = uavs[i]
-    may_wait = mission.pad_rate > 0.0 or (mission.plans_waits and mission.uavs > mission.pads)
-    if u.pad_request >= 0 or not may_wait:
+    zone = nearest_zone(chart, u)
+    few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
+    if u.pad_request >= 0 or not (mission.pad_rate > 0.0 or few):
         return 0
     ahead = lacking = 0
     for j in range(mission.uavs):
@@ -182,10 +200,10 @@ def waiting_time(mission, uavs, i):
         has_asked = o.active and o.pad_request >= 0
         is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
         must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
-        if j != i and (has_asked or (must and is_lower)):
+        if j != i and nearest_zone(chart, o) == zone and (has_asked or (must and is_lower)):
             ahead += 1
             lacking += mission.charge_complete - min(o.battery, mission.charge_start)
-    pads = working_pads(mission)
+    pads = working_pads(mission, zone)
     if ahead < pads:
         return 0
     power = max(pads, 1) * mission.charge_rate
@@ -195,7 +213,14 @@ def waiting_time(mission, uavs, i):
 
 
 @inlined
-def battery_home(mission, u, slots, reach):
+def nearest_zone(chart, u):
+    """The number of the zone that is nearest to a UAV."""
+    cell = chart.nearest[u.y, u.x]
+    return np.int64(chart.zones[chart.parking[cell, 1], chart.parking[cell, 0]])
+
+
+@inlined
+def battery_home(mission, u, chart, slots, reach):
     """The battery [%] that UAV ``u`` needs to reach its parking cell.
 
     Args:
@@ -207,26 +232,24 @@ def battery_home(mission, u, slots, reach):
     """
     if reach is None:
         return slots
-    return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, slots)
+    return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, chart, slots)
 
 
 @inlined
-def _further(mission, u, slots):
+def _further(mission, u, chart, slots):
     """The battery [%] for the cells by which the parking cell is farther than the zone."""
-    x = min(max(u.x, mission.zone_x), mission.zone_x + mission.zone_width - 1)
-    y = min(max(u.y, mission.zone_y), mission.zone_y + mission.zone_height - 1)
-    return (slots - abs(u.x - x) - abs(u.y - y)) * (u.slots_per_cell + mission.wind_most)
+    return (slots - distance_home(chart, u.x, u.y)) * (u.slots_per_cell + mission.wind_most)
 
 
 @inlined
-def round_trip(mission, u, x, y, home_x, home_y, reach):
+def round_trip(mission, u, chart, x, y, home_x, home_y, reach):
     """The battery [%] that UAV ``u`` needs to fly to a cell and from there to the zone.
 
     Gusts on the way out are not considered; the safe moves are what keeps the zone in reach.
     """
-    cells = abs(u.x - x) + abs(u.y - y)
+    cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
-        return cells + abs(home_x - x) + abs(home_y - y)
+        return cells + distance(chart, x, y, home_x, home_y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
     return cells * u.slots_per_cell + int(against) + reach[u.slots_per_cell - 1, y, x]
 
@@ -247,7 +270,7 @@ def contest(mission, uavs, i, x, y):
         if j == i or not o.active:
             continue
         slots = abs(o.x - x) + abs(o.y - y)
-        if is_parked(mission, o):
+        if is_parked(o):
             if slots == 0:
                 return 3
         elif slots <= 1 and (o.battery < u.battery or (o.battery == u.battery and j < i)):
@@ -258,19 +281,20 @@ def contest(mission, uavs, i, x, y):
 
 
 @inlined
-def safe_moves(mission, uavs, i, charge, home_x, home_y, reach):
+def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
     moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
-    to let this teammate pass. Moves off the grid and into the cell of a parked teammate are never
-    safe. A UAV that has just been overruled also avoids cells that a teammate may occupy:
+    to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
+    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate may occupy:
     otherwise two UAVs could block each other until the battery of one of them is depleted.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
+        chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
         home_x, home_y: Its parking cell.
         reach: The table of ``reach_of``.
@@ -280,7 +304,7 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach):
     """
     u = uavs[i]
     spare = margin(mission, u)
-    reserve = spare + waiting_time(mission, uavs, i) if charge else 0
+    reserve = spare + waiting_time(mission, uavs, i, chart) if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those that are not later than the margin allows.
     clear = nearest = in_time = 0
@@ -288,14 +312,14 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach):
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
         contested = contest(mission, uavs, i, x, y)
-        if not on_grid(mission, x, y) or contested == 3:
+        if not is_open(chart, x, y) or contested == 3:
             continue
         late = 0
         if charge:
             if reach is None:
-                needed = 1 + path_length(mission, uavs, i, x, y, home_x, home_y)
+                needed = 1 + path_length(mission, uavs, i, chart, x, y, home_x, home_y)
             else:
-                needed = _needed(mission, uavs, i, action, x, y, home_x, home_y, reach)
+                needed = _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach)
             # One slot is the charging slot itself; the battery must not be depleted before it.
             late = max(needed + 1 + reserve - u.battery, 0)
         bit = 1 << action
@@ -316,29 +340,29 @@ def safe_moves(mission, uavs, i, charge, home_x, home_y, reach):
 
 
 @inlined
-def _needed(mission, uavs, i, action, x, y, home_x, home_y, reach):
+def _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach):
     """The battery [%] for an action of UAV ``i`` and the way home from the cell it leads to."""
     u = uavs[i]
     if action == HOVER:
-        cost = 0 if u.latch and in_zone(mission, x, y) else 1
+        cost = 0 if u.latch and in_zone(chart, x, y) else 1
     else:
         cost = u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
-    slots = path_length(mission, uavs, i, u.x, u.y, home_x, home_y)
-    return cost + reach[u.slots_per_cell - 1, y, x] + _further(mission, u, slots)
+    slots = path_length(mission, uavs, i, chart, u.x, u.y, home_x, home_y)
+    return cost + reach[u.slots_per_cell - 1, y, x] + _further(mission, u, chart, slots)
 
 
 @kernel
-def _mask(missions, uavs, residual, rows_mission, rows_uav, reach):
+def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
     masks = np.zeros((len(rows_mission), 5), np.bool_)
-    taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
+    taken = np.empty(len(chart.parking), np.bool_)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
         charge = must_charge(mission, team[i], data_left(mission, residual[b]))
         home_x, home_y = 0, 0
         if charge:
-            home_x, home_y, _ = parking_cell(mission, team, i, taken)
-        safe = safe_moves(mission, team, i, charge, home_x, home_y, reach)
+            home_x, home_y, _ = parking_cell(mission, team, i, chart, taken)
+        safe = safe_moves(mission, team, i, chart, charge, home_x, home_y, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1
     return masks
@@ -349,6 +373,6 @@ def guard(view: View) -> np.ndarray:
 
     Every row allows at least one action. Any policy can restrict its choice to the mask.
     """
-    state = view.state
-    reach = reach_of(state.missions)
-    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, reach)
+    state, chart = view.state, view.world.chart
+    reach = reach_of(state.missions, chart)
+    return _mask(state.missions, state.uavs, state.residual, view.mission, view.uav, chart, reach)

@@ -43,11 +43,11 @@ class Observer:
         """Make an observer for the missions of a scenario.
 
         Raises:
-            InputError: If there is no such kind.
+            InputError: If there is no such kind, or it does not fit the scenario.
         """
         if kind not in KINDS:
             raise InputError(f"observation: {shown(kind)} is unknown{one_of(kind, KINDS)}")
-        self.kind, self.guarded = kind, guarded
+        self.kind, self.guarded, self._chart = kind, guarded, scenario.chart
         if kind == "state":
             self._encoder: Any = Components(scenario)
             self.space: spaces.Space = spaces.Box(*component_bounds(scenario), dtype=np.float32)
@@ -73,11 +73,11 @@ class Observer:
         """
         seen: Any = state
         if self.guarded or self.kind != "state":
-            states = compact_states(state, self.guarded)
+            states = compact_states(state, self._chart, self.guarded)
             allowed = masks(states, missions, uavs)
             seen = state if self.kind == "state" else states
         else:
-            allowed = legal_actions(state.missions, state.uavs, missions, uavs)
+            allowed = legal_actions(state.uavs, self._chart, missions, uavs)
         parts = self._encoder.encode(seen, missions, uavs)
         names = _PARTS.get(self.kind)
         return (dict(zip(names, parts, strict=True)) if names else parts[0]), allowed

@@ -3,7 +3,7 @@
 The replay memory stores these states instead of observations: one state serves all UAVs of its
 mission, and the next state of a transition is a later row of the memory.
 
-    states = compact_states(view.state, guarded=True)
+    states = compact_states(view.state, view.world.chart, guarded=True)
     masks(states, view.mission, view.uav)                        # (R, 5) allowed actions
     Vector(layout_of(space)).encode(states, view.mission, view.uav)
 """
@@ -15,8 +15,10 @@ import numpy as np
 from dess.code.kernels import kernel
 from dess.observations import guard
 from dess.observations.reach import reach_of
+from dess.errors import InputError
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import Chart, zones_of
 from dess.state import HOVER, State
 
 # Columns of ``CompactStates.missions``.
@@ -46,7 +48,7 @@ class CompactStates(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """The grid, zone and nodes that all missions of a space share.
+    """The square grid, the only zone and the nodes that all missions of a space share.
 
     Attributes:
         grid: Cells along one side (M).
@@ -58,6 +60,11 @@ class Layout(NamedTuple):
     zone: np.ndarray
     nodes: np.ndarray
 
+    @property
+    def zones(self) -> np.ndarray:
+        """``Chart.zones`` of the layout."""
+        return zones_of(self.grid, self.grid, [self.zone], [])
+
     def zone_slots(self, cells: np.ndarray) -> np.ndarray:
         """(N,) slots from each of (N, 2) cells to the nearest cell of the zone."""
         x, y, width, height = self.zone
@@ -66,7 +73,16 @@ class Layout(NamedTuple):
 
 
 def layout_of(space: ScenarioSpace) -> Layout:
-    """The layout of a space."""
+    """The layout of a space.
+
+    Raises:
+        InputError: If it has no such layout.
+    """
+    for field, allowed in (("rows", "a square grid"), ("zones", "one zone"), ("no_fly", "none")):
+        if space.has(field):
+            raise InputError(
+                f"{field}: an observation vector, nodes or maps does not have it; allowed: {allowed}"
+            )
     return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
 
 
@@ -79,22 +95,23 @@ def empty_states(count: int, uavs: int, nodes: int) -> CompactStates:
     )
 
 
-def compact_states(state: State, guarded: bool) -> CompactStates:
+def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
     """The compact states of all missions of a state.
 
     Args:
         state: The state of B missions.
+        chart: Their chart.
         guarded: True for the mask of the return guard, False for the mask of all legal actions.
     """
     states = empty_states(len(state.missions), state.uavs.shape[1], state.residual.shape[1])
-    reach = reach_of(state.missions)
-    _fill(state.missions, state.uavs, state.residual, guarded, reach, states)
+    reach = reach_of(state.missions, chart)
+    _fill(state.missions, state.uavs, state.residual, guarded, chart, reach, states)
     return states
 
 
 @kernel
-def _fill(missions, uavs, residual, guarded, reach, out):
-    taken = np.empty(missions[0].grid * missions[0].grid, np.bool_)
+def _fill(missions, uavs, residual, guarded, chart, reach, out):
+    taken = np.empty(len(chart.parking), np.bool_)
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
         out.missions[b, CHARGE_START] = mission.charge_start
@@ -110,14 +127,16 @@ def _fill(missions, uavs, residual, guarded, reach, out):
             if not u.active:
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
-            home_x, home_y, slots = guard.parking_cell(mission, team, i, taken)
-            row[HOME] = min(guard.battery_home(mission, u, slots, reach), _MOST)
+            home_x, home_y, slots = guard.parking_cell(mission, team, i, chart, taken)
+            row[HOME] = min(guard.battery_home(mission, u, chart, slots, reach), _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
-                    row[MASK] = guard.safe_moves(mission, team, i, charge, home_x, home_y, reach)
+                    row[MASK] = guard.safe_moves(
+                        mission, team, i, chart, charge, home_x, home_y, reach
+                    )
                 else:
-                    row[MASK] = legal_moves(mission, u)
+                    row[MASK] = legal_moves(chart, u)
 
 
 def masks(states: CompactStates, missions: np.ndarray, uavs: np.ndarray) -> np.ndarray:

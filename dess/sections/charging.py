@@ -24,7 +24,7 @@ class Charging(Section):
         0,
         ge=0,
         le=6400,
-        description="battery that all pads together can add in a slot [%]; 0 for no limit",
+        description="battery that all pads of a zone together can add in a slot [%]; 0 for no limit",
     )
     measured: bool = Field(
         False, description="whether records have the queue, waiting time and use of the pads"
@@ -57,13 +57,14 @@ def is_before(mission, u, other):
 def share_power(mission, uavs):
     """Charge the UAVs on the pads if the power is limited; return whether it is."""
     if mission.power > 0:
-        _share_power(mission, uavs)
+        for zone in range(mission.zones):
+            _share_power(mission, uavs, zone)
     return mission.power > 0
 
 
 @kernel
-def _share_power(mission, uavs):
-    """Charge the UAVs on the pads with the limited power, one after the other.
+def _share_power(mission, uavs, zone):
+    """Charge the UAVs on the pads of a zone with its limited power, one after the other.
 
     Each takes what it can take (``charge_rate``, up to ``charge_complete``) of what is left.
     """
@@ -72,7 +73,7 @@ def _share_power(mission, uavs):
     while left > 0:
         first = -1
         for i in range(mission.uavs):
-            waits = uavs[i].charging and not charged[i]
+            waits = uavs[i].charging and uavs[i].zone == zone and not charged[i]
             if waits and (first < 0 or is_before(mission, uavs[i], uavs[first])):
                 first = i
         if first < 0:

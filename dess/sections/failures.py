@@ -152,26 +152,37 @@ def _strike_node(mission, residual, sensor, k):
 
 
 @inlined
-def working_pads(mission):
-    """The number of charging pads that are not out of order."""
-    return mission.pads - _broken_pads(mission)
+def working_pads(mission, zone):
+    """The number of charging pads of a zone that are not out of order."""
+    return mission.zone_pads[zone] - _broken_pads(mission, zone)
 
 
 @extension
-def _broken_pads(mission):
+def _broken_pads(mission, zone):
     broken = 0
     if mission.pad_rate > 0.0:
-        for j in range(mission.pads):
+        first = first_pad(mission, zone)
+        for j in range(first, first + mission.zone_pads[zone]):
             broken += mission.pads_out[j]
     return broken
 
 
+@inlined
+def first_pad(mission, zone):
+    """The index of the first pad of a zone; pads are numbered zone by zone."""
+    first = 0
+    for other in range(zone):
+        first += mission.zone_pads[other]
+    return first
+
+
 @extension
 def take_pad(mission, uavs, u):
-    """Give a UAV the first pad that works and that no UAV holds; ``charging`` is set after."""
+    """Give a UAV the first pad of its zone that works and is free; ``charging`` is set after."""
     if not mission.has_failures:
         return
-    for j in range(mission.pads):
+    first = first_pad(mission, u.zone)
+    for j in range(first, first + mission.zone_pads[u.zone]):
         free = mission.pads_out[j] == 0
         for i in range(mission.uavs):
             if uavs[i].charging and uavs[i].pad == j:

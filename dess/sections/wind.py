@@ -42,21 +42,21 @@ class Wind(Section):
 
 
 @inlined
-def surcharge(grid, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
+def surcharge(columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y):
     """The battery [%] that a move into cell ``x, y`` costs beyond that in still air.
 
     Batteries are integers, so a fraction is rounded up or down by a draw per cell; its expected
     value is the fraction. A tail wind saves nothing.
 
     Args:
-        grid: Cells along one side.
+        columns: Cells of the grid from west to east.
         wind_x, wind_y: The mean wind [% per cell].
         gusts: Standard deviation of the wind from cell to cell [% per cell].
         seed: Seed of the field.
         step_x, step_y: The step of the move [cells].
         x, y: The cell that the move leads to.
     """
-    words = streams.block(seed, 0, streams.WIND, 0, 0, y * grid + x)
+    words = streams.block(seed, 0, streams.WIND, 0, 0, y * columns + x)
     east = wind_x + gusts * streams.normal(words[0])
     south = wind_y + gusts * streams.normal(words[1])
     against = -(east * step_x + south * step_y)
@@ -77,9 +77,12 @@ def move_surcharge(mission, step_x, step_y, x, y):
 
 
 @lru_cache(maxsize=16)
-def surcharges(grid: int, wind_x: float, wind_y: float, gusts: float, seed: int) -> np.ndarray:
-    """(4, M, M) surcharges [%] of the moves north, east, south and west into cell ``y, x``."""
-    table = np.zeros((4, grid, grid), np.int64)
+def surcharges(
+    size: tuple[int, int], wind_x: float, wind_y: float, gusts: float, seed: int
+) -> np.ndarray:
+    """(4, H, W) surcharges [%] of the moves north, east, south and west into cell ``y, x``."""
+    columns, rows = size
+    table = np.zeros((4, rows, columns), np.int64)
     if wind_x or wind_y or gusts:
         _fill(wind_x, wind_y, gusts, seed, table)
     table.flags.writeable = False
@@ -88,16 +91,16 @@ def surcharges(grid: int, wind_x: float, wind_y: float, gusts: float, seed: int)
 
 @kernel
 def _fill(wind_x, wind_y, gusts, seed, table):
-    grid = table.shape[1]
+    rows, columns = table.shape[1:]
     for action, (step_x, step_y) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-        for y in range(grid):
-            for x in range(grid):
+        for y in range(rows):
+            for x in range(columns):
                 table[action, y, x] = surcharge(
-                    grid, wind_x, wind_y, gusts, seed, step_x, step_y, x, y
+                    columns, wind_x, wind_y, gusts, seed, step_x, step_y, x, y
                 )
 
 
-def constants(wind: Wind, grid: int) -> dict[str, float]:
+def constants(wind: Wind, size: tuple[int, int]) -> dict[str, float]:
     """The fields of ``MISSION`` that describe the wind."""
     wind_x, wind_y = wind.push()
     return {
@@ -105,5 +108,5 @@ def constants(wind: Wind, grid: int) -> dict[str, float]:
         "wind_y": wind_y,
         "wind_gusts": wind.gusts,
         "wind_seed": wind.seed,
-        "wind_most": surcharges(grid, wind_x, wind_y, wind.gusts, wind.seed).max(),
+        "wind_most": surcharges(size, wind_x, wind_y, wind.gusts, wind.seed).max(),
     }

@@ -1,4 +1,4 @@
-"""The charging zone of the SimPy model: its pads as a resource."""
+"""A charging zone of the SimPy model: its pads as a resource."""
 
 import numpy as np
 import simpy
@@ -6,7 +6,7 @@ from simpy.resources.resource import Request
 
 
 class ChargingZone(simpy.Resource):
-    """The charging pads, granted in the order of the scenario (``rules.grant_pads``).
+    """The pads of a charging zone, granted in the order of the scenario (``rules.grant_pads``).
 
     The UAVs of a slot ask one after the other at the same time. Pads are granted when all have
     asked, so that the order of asking does not matter. A pad out of order is not granted.
@@ -15,15 +15,18 @@ class ChargingZone(simpy.Resource):
         requests: For each UAV its request, waiting or granted, or None.
     """
 
-    def __init__(self, env: simpy.Environment, mission: np.void, uavs: np.ndarray):
-        super().__init__(env, int(mission["pads"]))
+    def __init__(self, env: simpy.Environment, mission: np.void, uavs: np.ndarray, zone: int = 0):
+        pads = mission["zone_pads"]
+        super().__init__(env, int(pads[zone]))
         self._mission, self._uavs = mission, uavs
+        self._pads = slice(int(pads[:zone].sum()), int(pads[: zone + 1].sum()))
         self.requests: list[Request | None] = [None] * int(mission["uavs"])
 
     @property
     def capacity(self) -> int:
         """The number of pads that work."""
-        return int(self._mission["pads"] - self._mission["pads_out"].sum())
+        pads = self._pads
+        return pads.stop - pads.start - int(self._mission["pads_out"][pads].sum())
 
     def _do_put(self, event: Request) -> None:
         """Let a request wait until ``grant``."""

@@ -51,7 +51,7 @@ class DDQN:
                 training.
         """
         self._require_layout(view)
-        states = compact_states(view.state, self.guarded)
+        states = compact_states(view.state, view.world.chart, self.guarded)
         allowed = masks(states, view.mission, view.uav)
         parts = self.observation.encode(states, view.mission, view.uav)
         values = np.where(allowed, _values(self.network, parts).astype(np.float64), -np.inf)
@@ -73,6 +73,11 @@ class DDQN:
                     f"policy {self.name}: has learned {field} {value}, not {others[0]}; "
                     "allowed: the grid, zone and nodes of its training"
                 )
+        if not np.array_equal(view.world.chart.zones, self.layout.zones):
+            raise InputError(
+                f"policy {self.name}: has learned a square grid with one zone and no no-fly cells; "
+                "allowed: the grid, zone and nodes of its training"
+            )
         if not np.array_equal(view.world.nodes, self.layout.nodes):
             raise InputError(
                 f"policy {self.name}: has learned other nodes; allowed: those of its training"

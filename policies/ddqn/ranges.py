@@ -38,7 +38,7 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
     for name in sorted(set(constants.dtype.names or ()) - {*SAMPLED, *_PROGRESS}):
         if (missions[name] != constants[name]).any():
             raise ValueError(f"missions: {name} is not that of the scenario")
-    edge, slots, fleet = space.grid - 1, space.max_slots, uavs.shape[1]
+    edge, slots, fleet = max(space.size) - 1, space.max_slots, uavs.shape[1]
     is_there = np.arange(fleet) < missions["uavs"][:, None]
     types = np.broadcast_to(types_of(space, fleet), uavs.shape)
     for name in ("quota", "slots_per_cell", "rate"):
@@ -61,6 +61,7 @@ def check_state(state: State, space: ScenarioSpace, stepper: MissionStepper) -> 
         "end": (0, len(END_NAMES) - 1),
         "pad_request": (-1, slots),
         "pad": (-1, space.charging_pads - 1),
+        "zone": (-2, len(space.rectangles) - 1),
         "served": (-1, len(space.nodes) - 1),
     }
     truths = dict.fromkeys(("active", "latch", "charging", "grounded", "overruled"), (0, 1))

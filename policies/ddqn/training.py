@@ -182,7 +182,7 @@ class Training:
         """Run one slot of all environments with the exploring policy, and store it."""
         state = self.stepper.state
         over = np.nonzero(state.missions["active"] == 0)[0]
-        states = compact_states(state, self.config.guard)
+        states = compact_states(state, self.stepper.world.chart, self.config.guard)
         missions, uavs = np.nonzero(
             states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
         )

@@ -17,7 +17,7 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
-from dess.rules import in_zone
+from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
 from dess.state import HOVER, STEP_X, STEP_Y, fields
 from policies.planner.plan import CHARGE, NEVER
@@ -140,7 +140,7 @@ def fly(mission, rates, plan, source, first, flight, slots):
     extra, candidates, parts = rates.extra, rates.candidates, rates.parts
     waypoints, team, sea = plan.waypoints, flight.team[-1], flight.sea[-1]
     fleet, m = mission.uavs, mission.communication_slots
-    cost, grid = mission.flight_cost, mission.grid
+    cost, chart = mission.flight_cost, rates.chart
     copy_snapshot(mission, source, first, flight, -1)
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
     for i in range(fleet):
@@ -156,17 +156,16 @@ def fly(mission, rates, plan, source, first, flight, slots):
                 v.last_charge = number
     total = mission.initial + mission.arrived
     present = total - mission.collected - mission.lost
-    wait, rate, line = _revival(mission), mission.arrival_rate, parts * (grid - 1) + 1
+    wait, rate = _revival(mission), mission.arrival_rate
     t = first * STRIDE
     while t < slots:
         if t % STRIDE == 0:
             s = t // STRIDE
             copy_snapshot(mission, flight, -1, flight, s)
             flight.sums[s, 0], flight.sums[s, 1] = collected, penalty
-        active = taken = 0
+        active = 0
         for i in range(fleet):
             active += team[i].active
-            taken += team[i].charging
         if active == 0:
             break
         data_left = present + rate * mission.nodes * t - collected
@@ -202,10 +201,10 @@ def fly(mission, rates, plan, source, first, flight, slots):
                 is_blocked = False
                 for attempt in range(2):
                     if flies_on:
-                        v.action = _towards(v, w, w.turned if attempt == 0 else 1 - w.turned)
+                        v.action = _towards(chart, v, w, w.turned != attempt)
                     is_blocked = False
                     for j in range(fleet):
-                        is_blocked = is_blocked or (j != i and _blocks(mission, v, team[j], j < i))
+                        is_blocked = is_blocked or (j != i and _blocks(chart, v, team[j], j < i))
                     if not is_blocked:
                         break
                     penalty += _BLOCKED
@@ -217,10 +216,11 @@ def fly(mission, rates, plan, source, first, flight, slots):
                     v.left = v.slots_per_cell - 1
                     if extra.size > 0:
                         v.battery -= cost * extra[v.action, v.y, v.x]
-                elif v.latch != 0 and in_zone(mission, v.x, v.y) and taken < working_pads(mission):
-                    taken += 1
+                elif (
+                    v.latch != 0 and in_zone(chart, v.x, v.y) and _has_pad(mission, chart, team, v)
+                ):
                     penalty += _begin_to_charge(mission, v, active)
-            _open_slot(mission, v, parts, line)
+            _open_slot(mission, chart, v, parts)
         for _ in range(m):
             for i in range(fleet):
                 v = team[i]
@@ -271,26 +271,46 @@ def _unplanned(mission, v, active, data_left):
 
 
 @inlined
-def _towards(v, w, turned):
-    """The action that leads to a waypoint, along y first if ``turned``; Hover if none does."""
-    dx, dy = w.x - v.x, w.y - v.y
-    if turned != 0 and dy != 0:
-        dx = 0
-    elif turned == 0 and dx != 0:
-        dy = 0
-    if dx != 0:
-        return 1 if dx > 0 else 3
-    if dy != 0:
-        return 2 if dy > 0 else 0
+def _towards(chart, v, w, turned):
+    """The action of a shortest way to a waypoint, along y first if ``turned``; or Hover."""
+    along_x = 1 if w.x > v.x else 3 if w.x < v.x else HOVER
+    along_y = 2 if w.y > v.y else 0 if w.y < v.y else HOVER
+    first, second = (along_y, along_x) if turned else (along_x, along_y)
+    first = second if first == HOVER else first
+    if chart.ways.size == 0 or first == HOVER or _is_nearer(chart, v, w, first):
+        return first
+    if _is_nearer(chart, v, w, second):
+        return second
+    for action in range(HOVER):
+        if _is_nearer(chart, v, w, action):
+            return action
     return HOVER
 
 
 @inlined
-def _blocks(mission, v, other, has_moved):
+def _is_nearer(chart, v, w, action):
+    """Whether an action leads to an open cell that is nearer to a waypoint."""
+    x, y = v.x + STEP_X[action], v.y + STEP_Y[action]
+    before = distance(chart, v.x, v.y, w.x, w.y)
+    return is_open(chart, x, y) and distance(chart, x, y, w.x, w.y) < before
+
+
+@inlined
+def _has_pad(mission, chart, team, v):
+    """Whether the zone in which a UAV is has a free pad."""
+    zone, free = chart.zones[v.y, v.x], 0
+    for i in range(mission.uavs):
+        free -= team[i].charging != 0 and chart.zones[team[i].y, team[i].x] == zone
+    return free + working_pads(mission, zone) > 0
+
+
+@inlined
+def _blocks(chart, v, other, has_moved):
     """Whether a teammate, which will move away unless it charges, is where an action leads."""
     x, y = v.x + STEP_X[v.action], v.y + STEP_Y[v.action]
-    stays = has_moved or other.charging != 0 or (other.latch != 0 and in_zone(mission, x, y))
-    return stays and other.x == x and other.y == y and other.active != 0
+    if other.x != x or other.y != y or other.active == 0:
+        return False
+    return has_moved or other.charging != 0 or (other.latch != 0 and in_zone(chart, x, y))
 
 
 @inlined
@@ -304,12 +324,14 @@ def _begin_to_charge(mission, v, active):
 
 
 @inlined
-def _open_slot(mission, v, parts, line):
+def _open_slot(mission, chart, v, parts):
     """Set the place of a UAV at the start of a slot, and how far it flies per part of it."""
-    v.place, v.pace = v.y * line + v.x * parts, 0
+    rows, columns = chart.zones.shape
+    row, column = parts * (columns - 1) + 1, parts * (rows - 1) + 1  # their places
+    v.place, v.pace = v.y * row + v.x * parts, 0
     if v.action != HOVER:
         if STEP_Y[v.action] != 0:
-            v.place = (mission.grid + v.x) * line + v.y * parts
+            v.place = rows * row + v.x * column + v.y * parts
         v.pace = v.part * (STEP_X[v.action] + STEP_Y[v.action])
         v.place -= v.pace * (v.left + 1) * mission.communication_slots
 

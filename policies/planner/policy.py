@@ -16,7 +16,6 @@ import numpy as np
 
 from dess.code.kernels import inlined, kernel
 from dess.observations.guard import guard, must_charge
-from dess.rules import in_zone, zone_cell
 from dess.state import HOVER, STEP_X, State
 from dess.view import View
 from policies.heuristics import step_towards
@@ -145,7 +144,7 @@ def _decide(
             if workspace.course[TRIED] == 0 and hottest != _NEW:
                 _take_up(mission, team, plan, memory.first[b])
             elif workspace.course[TRIED] == 0:
-                _start(mission, team, residual[b].sum(), plan)
+                _start(mission, team, residual[b].sum(), rates.chart, plan)
             most -= improve(
                 mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest, most
             )
@@ -169,7 +168,7 @@ def _decide(
             for move in range(len(STEP_X)):
                 if safe[row, move]:
                     moves |= 1 << move
-            action = step_towards(mission, team, i, moves, x, y)
+            action = step_towards(mission, team, i, rates.chart, moves, x, y)
         actions[row] = action
     return len(rows_mission)
 
@@ -180,7 +179,7 @@ def _must_charge_here(mission, u, data, waypoints, length):
 
     The fluid model may expect that the battery suffices for the quota where the guard does not.
     """
-    if not (u.latch and in_zone(mission, u.x, u.y) and must_charge(mission, u, data)):
+    if not (u.latch and u.zone >= 0 and must_charge(mission, u, data)):
         return False
     is_planned = False
     for number in range(length):
@@ -189,13 +188,13 @@ def _must_charge_here(mission, u, data, waypoints, length):
 
 
 @kernel
-def _start(mission, uavs, data, plan):
+def _start(mission, uavs, data, chart, plan):
     """A plan in which the UAVs that must charge do so, each in its own cell of the zone."""
     for i in range(mission.uavs):
         plan.lengths[i] = 0
         if uavs[i].active and must_charge(mission, uavs[i], data):
-            x, y = zone_cell(mission, i % (mission.zone_width * mission.zone_height))
-            insert(plan, i, 0, x, y, CHARGE, 0)
+            cell = chart.parking[i % len(chart.parking)]
+            insert(plan, i, 0, cell[0], cell[1], CHARGE, 0)
 
 
 @kernel

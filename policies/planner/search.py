@@ -15,7 +15,7 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import inlined, kernel
-from dess.rules import in_zone, on_grid, zone_cell
+from dess.sea.chart import distance, in_zone, is_open
 from dess.state import STEP_X, STEP_Y
 from policies.planner import fluid
 from policies.planner import plan as plans
@@ -100,7 +100,7 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         words[0], words[1], words[2], words[3] = streams.block(
             mission.seed, mission.replication, streams.PLAN, 0, mission.slot, step
         )
-        slot = _edit(mission, uavs, nodes, flight, trial, words)
+        slot = _edit(mission, uavs, nodes, rates.chart, flight, trial, words)
         if slot == _NO_EDIT:
             continue
         if slot >= flight.last[1]:
@@ -146,7 +146,7 @@ def _pick_low(word, count):
 
 
 @kernel
-def _edit(mission, uavs, nodes, flight, plan, words):
+def _edit(mission, uavs, nodes, chart, flight, plan, words):
     """Edit a plan at random; return the first slot that this may change, or ``_NO_EDIT``."""
     kind, i = _KINDS[_pick(words[0], len(_KINDS))], _pick(words[1], mission.uavs)
     if not uavs[i].active:
@@ -154,9 +154,9 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     length = plan.lengths[i]
     p = _pick_low(words[1], length + (kind in (_INSERT, _CHARGE, _CROSS)))
     if kind == _INSERT:
-        return _insert_node(mission, nodes, flight, plan, i, p, words)
+        return _insert_node(mission, nodes, chart, flight, plan, i, p, words)
     if kind == _CHARGE:
-        return _edit_charge(mission, plan, i, p, words)
+        return _edit_charge(mission, chart, plan, i, p, words)
     if length == 0 and kind != _CROSS:
         return _NO_EDIT
     w = plan.waypoints[i, p]
@@ -172,7 +172,7 @@ def _edit(mission, uavs, nodes, flight, plan, words):
     elif kind == _NUDGE:
         action = _pick(words[2], 4)
         x, y = w.x + STEP_X[action], w.y + STEP_Y[action]
-        if not on_grid(mission, x, y) or (w.stay == plans.CHARGE and not in_zone(mission, x, y)):
+        if not is_open(chart, x, y) or (w.stay == plans.CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
         w.x, w.y = x, y
     elif kind == _REVERSE:
@@ -185,7 +185,7 @@ def _edit(mission, uavs, nodes, flight, plan, words):
         if not uavs[j].active:
             slot = _NO_EDIT
         elif kind == _MOVE:
-            slot = _move(flight, plan, i, p, j, words)
+            slot = _move(chart, flight, plan, i, p, j, words)
         elif kind == _SWAP:
             slot = _swap_with(plan, i, p, j, _pick(words[3], plan.lengths[j]))
         else:
@@ -194,7 +194,7 @@ def _edit(mission, uavs, nodes, flight, plan, words):
 
 
 @kernel
-def _move(flight, plan, i, p, j, words):
+def _move(chart, flight, plan, i, p, j, words):
     """Move some waypoints of UAV ``i``, from ``p`` on, to UAV ``j``, in this order or reversed."""
     count = min(1 + _pick_low(words[3], _MOST_MOVED), plan.lengths[i] - p)
     if plan.lengths[j] + count > plans.MOST_WAYPOINTS:
@@ -212,7 +212,7 @@ def _move(flight, plan, i, p, j, words):
         plans.remove(plan, i, p)
     q = _pick(words[3], plan.lengths[j] + 1)
     if not has_charge and _pick_low(words[2], 1 << 16) < _SHORTEST:
-        q = _shortest_detour(flight, plan, j, moved[0, 0], moved[0, 1])
+        q = _shortest_detour(chart, flight, plan, j, moved[0, 0], moved[0, 1])
     if j == i and q == p:
         return plans.NEVER
     slot = min(slot, plan.waypoints[j, q].begun)
@@ -257,7 +257,7 @@ def _cross(plan, i, p, j, q):
 
 
 @kernel
-def _insert_node(mission, nodes, flight, plan, i, p, words):
+def _insert_node(mission, nodes, chart, flight, plan, i, p, words):
     """Insert a node into the plan of UAV ``i``: of two random ones, that which keeps more data."""
     if plan.lengths[i] == plans.MOST_WAYPOINTS:
         return _NO_EDIT
@@ -267,16 +267,17 @@ def _insert_node(mission, nodes, flight, plan, i, p, words):
         k = other
     x, y = nodes[k, 0], nodes[k, 1]
     if _pick_low(words[0], 1 << 16) < _SHORTEST:
-        p = _shortest_detour(flight, plan, i, x, y)
+        p = _shortest_detour(chart, flight, plan, i, x, y)
     slot = plan.waypoints[i, p].begun
     plans.insert(plan, i, p, x, y, _pick(words[3], 3), np.int64(words[3] & np.uint64(1)))
     return slot
 
 
 @kernel
-def _edit_charge(mission, plan, i, p, words):
+def _edit_charge(mission, chart, plan, i, p, words):
     """Let UAV ``i`` charge before waypoint ``p``, or in another cell if it charges there."""
-    x, y = zone_cell(mission, _pick(words[2], mission.zone_width * mission.zone_height))
+    cell = _pick(words[2], len(chart.parking))
+    x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     w = plan.waypoints[i, p]
     slot = w.begun
     if p < plan.lengths[i] and w.stay == plans.CHARGE:
@@ -289,15 +290,15 @@ def _edit_charge(mission, plan, i, p, words):
 
 
 @kernel
-def _shortest_detour(flight, plan, i, x, y):
+def _shortest_detour(chart, flight, plan, i, x, y):
     """Where in the plan of UAV ``i`` a cell is the shortest detour."""
     least, place = plans.NEVER, 0
     from_x, from_y = flight.team[0, i].x, flight.team[0, i].y
     for p in range(plan.lengths[i] + 1):
-        detour = abs(x - from_x) + abs(y - from_y)
+        detour = distance(chart, from_x, from_y, x, y)
         if p < plan.lengths[i]:
             w = plan.waypoints[i, p]
-            detour += abs(x - w.x) + abs(y - w.y) - abs(from_x - w.x) - abs(from_y - w.y)
+            detour += distance(chart, w.x, w.y, x, y) - distance(chart, w.x, w.y, from_x, from_y)
             from_x, from_y = w.x, w.y
         if detour < least:
             least, place = detour, p

@@ -23,8 +23,8 @@ from pydantic import AfterValidator, Field
 from dess.errors import InputError, shown
 from dess.files.documents import Document
 from dess.files.reading import read_text
+from dess.sea.chart import Cell
 
-Cell = tuple[int, int]
 # Where a node stands in the file, such as ``line 3``, and its longitude and latitude [degrees], or
 # the column and row of its cell.
 Place = tuple[str, float, float]
@@ -62,12 +62,12 @@ class _Collection(Document, extra="ignore"):
     features: tuple[_Feature, ...] = Field(description=_ALLOWED)
 
 
-def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
+def nodes_in(path: Path, size: tuple[int, int], cell_size: float) -> tuple[Cell, ...]:
     """The cells of the nodes in a file, in the order of the file.
 
     Args:
         path: A file ``.csv``, ``.geojson`` or ``.json``.
-        grid: Cells along one side of the grid.
+        size: Cells of the grid from west to east and from north to south.
         cell_size: Side of a cell [m].
 
     Raises:
@@ -82,13 +82,13 @@ def nodes_in(path: Path, grid: int, cell_size: float) -> tuple[Cell, ...]:
         raise InputError(f"{path}: has {len(places):,} nodes; allowed: 1..{MAX_NODES}")
     positions = np.array([place[1:] for place in places])
     if is_geographic:
-        positions = _projected(positions, grid, cell_size)
+        positions = _projected(positions, size, cell_size)
     cells = [(int(x), int(y)) for x, y in np.floor(positions)]
     known: dict[Cell, str] = {}
     for (name, *_), cell in zip(places, cells, strict=True):
-        if min(cell) < 0 or max(cell) >= grid:
-            line = f"{name} is off the grid of {grid} x {grid} cells, at {[*cell]}"
-            raise InputError(f"{path}: {line}; allowed: {_enough(cells, grid, is_geographic)}")
+        if min(cell) < 0 or cell[0] >= size[0] or cell[1] >= size[1]:
+            line = f"{name} is off the grid of {size[0]} x {size[1]} cells, at {[*cell]}"
+            raise InputError(f"{path}: {line}; allowed: {_enough(cells, size, is_geographic)}")
         if cell in known:
             smaller = f"a cell_size below {cell_size:g} m" if is_geographic else "distinct cells"
             shared = f"{known[cell]} and {name} lie in one cell, {[*cell]}"
@@ -141,20 +141,24 @@ def _of_geojson(path: Path) -> tuple[bool, list[Place]]:
     return True, [(f"features.{n}", x, y) for n, (x, y, *_) in enumerate(positions)]
 
 
-def _projected(degrees: np.ndarray, grid: int, cell_size: float) -> np.ndarray:
+def _projected(degrees: np.ndarray, size: tuple[int, int], cell_size: float) -> np.ndarray:
     """The (K, 2) places on the grid [cells] of places on the Earth; y grows south."""
     if np.ptp(degrees[:, 0]) > 180:  # on both sides of the 180th meridian
         degrees = degrees + [360, 0] * (degrees < 0)
     middle = (degrees.min(0) + degrees.max(0)) / 2
     degree = math.radians(1) * EARTH_RADIUS  # of latitude [m]
     east = degree * math.cos(math.radians(middle[1])) / cell_size
-    return grid / 2 + (degrees - middle) * [east, -degree / cell_size]
+    return np.array(size) / 2 + (degrees - middle) * [east, -degree / cell_size]
 
 
-def _enough(cells: Sequence[Cell], grid: int, is_geographic: bool) -> str:
+def _enough(cells: Sequence[Cell], size: tuple[int, int], is_geographic: bool) -> str:
     """What would be allowed, such as a grid that is large enough, where cells are off the grid."""
-    beyond = max(max(-c, c - grid + 1) for cell in cells for c in cell)
-    needed = grid + 2 * beyond if is_geographic else grid + beyond
-    if needed > MAX_GRID or (not is_geographic and min(map(min, cells)) < 0):
+    sides = np.array(cells).T
+    beyond = [max(-side.min(), side.max() - n + 1, 0) for side, n in zip(sides, size, strict=True)]
+    needed = [n + b * (1 + is_geographic) for n, b in zip(size, beyond, strict=True)]
+    if size[0] == size[1]:
+        needed = [max(needed)] * 2
+    if max(needed) > MAX_GRID or (not is_geographic and min(map(min, cells)) < 0):
         return "a larger cell_size" if is_geographic else f"0 <= x, y < {MAX_GRID}"
-    return f"grid = {needed} or more" + (", or a larger cell_size" if is_geographic else "")
+    enough = f"grid = {needed[0]}" + (f", rows = {needed[1]}" if needed[0] != needed[1] else "")
+    return f"{enough} or more" + (", or a larger cell_size" if is_geographic else "")

@@ -1,0 +1,144 @@
+"""The chart of a sea: its charging zones, its no-fly cells and the ways between its cells.
+
+chart = load_scenario("bay").chart
+chart.zones[y, x]                  # the zone of a cell, OPEN or NO_FLY
+distance(chart, 3, 4, 10, 12)      # cells on the shortest way
+"""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from dess.code.kernels import inlined, kernel
+
+Cell = tuple[int, int]
+Rectangle = tuple[int, int, int, int]  # x, y, width and height
+
+# Cells in ``Chart.zones`` that are in no zone.
+OPEN, NO_FLY = -1, -2
+FAR = 2**15 - 1  # [cells]: there is no way
+
+
+class Chart(NamedTuple):
+    """The geometry that all missions of a batch share, for a grid of H rows and W columns.
+
+    Attributes:
+        zones: (H, W) the number of the charging zone of a cell, ``OPEN`` or ``NO_FLY``.
+        parking: (C, 2) the cells of the zones, zone by zone and row by row.
+        nearest: (H, W) the number of the parking cell that is nearest to a cell.
+        ways: (W * H, W * H) cells on the shortest way between two cells, numbered row by row, or
+            ``FAR``; (0, 0) where there are no no-fly cells.
+    """
+
+    zones: np.ndarray
+    parking: np.ndarray
+    nearest: np.ndarray
+    ways: np.ndarray
+
+
+def zones_of(
+    width: int, height: int, zones: Iterable[Rectangle], no_fly: Iterable[Cell]
+) -> np.ndarray:
+    """``Chart.zones`` of zones and no-fly cells that lie on the grid."""
+    cells = np.full((height, width), OPEN, np.int8)
+    for x, y in no_fly:
+        cells[y, x] = NO_FLY
+    for number, (x, y, columns, rows) in enumerate(zones):
+        cells[y : y + rows, x : x + columns] = number
+    return cells
+
+
+def parking_of(zones: Iterable[Rectangle]) -> list[Cell]:
+    """The cells of zones, zone by zone and row by row."""
+    return [
+        (left + i % width, top + i // width)
+        for left, top, width, height in zones
+        for i in range(width * height)
+    ]
+
+
+@lru_cache(maxsize=16)
+def chart_at(
+    width: int, height: int, zones: tuple[Rectangle, ...], no_fly: tuple[Cell, ...]
+) -> Chart:
+    """The chart of a grid with these zones and no-fly cells."""
+    cells = zones_of(width, height, zones, no_fly)
+    parking = np.array(parking_of(zones), np.int64)
+    nearest = spread(cells, parking)[1].reshape(cells.shape)
+    ways = np.zeros((0, 0), np.int16)
+    if no_fly:
+        ways = np.empty((cells.size, cells.size), np.int16)
+        for number, (y, x) in enumerate(np.ndindex(cells.shape)):
+            ways[number] = spread(cells, np.array([[x, y]]))[0]
+    return Chart(cells, parking, nearest, ways)
+
+
+def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The shortest ways from all cells to the nearest of some cells (breadth-first search).
+
+    Args:
+        zones: (H, W) as in ``Chart``.
+        sources: (S, 2) cells.
+
+    Returns:
+        (H * W,) the cells on the way, ``FAR`` where there is none, and (H * W,) the number of the
+        nearest source, the lowest on a tie.
+    """
+    lengths, nearest = np.full(zones.size, FAR, np.int16), np.zeros(zones.size, np.int16)
+    _spread(zones, sources, lengths, nearest)
+    return lengths, nearest
+
+
+@kernel
+def _spread(zones, sources, lengths, nearest):
+    height, width = zones.shape
+    queue = np.empty(zones.size, np.int64)
+    first = last = 0
+    for number in range(len(sources)):
+        x, y = sources[number, 0], sources[number, 1]
+        if zones[y, x] != NO_FLY:
+            cell = y * width + x
+            queue[last], lengths[cell], nearest[cell] = cell, 0, number
+            last += 1
+    while first < last:
+        cell = queue[first]
+        first += 1
+        for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
+            x, y = cell % width + step_x, cell // width + step_y
+            if not (0 <= x < width and 0 <= y < height) or zones[y, x] == NO_FLY:
+                continue
+            to = y * width + x
+            if lengths[to] == FAR:
+                queue[last], lengths[to], nearest[to] = to, lengths[cell] + 1, nearest[cell]
+                last += 1
+
+
+@inlined
+def is_open(chart, x, y):
+    """Whether cell ``x, y`` is on the grid, and no no-fly cell."""
+    height, width = chart.zones.shape
+    return 0 <= x < width and 0 <= y < height and chart.zones[y, x] != NO_FLY
+
+
+@inlined
+def in_zone(chart, x, y):
+    """Whether cell ``x, y`` of the grid is in a charging zone."""
+    return chart.zones[y, x] >= 0
+
+
+@inlined
+def distance(chart, x, y, to_x, to_y):
+    """The cells on the shortest way between two cells of the grid."""
+    if chart.ways.size == 0:
+        return abs(x - to_x) + abs(y - to_y)
+    width = chart.zones.shape[1]
+    return np.int64(chart.ways[to_y * width + to_x, y * width + x])
+
+
+@inlined
+def distance_home(chart, x, y):
+    """The cells on the shortest way from a cell to the nearest charging zone."""
+    number = chart.nearest[y, x]
+    return distance(chart, x, y, chart.parking[number, 0], chart.parking[number, 1])
