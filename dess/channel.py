@@ -48,12 +48,14 @@ class World(NamedTuple):
 
     Attributes:
         nodes: (K, 2) cells of the sensor nodes.
-        mean_snr: (M, F * (M - 1) + 1), M cells along the longer side, mean SNR [dB] at a distance of ``a`` cells along one axis
-            and ``b / F`` cells along the other. These are all relative positions from which a UAV
-            can serve a node. F is m, or a multiple of it if a move may take several slots.
-        order: (5 * W * H, K + 1) for each step on a grid of W x H cells, the nodes in descending order of their highest
-            mean SNR in the slot; the last column tells whether the row is filled. If a move may
-            take several slots, there are such rows for each leg (``fleet.leg``).
+        mean_snr: (M, F * (M - 1) + 1) mean SNR [dB] at a distance of ``a`` cells along one axis and
+            ``b / F`` cells along the other, where M is the longer side of the grid. These are all
+            relative positions from which a UAV can serve a node. F is m, or a multiple of it if a
+            move may take several slots.
+        order: (5 * W * H, K + 1) for each step on a grid of W x H cells, the nodes in descending
+            order of their highest mean SNR in the slot; the last column tells whether the row is
+            filled. If a move may take several slots, there are such rows for each leg
+            (``fleet.leg``).
         means: (5 * W * H, K, m) for each step, the mean SNR [dB] of the nodes in that order, per
             communication slot; rows as in ``order``.
         chart: The zones, the no-fly cells and the ways between cells.

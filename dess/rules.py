@@ -120,9 +120,9 @@ def resolve(mission, uavs, chart):
     """Safety controller (eq. 2, 5; Section III-B): move all active UAVs at the same time.
 
     A move off the grid or into a no-fly cell becomes Hover, and so does a move into a cell that
-    another active UAV will occupy. A cancelled move can block the move of another UAV, so the check is repeated until no
-    move is cancelled. The result does not depend on the numbering of the UAVs. A UAV in the middle
-    of a move flies on; the cell that it flies to is its own.
+    another active UAV will occupy. A cancelled move can block the move of another UAV, so the check
+    is repeated until no move is cancelled. The result does not depend on the numbering of the UAVs.
+    A UAV in the middle of a move flies on; the cell that it flies to is its own.
     """
     count = mission.uavs
     for i in range(count):

@@ -14,8 +14,8 @@ import numpy as np
 
 from dess import streams
 from dess.code.kernels import kernel
-from dess.errors import InputError
 from dess.constants import MOST_ZONES
+from dess.errors import InputError
 from dess.scenario import SAMPLED, Scenario, ScenarioSpace
 from dess.sections import fleet, wind
 from dess.sections.failures import MOST_PADS

@@ -82,7 +82,7 @@ class View:
 
     @cached_property
     def legal(self) -> np.ndarray:
-        """(R, 5) mask of the legal actions: Hover, and the moves to cells that are no no-fly cells."""
+        """(R, 5) mask of the legal actions: Hover, and the moves that stay on the open grid."""
         return legal_actions(self.state.uavs, self.world.chart, self.mission, self.uav)
 
 

@@ -29,7 +29,7 @@ def draw(space: ScenarioSpace, state: State, environment: int = 0) -> np.ndarray
         environment: The index of the mission in the state.
 
     Returns:
-        An image of shape (16 H, 16 W, 3) and type uint8 with north on top; the grid has W x H cells.
+        An image of shape (16 H, 16 W, 3) and type uint8 of W x H cells, with north on top.
     """
     uavs, residual = state.uavs[environment], state.residual[environment]
     cells = np.full((*space.chart.zones.shape, 3), _SEA, np.uint8)

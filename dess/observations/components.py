@@ -31,8 +31,8 @@ _MATE = ("active", "dx", "dy", "battery", "quota", "charging")  # all 0 after th
 def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
-    Positions and distances are divided by the largest cell index of the grid in that direction, battery, C_S and C_C
-    by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
+    Positions and distances are divided by the largest cell index in that direction, battery, C_S
+    and C_C by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
     end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has fewer
     UAVs than the largest fleet, the other rows are zeros.
 

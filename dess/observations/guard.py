@@ -6,7 +6,8 @@
 A UAV that cannot fill its quota with its present battery must be able to reach a free cell of the
 charging zone, with a margin of some slots for detours around teammates. The rules are described in
 ``docs/concepts/return-guard.md``. The functions below are compiled and work on the arrays of one
-mission; ``chart`` is that of ``dess.sea.chart``, ``reach`` the table of ``dess.observations.reach``.
+mission; ``chart`` is a ``dess.sea.chart.Chart``, ``reach`` the table of
+``dess.observations.reach``.
 """
 
 import numpy as np
@@ -180,8 +181,8 @@ def waiting_time(mission, uavs, i, chart):
 
     Before it, pads are given to the teammates there that have asked, and to those in the air that
     must charge, are nearest to this zone and have less battery (on a tie, a lower index). If they
-    take all pads that work, it waits until they are charged. More than C_S is of no use, since a UAV may ask for a pad only at
-    or below C_S.
+    take all pads that work, it waits until they are charged. More than C_S is of no use, since a
+    UAV may ask for a pad only at or below C_S.
 
     Args:
         mission: ``MISSION`` record.
@@ -287,8 +288,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
     moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
     to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
-    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate may occupy:
-    otherwise two UAVs could block each other until the battery of one of them is depleted.
+    teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
+    may occupy: otherwise two UAVs could block each other until the battery of one of them is depleted.
 
     Args:
         mission: ``MISSION`` record.

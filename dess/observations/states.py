@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import kernel
+from dess.errors import InputError
 from dess.observations import guard
 from dess.observations.reach import reach_of
-from dess.errors import InputError
 from dess.rules import data_left, legal_moves, may_act
 from dess.scenario import ScenarioSpace
 from dess.sea.chart import Chart, zones_of
@@ -78,10 +78,12 @@ def layout_of(space: ScenarioSpace) -> Layout:
     Raises:
         InputError: If it has no such layout.
     """
-    for field, allowed in (("rows", "a square grid"), ("zones", "one zone"), ("no_fly", "none")):
+    needs = {"rows": "a square grid", "zones": "a single zone", "no_fly": "no no-fly cells"}
+    for field, allowed in needs.items():
         if space.has(field):
             raise InputError(
-                f"{field}: an observation vector, nodes or maps does not have it; allowed: {allowed}"
+                f"{field}: the observations vector, nodes and maps need {allowed}; "
+                "allowed: the observation state"
             )
     return Layout(space.grid, np.array(space.zone), np.array(space.nodes))
 

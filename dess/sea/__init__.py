@@ -1,1 +1,1 @@
-"""The sea: where its nodes and no-fly cells are, read from files, and the ways between its cells."""
+"""The sea: its nodes and no-fly cells, read from files, and the ways between its cells."""

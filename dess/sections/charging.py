@@ -24,7 +24,8 @@ class Charging(Section):
         0,
         ge=0,
         le=6400,
-        description="battery that all pads of a zone together can add in a slot [%]; 0 for no limit",
+        description="battery that all pads of a zone together can add in a slot [%]; 0 for no "
+        "limit",
     )
     measured: bool = Field(
         False, description="whether records have the queue, waiting time and use of the pads"
