@@ -120,6 +120,7 @@ PARAMETERS = {
 _OTHERS = {
     "pads": Parameter("Number of charging pads", "Pads"),
     "zone": Parameter("Start and charging zone", "Zone"),
+    "zones": Parameter("Further charging zones", "Zones"),
     "nodes": Parameter("Sensor nodes", "Nodes"),
     "quota": Parameter("Communication quota", "Quota", "communication slots"),
     "arrival_rate": Parameter("Arrival rate", "Arrivals", "data units per node and slot"),
@@ -136,7 +137,7 @@ _OTHERS = {
 
 # The fields that an operator decides on. All other fields are conditions that a fleet has to meet.
 DECISIONS = (
-    *("uavs", "pads", "zone", "forbid_swaps", "altitude"),
+    *("uavs", "pads", "zone", "zones", "forbid_swaps", "altitude"),
     *("flying_time", "charge_start", "charge_complete", "charge_rate"),
 )
 

@@ -5,6 +5,7 @@ class Mine(Adapter):   # in my_policies.py, for dess evaluate --policy my_polici
         super().__init__("mine", load_network(FILE), guarded=True, weights=FILE)
 """
 
+from ast import literal_eval
 from collections.abc import Callable
 from functools import lru_cache
 from hashlib import sha256
@@ -17,10 +18,10 @@ from dess.env.stepper import checked_actions
 from dess.files.reading import read_bytes
 from dess.observations.observer import Observer
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import geometry
 from dess.view import View
 
 LIMIT = 2**32  # bytes of the largest file of weights
-_ZONE = ("zone_x", "zone_y", "zone_width", "zone_height")
 
 
 class Adapter:
@@ -67,24 +68,14 @@ class Adapter:
         Raises:
             InputError: If there is no such observation, or the function returns no actions.
         """
-        actions = np.empty(len(view), np.int64)
-        zones, zone_of = np.unique(view.constants[[*_ZONE]], return_inverse=True)
-        for number, zone in enumerate(zones.tolist()):
-            rows = np.flatnonzero(zone_of == number)
-            seen = self._observer(view, zone).observe(
-                view.state, view.mission[rows], view.uav[rows]
-            )
-            actions[rows] = checked_actions(self._choose(*seen), rows.shape)
-        return actions
-
-    def _observer(self, view: View, zone: tuple[int, ...]) -> Observer:
-        """The observer for the missions of the view with this zone."""
-        fleet, grid = view.state.uavs.shape[1], int(view.constants["grid"][0])
-        nodes = tuple(map(tuple, view.world.nodes.tolist()))
-        return _observer(self.observation, self.guarded, fleet, grid, zone, nodes)
+        fleet, sea = view.state.uavs.shape[1], geometry(view.world.chart)
+        nodes = view.world.nodes.tolist()
+        observer = _observer(self.observation, self.guarded, fleet, repr((sea, nodes)))
+        seen = observer.observe(view.state, view.mission, view.uav)
+        return checked_actions(self._choose(*seen), view.mission.shape)
 
 
 @lru_cache
-def _observer(kind: str, guarded: bool, uavs: int, grid: int, zone: Any, nodes: Any) -> Observer:
-    space = ScenarioSpace.of(uavs=uavs, grid=grid, zone=zone, nodes=nodes)
-    return Observer(space, kind, guarded)
+def _observer(kind: str, guarded: bool, uavs: int, sea: str) -> Observer:
+    fields, nodes = literal_eval(sea)
+    return Observer(ScenarioSpace.of(uavs=uavs, nodes=nodes, **fields), kind, guarded)

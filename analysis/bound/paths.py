@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
-from dess.rules import in_zone
 from dess.state import STEP_X, STEP_Y
 
 CHARGE, STOP = 5, 6  # what a UAV can do besides the actions
@@ -66,16 +65,22 @@ def data_had(data, phases, phase, f):
 @inlined
 def may_charge(mission, phases, phase, f, x, y):
     """Whether a UAV may charge after f flying slots."""
-    return phases.opens[phase] <= f <= phases.closes[phase] and in_zone(mission, x, y)
+    return phases.opens[phase] <= f <= phases.closes[phase] and _home(mission, x, y) == 0
 
 
 @inlined
 def _is_reached(mission, phases, phase, f, x, y):
     """Whether a UAV can be in a cell after f flying slots: it has left the zone before them."""
     radius = f if phase == 0 else f - phases.opens[0]
+    return _home(mission, x, y) <= radius
+
+
+@inlined
+def _home(mission, x, y):
+    """The cells from a cell to the zone, if no no-fly cell is in the way."""
     east, south = mission.zone_x + mission.zone_width, mission.zone_y + mission.zone_height
     along_x = max(mission.zone_x - x, x - east + 1, 0)
-    return along_x + max(mission.zone_y - y, y - south + 1, 0) <= radius
+    return along_x + max(mission.zone_y - y, y - south + 1, 0)
 
 
 @inlined

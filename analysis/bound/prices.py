@@ -97,7 +97,7 @@ def upper_bound(
         iterations: How many prices are tried.
 
     Raises:
-        InputError: If the scenario has a section, or the seed or the replication is out of range.
+        InputError: If the scenario has no bound, or the seed or the replication is out of range.
     """
     check_scenario(scenario)
     return improve(known_of(scenario, seed, replication), iterations, Detail())
@@ -106,11 +106,19 @@ def upper_bound(
 def check_scenario(scenario: ScenarioSpace) -> None:
     """Refuse a scenario whose missions have no bound.
 
+    No-fly cells are allowed: who may fly over them collects no less, so the bound stays valid.
+
     Raises:
-        InputError: If it has a section beyond the paper, or a bound takes too much memory.
+        InputError: If it has a section beyond the paper, several zones or a grid that is not
+            square, or if a bound takes too much memory.
     """
     if scenario.is_extended:
         raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
+    if scenario.rows or scenario.zones:
+        raise InputError(
+            "bound: the sea has several charging zones or is not square; allowed: one zone on a "
+            "square grid"
+        )
     memory = ceilings_memory(scenario, Detail())
     if memory > MOST_MEMORY:
         raise InputError(

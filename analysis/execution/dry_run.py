@@ -158,12 +158,16 @@ def check_effort(
 
 
 def _check_policies(study: Study) -> None:
-    """Check that every policy can act on every layout of the design (grid, zone and nodes).
+    """Check that every policy can act on every layout of the design (zones, no-fly cells, nodes).
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
     spaces = (point.scenario for point in study.points)
-    places = [*{(space.grid, space.zone, space.nodes): space for space in spaces}.values()]
+    places = [
+        *{
+            (space.size, space.rectangles, space.no_fly, space.nodes): space for space in spaces
+        }.values()
+    ]
     for policy in study.policies:
         try:
             team = load_team(policy, max(space.uavs[1] for space in places))

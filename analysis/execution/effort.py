@@ -5,6 +5,7 @@ unless ``--yes`` is given. Functions of Python have the same checks where they h
 ``yes``; ``run_study``, ``evaluate`` and ``simulate_batch`` do what they are asked to do.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
@@ -152,6 +153,5 @@ def check_workers_memory(
 def mission_memory(space: ScenarioSpace) -> float:
     """The memory [bytes] of the packets, and the tables of ``dess.channel.World``, all filled."""
     nodes = len(space.nodes)
-    return PACKET_MEMORY * space.packets + 5 * space.grid**2 * (
-        8 * nodes * space.communication_slots + 2 * (nodes + 1)
-    )
+    steps = 5 * math.prod(space.size) * (8 * nodes * space.communication_slots + 2 * (nodes + 1))
+    return PACKET_MEMORY * space.packets + steps + space.chart.ways.nbytes

@@ -80,14 +80,17 @@ def trajectories(events: Events, scenario: Scenario, ax: Axes) -> None:
 
 
 def chart(scenario: Scenario | ScenarioSpace, ax: Axes) -> None:
-    """The grid and its zone, without nodes; y grows south."""
-    x, y, width, height = scenario.zone
-    ends = (-0.5, scenario.grid - 0.5)
+    """The grid with its zones and no-fly cells, without nodes; y grows south."""
+    columns, rows = scenario.size
     ax.set_facecolor(style.SEA)
     ax.grid(False)
-    ax.add_patch(Rectangle((x - 0.5, y - 0.5), width, height, facecolor=style.ZONE,
-                           edgecolor=style.ZONE_EDGE, zorder=1))  # fmt: skip
-    ax.set(aspect="equal", xlim=ends, ylim=ends[::-1], ylabel="y, south [cells]")
+    for x, y in scenario.no_fly:
+        ax.add_patch(Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=style.LAND, zorder=1))
+    for x, y, width, height in scenario.rectangles:
+        ax.add_patch(Rectangle((x - 0.5, y - 0.5), width, height, facecolor=style.ZONE,
+                               edgecolor=style.ZONE_EDGE, zorder=1))  # fmt: skip
+    ax.set(aspect="equal", xlim=(-0.5, columns - 0.5), ylim=(rows - 0.5, -0.5))
+    ax.set_ylabel("y, south [cells]")
     ax.set_xlabel(f"x, east [cells of {scenario.cell_size:g} m]")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(integer=True, nbins=8))

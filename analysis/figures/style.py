@@ -28,7 +28,7 @@ Look: TypeAlias = tuple[str, str]  # a colour and a marker
 Values: TypeAlias = Literal["x", "y", "xy"]
 
 INK, MUTED, GRID = "#22303c", "#7a8791", "#dde4e9"
-SEA, ZONE, ZONE_EDGE = "#f3f8fb", "#ffe08a", "#d9a400"  # of maps
+SEA, ZONE, ZONE_EDGE, LAND = "#f3f8fb", "#ffe08a", "#d9a400", "#cdbf9f"  # of maps
 UAVS = ("#1b1b1b", "#b3123f", "#1f5fbf", "#00734d", "#8a4b00", "#7b2fa0", "#007a8a", "#66707a")
 # Policies that look the same in all figures, whatever other policies are drawn.
 KNOWN_POLICIES = (

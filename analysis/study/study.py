@@ -283,12 +283,12 @@ class Study(StudyData):
         return Point(row.values, self._scenario_at(row.values), row.replication)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
-        if not values.keys() & {"grid", "cell_size"}:  # these move the nodes of a file
+        if not values.keys() & {"grid", "rows", "cell_size"}:  # these move the nodes of a file
             with suppress(InputError):  # raised below, in the words of the scenario's file
                 return ScenarioSpace.of(**self._fields | values)
         try:
             space = load_scenario(self.scenario, **self.set, **values)
-            for field in ("grid", "cell_size"):
+            for field in ("grid", "rows", "cell_size"):
                 if field in values and "nodes" not in values and space.nodes != self._base.nodes:
                     raise InputError(f"{field} moves the nodes of a file; allowed: nodes as cells")
             return space

@@ -110,9 +110,7 @@ def battery_errors(log: Log) -> np.ndarray:
     flown = (before - s.flight_cost * (1 + _surcharges(s, table))).clip(lower=0)
     flown = flown.where(~table["grounded"], before)
     right = (table["battery"] == flown).where(~charging, _charges_rightly(s, table, before))
-    x, y, width, height = s.zone
-    parked = table["x"].between(x, x + width - 1) & table["y"].between(y, y + height - 1)
-    right &= ~charging | (parked & ~table["moved"])
+    right &= ~charging | ((_zone_of(s, table) >= 0) & ~table["moved"])
     level = np.select([before >= s.charge_complete, before <= s.charge_start], [0, 1], np.nan)
     latch = pd.Series(level).groupby(table["uav"]).ffill() == 1
     begins = charging & ~charging.groupby(table["uav"]).shift(fill_value=False)
@@ -124,6 +122,11 @@ def battery_errors(log: Log) -> np.ndarray:
     return (~right).to_numpy()
 
 
+def _zone_of(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
+    """(N,) the number of the charging zone in which each UAV is; negative for none."""
+    return scenario.chart.zones[table["y"].to_numpy(), table["x"].to_numpy()]
+
+
 def _first_battery(scenario: Scenario) -> dict[int, int]:
     """The battery of each UAV at the start [%]."""
     types = [type_of(scenario.fleet, i) for i in range(scenario.uavs)]
@@ -133,7 +136,7 @@ def _first_battery(scenario: Scenario) -> dict[int, int]:
 def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
     """(N,) the battery [%] that the wind costs in each UAV slot; a move pays in its first."""
     wind = scenario.wind
-    field = surcharges(scenario.grid, *wind.push(), wind.gusts, wind.seed)
+    field = surcharges(scenario.size, *wind.push(), wind.gusts, wind.seed)
     x, y = table["x"].to_numpy(), table["y"].to_numpy()
     step_x, step_y = x - table["from_x"], y - table["from_y"]
     action = np.select([step_y < 0, step_x > 0, step_y > 0], [NORTH, EAST, SOUTH], WEST)
@@ -141,11 +144,11 @@ def _surcharges(scenario: Scenario, table: pd.DataFrame) -> np.ndarray:
 
 
 def _charges_rightly(scenario: Scenario, table: pd.DataFrame, before: pd.Series) -> pd.Series:
-    """Whether a UAV that charges gains what it can, or all UAVs together gain the shared power."""
-    s, charging, slot = scenario, table["charging"], table["slot"]
+    """Whether a UAV that charges gains what it can, or all in its zone gain the shared power."""
+    s, charging, place = scenario, table["charging"], [table["slot"], _zone_of(scenario, table)]
     wanted = (s.charge_complete - before).clip(upper=s.charge_rate).where(charging, 0)
     gain = (table["battery"] - before).where(charging, 0)
     power = s.charging.power or s.charging_pads * s.charge_rate
-    of_all = gain.groupby(slot).transform("sum")
-    shared = wanted.groupby(slot).transform("sum").clip(upper=power)
+    of_all = gain.groupby(place).transform("sum")
+    shared = wanted.groupby(place).transform("sum").clip(upper=power)
     return gain.between(0, wanted) & (of_all == shared)

@@ -33,7 +33,7 @@ def distance(scenario: World, dx: Any, dy: Any) -> Any:
 
 def mean_snr(scenario: World, distance: Any) -> Any:
     """Mean SNR [dB] at a distance [m] (eq. 10)."""
-    edge = np.sqrt(2) / 2 * scenario.grid * scenario.cell_size
+    edge = np.hypot(*scenario.size) / 2 * scenario.cell_size
     return scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
 
 

@@ -32,9 +32,9 @@ def component_names(scenario: Scenario | ScenarioSpace) -> list[str]:
     """The names of the F components of an observation.
 
     Positions and distances are divided by the largest cell index in that direction, battery, C_S
-    and C_C by 100, communications by the quota, the slot by ``max_slots``, and residual data by the high
-    end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has fewer
-    UAVs than the largest fleet, the other rows are zeros.
+    and C_C by 100, communications by the quota, the slot by ``max_slots``, and residual data by the
+    high end of ``initial_data``. A UAV that has ended keeps its last state. Where a mission has
+    fewer UAVs than the largest fleet, the other rows are zeros.
 
     Scenarios beyond the paper have more components at the end: the share of the pads that are out
     of order, the surcharge of each move by the wind divided by 100, and ages divided by

@@ -289,7 +289,8 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
     moves into a cell that a teammate with the right of way may take; the UAV may spend its margin
     to let this teammate pass. Moves off the grid, into a no-fly cell and into the cell of a parked
     teammate are never safe. A UAV that has just been overruled also avoids cells that a teammate
-    may occupy: otherwise two UAVs could block each other until the battery of one of them is depleted.
+    may occupy: otherwise two UAVs could block each other until the battery of one of them is
+    depleted.
 
     Args:
         mission: ``MISSION`` record.

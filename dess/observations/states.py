@@ -63,7 +63,7 @@ class Layout(NamedTuple):
     @property
     def zones(self) -> np.ndarray:
         """``Chart.zones`` of the layout."""
-        return zones_of(self.grid, self.grid, [self.zone], [])
+        return zones_of(self.grid, self.grid, [tuple(self.zone.tolist())], [])
 
     def zone_slots(self, cells: np.ndarray) -> np.ndarray:
         """(N,) slots from each of (N, 2) cells to the nearest cell of the zone."""

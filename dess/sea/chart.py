@@ -7,7 +7,7 @@ distance(chart, 3, 4, 10, 12)      # cells on the shortest way
 
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -73,6 +73,21 @@ def chart_at(
         for number, (y, x) in enumerate(np.ndindex(cells.shape)):
             ways[number] = spread(cells, np.array([[x, y]]))[0]
     return Chart(cells, parking, nearest, ways)
+
+
+def geometry(chart: Chart) -> dict[str, Any]:
+    """The fields of a scenario that have this chart, but for the pads of the zones."""
+    rows, columns = chart.zones.shape
+    corners = [np.argwhere(zone == chart.zones.T) for zone in range(chart.zones.max() + 1)]
+    zones = [[*cells[0].tolist(), *np.ptp(cells, 0).tolist()] for cells in corners]
+    rectangles = [[x, y, width + 1, height + 1] for x, y, width, height in zones]
+    return {
+        "grid": columns,
+        "rows": None if rows == columns else rows,
+        "zone": rectangles[0],
+        "zones": [{"cells": cells} for cells in rectangles[1:]],
+        "no_fly": np.argwhere(chart.zones.T == NO_FLY).tolist(),
+    }
 
 
 def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

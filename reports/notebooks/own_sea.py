@@ -112,10 +112,11 @@ html.say("{lines}", lines=html.commands([answer.command]))
 
 # %%
 html.say(
-    "The sea has {nodes} sensor nodes on {grid} x {grid} cells of {size:g} m. The sweep has "
+    "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
     "{settings} settings and simulated {n:,} missions.",
     nodes=len(sea.nodes),
-    grid=sea.grid,
+    columns=sea.size[0],
+    rows=sea.size[1],
     size=sea.cell_size,
     settings=len(costs),
     n=len(answer.results.missions),

@@ -77,7 +77,8 @@ class Playback:
         filled = log.loc[log["event"] == "quota_filled", "uav"]
         aged = scenario.age.measured
         return {
-            **{name: getattr(scenario, name) for name in ("grid", "zone", "nodes")},
+            **{"size": scenario.size, "zones": scenario.rectangles},
+            **{"nodes": scenario.nodes, "noFly": scenario.no_fly},
             "thresholds": {"C_S": scenario.charge_start, "C_C": scenario.charge_complete},
             "colours": {"uavs": self.uav_colours, "nodes": self.node_colours},
             "pads": scenario.charging_pads,

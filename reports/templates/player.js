@@ -4,6 +4,7 @@ function playMission(id, mission) {
     "use strict";
     const INK = "{{ style.INK }}", MUTED = "{{ style.MUTED }}", GRID = "{{ style.GRID }}";
     const SEA = "{{ style.SEA }}", ZONE = "{{ style.ZONE }}", ZONE_EDGE = "{{ style.ZONE_EDGE }}";
+    const LAND = "{{ style.LAND }}";
     const WIDE = 720; // width [px] from which the curves are beside the map, and not below it
     const NODE = 12.5, UAV = 8, PAD = 10.5; // radii of the largest disc and of a UAV, half a square
     const figure = document.getElementById(id), canvas = figure.querySelector("canvas");
@@ -79,10 +80,15 @@ function playMission(id, mission) {
     const radius = (data) => NODE * Math.sqrt(data / largest);
 
     function map(box) {
-        const size = [-0.5, mission.grid - 0.5], [x, y, w, h] = mission.zone;
-        const numbers = steps([0, mission.grid - 1], 7);
-        const p = panel("", box, size, size, () => {
-            rectangle(p.px(x - 0.5), p.py(y - 0.5), p.px(w) - p.px(0), p.py(h) - p.py(0), ZONE, ZONE_EDGE);
+        const [columns, rows] = mission.size, longest = Math.max(columns, rows);
+        const scale = box.w / longest;
+        box = { ...box, w: scale * columns, h: scale * rows };
+        const numbers = (cells) => steps([0, longest - 1], 7).filter((v) => v < cells);
+        const cells = (x, y, w, h, fill, edge) =>
+            rectangle(p.px(x - 0.5), p.py(y - 0.5), w * scale, h * scale, fill, edge);
+        const p = panel("", box, [-0.5, columns - 0.5], [-0.5, rows - 0.5], () => {
+            mission.noFly.forEach(([x, y]) => cells(x, y, 1, 1, LAND));
+            mission.zones.forEach((zone) => cells(...zone, ZONE, ZONE_EDGE));
             nodes.forEach(([x, y], k) => disc(p.px(x), p.py(y), radius(most[k]), "white", mission.colours.nodes[k]));
         }, (t) => {
             const at = (s, i) => [p.px(fleet.x[s][i]), p.py(fleet.y[s][i])];
@@ -102,7 +108,7 @@ function playMission(id, mission) {
                 text(i + 1, x, y + 0.5, "center", "bold 11px", "white");
                 pen.globalAlpha = 1;
             });
-        }, { fill: SEA, xTicks: numbers, yTicks: numbers, xTitle: "x, east [cells]", isMap: true });
+        }, { fill: SEA, xTicks: numbers(columns), yTicks: numbers(rows), xTitle: "x, east [cells]", isMap: true });
         return p;
     }
 

@@ -106,12 +106,10 @@ def at_home(results: Results, policies: Sequence[str]) -> pd.DataFrame:
         A row per policy and slot: ``policy``, ``slot``, ``share``, and ``n``, the number of UAVs
         whose mission is not over. Slots with less than half of the UAVs of slot 0 have no row.
     """
-    left, top, width, height = results.scenario().zone
-    tables = []
+    zones, tables = results.scenario().chart.zones, []
     for policy in policies:
         slots = pd.concat([uav_slots(events) for events in _logs(results, policy)])
-        inside = slots["x"].between(left, left + width - 1)
-        inside &= slots["y"].between(top, top + height - 1)
+        inside = pd.Series(zones[slots["y"], slots["x"]] >= 0, slots.index)
         rows = inside.groupby(slots["slot"]).agg(share="mean", n="size").reset_index()
         tables.append(rows[rows["n"] >= rows["n"].iloc[0] / 2].assign(policy=policy))
     return pd.concat(tables, ignore_index=True)
