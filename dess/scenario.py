@@ -17,6 +17,7 @@ from pydantic.fields import FieldInfo
 from dess.constants import (
     AS_RANGE,
     EXTENSIONS,
+    GEOMETRY,
     MOST_CELLS,
     MOST_DATA,
     MOST_NODES,
@@ -35,7 +36,7 @@ from dess.sections.section import Integer, Number, Section
 
 __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
 __all__ += ["scenario_description", "dotted", "merged", "validated", "Integer", "Number"]
-__all__ += ["EXTENSIONS", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
+__all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
