@@ -144,7 +144,8 @@ def _value(space: ScenarioSpace, field: str) -> str:
         return _counted(len(value), "cell")
     if field == "zones":
         value = [
-            f"{[*zone.cells]}, {_counted(n, 'pad')}" for zone, n in zip(value, space.zone_pads[1:])
+            f"{[*zone.cells]}, {_counted(n, 'pad')}"
+            for zone, n in zip(value, space.zone_pads[1:], strict=True)
         ]
         return "; ".join(value)
     if field in SAMPLED or field == "initial_data":
