@@ -171,6 +171,27 @@ def answers(results: Results, table: pd.DataFrame) -> list[str]:
     return sentences
 
 
+def answer(results: Results) -> str:
+    """In words: the cheapest setting of the first policy, and what the others would have said.
+
+    If there are several conditions, it is the setting for all of them together.
+    """
+    table, first = judged(results), results.policies[0]
+    return " ".join([answers(results, table[table["policy"] == first])[-1], *dependence(results)])
+
+
+def dependence(results: Results) -> list[str]:
+    """A sentence for each further policy: what its cheapest fleet is, so how much depends on it."""
+    fleets = selections(results).groupby("policy", sort=False)["setting"].last()
+    first, *others = results.policies
+    return [
+        f"`{policy}` gives the same answer."
+        if fleets[policy] == fleets[first]
+        else f"With `{policy}`, it would be **{fleets[policy]}**."
+        for policy in others
+    ]
+
+
 def cheapest_fleet(results: Results) -> str:
     """The cheapest fleet of the first policy that meets the requirements under every condition."""
     found = selections(results)

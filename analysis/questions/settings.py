@@ -59,7 +59,7 @@ def points(results: Results) -> pd.DataFrame:
     for field in manifest.values[0]:
         values = [of_point[field] for of_point in manifest.values]
         if field == "pads":  # without a number, it depends on the zone
-            values = [results.scenario(number).charging_pads for number in range(len(values))]
+            values = [results.scenario(number).zone_pads[0] for number in range(len(values))]
         texts = _texts(field, values)
         if len({*texts}) > 1:
             columns[field] = texts
