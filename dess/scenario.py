@@ -31,11 +31,21 @@ from dess.constants import (
 )
 from dess.errors import InputError, one_of
 from dess.files.shipped import Shipped
+from dess.sea.families import FAMILIES, is_generated, sea_of
 from dess.sea.files import nodes_in
 from dess.sections.section import Integer, Number, Section
 
 __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
-__all__ += ["scenario_description", "dotted", "merged", "validated", "Integer", "Number"]
+__all__ += [
+    "scenario_description",
+    "scenario_families",
+    "is_scenario_name",
+    "dotted",
+    "merged",
+    "validated",
+    "Integer",
+    "Number",
+]
 __all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
@@ -159,18 +169,19 @@ def fields_of(model: type[Constants]) -> dict[str, FieldInfo]:
 
 
 def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> ScenarioSpace:
-    """A shipped scenario by name, or one from a TOML file.
+    """A shipped scenario by name, a generated one by family and seed, or one from a TOML file.
 
     Args:
-        name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
-            ``nodes`` may be the name of a file in the same folder, which ``dess.sea.files`` reads.
+        name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
+            (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` may be
+            the name of a file in the same folder, which ``dess.sea.files`` reads.
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
     Raises:
         InputError: If there is no such scenario, or it is not valid.
     """
-    where, read = _SCENARIOS.load(name_or_path)
+    where, read = _read(name_or_path)
     read.pop("description", None)
     values = merged(read, overrides)
     if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
@@ -186,10 +197,28 @@ def scenario_names() -> list[str]:
     return _SCENARIOS.names()
 
 
+def scenario_families() -> dict[str, str]:
+    """The families of generated seas as ``FAMILY:SEED``, each with its description."""
+    return {f"{name}:SEED": f"{f.description}, e.g. {name}:7" for name, f in FAMILIES.items()}
+
+
+def is_scenario_name(name: str) -> bool:
+    """Whether a scenario is named by what is shipped or generated, and not by its file."""
+    return name in scenario_names() or is_generated(name)
+
+
 def scenario_description(name_or_path: str | Path) -> str:
     """What a scenario is about, as its file says under ``description``.
 
     Raises:
         InputError: If there is no such scenario.
     """
-    return str(_SCENARIOS.load(name_or_path)[1].get("description", ""))
+    return str(_read(name_or_path)[1].get("description", ""))
+
+
+def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
+    """The name or path of a scenario, for messages, and its fields."""
+    name = str(name_or_path)
+    if is_generated(name):
+        return f"scenario {name}", sea_of(name)
+    return _SCENARIOS.load(name_or_path, others=scenario_families())

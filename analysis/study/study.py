@@ -27,7 +27,7 @@ from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
 from dess.record import measures_of
-from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
+from dess.scenario import Integer, ScenarioSpace, dotted, is_scenario_name, load_scenario
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
 from policies.registry import load_team, typed
@@ -313,7 +313,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     where, values = _STUDIES.load(name_or_path)
     values = {"name": text if text in study_names() else Path(text).stem} | values
     scenario = values.get("scenario")
-    if isinstance(scenario, str) and scenario not in scenario_names():
+    if isinstance(scenario, str) and not is_scenario_name(scenario):
         values["scenario"] = str(Path(text).parent / scenario)
     if "policies" in overrides:
         overrides["policies"] = typed(overrides["policies"])

@@ -36,7 +36,7 @@ from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
-from dess.scenario import load_scenario, scenario_names
+from dess.scenario import is_scenario_name, load_scenario
 from policies.registry import typed
 
 LONGEST = 60  # largest number of characters for the fields in a name
@@ -173,7 +173,7 @@ def write(study: Study, folder: str | Path) -> Path:
     """Write the file of the study, which ``dess study run`` reads, and return its path."""
     path = file_of(study, folder)
     data = study.model_dump(mode="json", exclude_unset=True)
-    if study.scenario not in scenario_names():
+    if not is_scenario_name(study.scenario):
         data["scenario"] = Path(os.path.relpath(study.scenario, path.parent)).as_posix()
     write_file(path, tomli_w.dumps(data))
     return path
