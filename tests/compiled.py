@@ -6,18 +6,18 @@ from dess.observations import guard
 
 
 @kernel
-def resolve(mission, uavs):
-    rules.resolve(mission, uavs)
+def resolve(mission, uavs, chart):
+    rules.resolve(mission, uavs, chart)
 
 
 @kernel
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, batches, search,
+    nodes, mean_snr, order, means, chart, batches, search,
 ):  # fmt: skip
     rules.advance(
         mission, uavs, residual, sensors, teeth, arrivals,
-        nodes, mean_snr, order, means, batches, search,
+        nodes, mean_snr, order, means, chart, batches, search,
     )  # fmt: skip
 
 
@@ -27,5 +27,5 @@ def must_charge(mission, u, data):
 
 
 @kernel
-def waiting_time(mission, uavs, i):
-    return guard.waiting_time(mission, uavs, i)
+def waiting_time(mission, uavs, i, chart):
+    return guard.waiting_time(mission, uavs, i, chart)
