@@ -1,8 +1,11 @@
 """Rules that exist only inside compiled functions, so that tests can call them one by one."""
 
+import numpy as np
+
 from dess import rules
 from dess.code.kernels import kernel
 from dess.observations import guard
+from dess.sea.chart import FAR, distance, is_open
 
 
 @kernel
@@ -29,3 +32,13 @@ def must_charge(mission, u, data):
 @kernel
 def waiting_time(mission, uavs, i, chart):
     return guard.waiting_time(mission, uavs, i, chart)
+
+
+@kernel
+def distances(chart, x, y, to):
+    """Shortest ways from cells, which may be closed, to cells."""
+    found = np.full(len(x), FAR)
+    for row in range(len(x)):
+        if is_open(chart, x[row], y[row]):
+            found[row] = distance(chart, x[row], y[row], to[row, 0], to[row, 1])
+    return found

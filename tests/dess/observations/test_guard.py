@@ -1,5 +1,6 @@
 """The return guard: UAVs that follow it reach the charger in time."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
