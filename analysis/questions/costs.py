@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, DECISIONS, METRICS, SUCCESS, parameter, value_text
-from analysis.questions.settings import points, ranked
+from analysis.names import COST, DECISIONS, METRICS, SUCCESS
+from analysis.questions.settings import points, ranked, value_in_words
 from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
 from analysis.study.cheapest import Cheapest, CheapestChoice
@@ -29,7 +29,6 @@ from dess.errors import InputError, one_of
 MISSED, OPEN, MET = "missed", "open", "met"  # the most serious first
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables
 EVERYWHERE = "all conditions"
-_UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
 _WHY_NOT = {
     MET: "meets the requirements as well, and saves less than the indifference",
     OPEN: "is not known to meet the requirements",
@@ -298,13 +297,6 @@ def _words(results: Results, decisions: bool) -> list[list[str]]:
     """The fields of every design point that an operator decides on, or all others, in words."""
     rows = points(results).to_dict("records")
     return [
-        [_value(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions] for r in rows
+        [value_in_words(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions]
+        for r in rows
     ]
-
-
-def _value(field: str, value: Any) -> str:
-    """``3 UAVs``, or ``arrival rate 0.02``."""
-    text = value_text(value)
-    if unit := _UNITS.get(field):
-        return f"{text} {unit}{'' if text == '1' else 's'}"
-    return f"{parameter(field).within} {text}"

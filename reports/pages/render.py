@@ -189,7 +189,8 @@ def _check_results(folder: Path) -> None:
 
 def _page(report: Report) -> str:
     """The page of a report that has been run."""
-    code = Markup(highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter()))
+    code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
+    code = Markup(code.replace("<pre>", '<pre tabindex="0">', 1))  # it scrolls on a phone
     body = body_of(report.notebook)
     return fill("report.html", scripts=report.scripts, report=report, body=body, code=code)
 
