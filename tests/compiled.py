@@ -14,8 +14,8 @@ def resolve(mission, uavs, chart):
 
 
 @kernel
-def move(mission, uavs):
-    rules.resolve(mission, uavs)
+def move(mission, uavs, chart):
+    rules.resolve(mission, uavs, chart)
     rules.grant_pads(mission, uavs)
     rules.spend(mission, uavs)
 

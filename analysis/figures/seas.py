@@ -10,7 +10,7 @@ def groups(table: pd.DataFrame, by: str, title: str) -> Figure:
     """What every policy reaches in groups of seas, with intervals.
 
     Args:
-        table: Rows of ``analysis.questions.seas.quality`` or ``shares``.
+        table: Rows of ``analysis.questions.optimality.seas.quality`` or ``shares``.
         by: The column of the groups.
         title: Of the vertical axis.
     """

@@ -124,7 +124,7 @@ class TinySea:
         for actions in product(range(5), repeat=len(team)):
             self._set(slot, team)
             self.uavs["action"] = actions
-            compiled.move(self.mission, self.uavs)
+            compiled.move(self.mission, self.uavs, self.space.chart)
             moved[self._team()] = None
         for after in moved:
             outcomes = self._flown(team, after, residual, self.data[slot + 1] - self.data[slot])

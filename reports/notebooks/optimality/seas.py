@@ -26,7 +26,8 @@ from analysis import load_results
 from analysis.figures import fronts
 from analysis.figures import seas as figures
 from analysis.names import METRICS, PRODUCT, SUCCESS
-from analysis.questions import decision_times, seas
+from analysis.questions import decision_times
+from analysis.questions.optimality import seas
 from reports import tables
 from reports.pages import html
 
