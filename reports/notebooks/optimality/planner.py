@@ -120,7 +120,7 @@ points, gaps = questions.front(study, times), gap.by_fleet(study)
 useful = gap.useful(gaps)
 alt = "Decision time against the product of all policies, and their Pareto front"
 caption = "No policy is both faster and better than one on the line. Medians on one core."
-drawn = [(fronts.decision_times(points), alt, caption, points)]
+drawn: list[html.Drawing] = [(fronts.decision_times(points), alt, caption, points)]
 if len(useful):
     alt = "The product of every policy and the upper bound, by number of UAVs"
     drawn.append((figures.gaps(useful), alt, "The band is the 95 % interval of the bound."))
