@@ -32,8 +32,8 @@ def must_charge(mission, u, data):
 
 
 @kernel
-def waiting_time(mission, uavs, i, chart):
-    return guard.waiting_time(mission, uavs, i, chart)
+def waiting_time(mission, uavs, i, chart, home_x, home_y):
+    return guard.waiting_time(mission, uavs, i, chart, home_x, home_y)
 
 
 @kernel

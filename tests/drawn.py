@@ -80,7 +80,9 @@ def seas(draw: st.DrawFn, nodes: Any = None, **fixed: Any) -> dict[str, Any]:
             zones.append({"cells": cells_of, "pads": draw(st.sampled_from([1, None]))})
     # Coasts and islands, each of which leaves a way to all zones and nodes.
     no_fly, kept = set[Cell](), taken | {*nodes}
-    for island in draw(st.lists(_rectangles(*size, 7, 7) | _rectangles(*size, 9, 1), min_size=2, max_size=5)):
+    for island in draw(
+        st.lists(_rectangles(*size, 7, 7) | _rectangles(*size, 9, 1), min_size=2, max_size=5)
+    ):
         more = no_fly | _in_rectangle(*island) - kept
         if kept <= {*reached(zone[:2], *size, more)}:
             no_fly = more
