@@ -6,6 +6,8 @@ from dess import rules
 from dess.code.kernels import kernel
 from dess.observations import guard
 from dess.sea.chart import FAR, distance, is_open
+from dess.state import STEP_X, STEP_Y
+from policies import heuristics
 
 
 @kernel
@@ -47,8 +49,8 @@ def must_charge(mission, u, data):
 
 
 @kernel
-def waiting_time(mission, uavs, i, chart):
-    return guard.waiting_time(mission, uavs, i, chart)
+def waiting_time(mission, uavs, i, chart, home_x, home_y):
+    return guard.waiting_time(mission, uavs, i, chart, home_x, home_y)
 
 
 @kernel
@@ -59,3 +61,29 @@ def distances(chart, x, y, to):
         if is_open(chart, x[row], y[row]):
             found[row] = distance(chart, x[row], y[row], to[row, 0], to[row, 1])
     return found
+
+
+@kernel
+def parking_cell(mission, uavs, i, chart):
+    return guard.parking_cell(mission, uavs, i, chart, np.empty(len(chart.parking), np.bool_))
+
+
+@kernel
+def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
+    """The node that a heuristic chooses, and the way there."""
+    charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
+    home_x, home_y, _ = parking_cell(mission, uavs, i, chart)
+    node = heuristics._goal(
+        kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
+        home_x, home_y, reach,
+    )  # fmt: skip
+    return node
+
+
+@kernel
+def step_cost(mission, uavs, i, chart, action, x, y):
+    """What a heuristic counts for an action of a UAV that flies to a cell."""
+    u = uavs[i]
+    after = u.x + STEP_X[action], u.y + STEP_Y[action]
+    way = guard.path_length(mission, uavs, i, chart, after[0], after[1], x, y)
+    return way, guard.contest(mission, uavs, i, after[0], after[1])

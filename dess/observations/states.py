@@ -134,7 +134,8 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
             home_x, home_y, slots = guard.parking_cell(mission, team, i, chart, taken)
-            row[HOME] = min(guard.battery_home(mission, u, chart, slots, reach), _MOST)
+            home = guard.battery_home(mission, u, chart, home_x, home_y, slots, reach)
+            row[HOME] = min(home, _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0

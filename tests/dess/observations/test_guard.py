@@ -117,7 +117,7 @@ def test_the_time_that_a_uav_expects_to_wait(
     for i in asked:
         uavs[i]["pad_request"] = 0
     state, chart = placed(uavs, **QUEUE | scenario)
-    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0, chart) == slots
+    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0, chart, 26, 2) == slots
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:

@@ -71,15 +71,16 @@ def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
     fleet = [{"slots_per_cell": 2}]
     space = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
     reach, extra = reach_of(constants_of(space), space.chart), _table(wind, *space.size)
-    in_zones = {*parking_of(space.rectangles)}
-    for s, (x, y) in product((1, 2), reached(space.zone[:2], *space.size, {*space.no_fly})):
+    water = reached(space.zone[:2], *space.size, {*space.no_fly})
+    zones = [space.rectangles, *([zone] for zone in space.rectangles)]
+    for (number, among), s, (x, y) in product(enumerate(zones[: len(reach)]), (1, 2), water):
         steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
         ways = [
-            s + extra[action, b, a] + reach[s - 1, b, a]
+            s + extra[action, b, a] + reach[number, s - 1, b, a]
             for action, a, b in steps
             if 0 <= a < space.size[0] and 0 <= b < space.size[1] and (a, b) not in space.no_fly
         ]
-        assert reach[s - 1, y, x] == (0 if (x, y) in in_zones else min(ways))
+        assert reach[number, s - 1, y, x] == (0 if (x, y) in parking_of(among) else min(ways))
 
 
 @given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)
