@@ -32,7 +32,8 @@ from dess.constants import (
 from dess.errors import InputError, one_of, shown
 from dess.files.shipped import Shipped
 from dess.sea.families import FAMILIES, is_generated, sea_of
-from dess.sea.files import nodes_in
+from dess.sea.no_fly import no_fly_in
+from dess.sea.nodes import nodes_in, projection_in
 from dess.sections.section import Integer, Number, Section
 
 __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
@@ -179,7 +180,8 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     Args:
         name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
             (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` may be
-            the name of a file in the same folder, which ``dess.sea.files`` reads.
+            the name of a file in the same folder, which ``dess.sea.nodes`` reads, and ``no_fly``
+            one that ``dess.sea.no_fly`` reads.
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
@@ -188,13 +190,28 @@ def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> Sc
     """
     where, read = _read(name_or_path)
     read.pop("description", None)
-    values = merged(read, overrides)
-    if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
-        placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
-        without = validated(ScenarioSpace, values | placeless, where)
-        path = _SCENARIOS.beside(name_or_path, "nodes", read["nodes"])
-        values["nodes"] = nodes_in(path, without.size, without.cell_size)
+    values = merged(read, overrides) | _from_files(name_or_path, where, read, overrides)
     return validated(ScenarioSpace, values, where)
+
+
+def _from_files(
+    name_or_path: str | Path, where: str, read: dict[str, Any], overrides: dict[str, Any]
+) -> dict[str, Any]:
+    """The nodes and no-fly cells that a scenario names files of, unless others replace them."""
+    named = [key for key in ("nodes", "no_fly") if isinstance(read.get(key), str)]
+    if not {*named} - overrides.keys():
+        return {}
+    placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
+    without = validated(ScenarioSpace, merged(read, overrides) | placeless, where)
+    about = without.size, without.cell_size
+    paths = {key: _SCENARIOS.beside(name_or_path, key, read[key]) for key in named}
+    cells = {}
+    if "nodes" in paths and "nodes" not in overrides:
+        cells["nodes"] = nodes_in(paths["nodes"], *about)
+    if "no_fly" in paths and "no_fly" not in overrides:
+        projection = projection_in(paths["nodes"], *about) if "nodes" in paths else None
+        cells["no_fly"] = no_fly_in(paths["no_fly"], without.size, projection)
+    return cells
 
 
 def scenario_names() -> list[str]:

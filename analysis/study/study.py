@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -297,14 +298,10 @@ class Study(StudyData):
                 return ScenarioSpace.of(**self._fields | values)
         try:
             space = scenario_at(self.scenario, values, **self.set)
-            for field in ("grid", "rows", "cell_size"):
-                if (
-                    SEA not in values
-                    and field in values
-                    and "nodes" not in values
-                    and space.nodes != self._base.nodes
-                ):
-                    raise InputError(f"{field} moves the nodes of a file; allowed: nodes as cells")
+            for field, cells in product(("grid", "rows", "cell_size"), ("nodes", "no_fly")):
+                moves = getattr(space, cells) != getattr(self._base, cells)
+                if values.keys() & {field, cells, SEA} == {field} and moves:
+                    raise InputError(f"{field} moves the {cells} of a file; allowed: cells")
             return space
         except InputError as error:
             raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
