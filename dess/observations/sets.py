@@ -28,13 +28,19 @@ OWN, NODE, MATE, ZONE, ACTION = 30, 24, 17, 11, 14
 MOVES = 9
 # The nearness of a cell is exp(-way / scale), for each scale [cells].
 SCALES = np.array([1.5, 4.0, 12.0])
-_NORMS = np.array([10.0, 25.0, 80.0], np.float32)  # by which sums of data x nearness are divided
+_NORMS = np.array([1.0, 2.5, 8.0], np.float32)  # by which sums of data x nearness are divided
 # By which the nearness changes if the way is one cell shorter, and longer.
 _FACTORS = np.stack([exp(1 / SCALES), exp(-1 / SCALES)]).astype(np.float32)
 _FARTHEST = 255  # [cells]; all longer ways are alike
-DATA_UNIT = np.float32(10.0)
 # Euclidean distances [cells] at which the rate tells what the channel is like.
 _PROBES = (1.0, 3.0, 8.0)
+
+
+# The fields of ``MISSION`` that ``sea_of`` reads and that a batch need not share.
+_FIELDS = (
+    *("zone_pads", "initial_low", "initial_high", "arrival_rate", "charge_rate"),
+    "communication_slot_length",
+)
 
 
 class Sea(NamedTuple):
@@ -44,14 +50,17 @@ class Sea(NamedTuple):
         chart: The zones, the no-fly cells and the ways.
         nodes: (K, 2) cells of the nodes.
         pads: (C,) charging pads of the zones.
-        rates: (H + W, ) data units that a UAV collects in a slot, by the distance in half cells.
-        constants: (5,) the rates at the probes, the data that arrive at a node in 100 slots, and
-            the battery gained in a charging slot, all scaled.
+        unit: Data that a quarter of the nodes have less than at the start [data units]: what data
+            are divided by.
+        rates: (L,) units that a UAV collects in a slot, by the distance in cells.
+        constants: (5,) the rates at the probes, the data that arrive at a node in 40 slots, and the
+            battery gained in a charging slot, all scaled.
     """
 
     chart: Chart
     nodes: np.ndarray
     pads: np.ndarray
+    unit: np.float32
     rates: np.ndarray
     constants: np.ndarray
 
@@ -65,16 +74,27 @@ def sea_of(mission: Any, world: World) -> Sea:
     """
     length = float(mission["communication_slot_length"] * mission["communication_slots"])
     snr = world.mean_snr[0, :: (world.mean_snr.shape[1] - 1) // (len(world.mean_snr) - 1)]
-    rates = length * log10(1 + 10 ** (snr / 10)) / np.log10(2)
+    low, high, arriving = (mission[n] for n in ("initial_low", "initial_high", "arrival_rate"))
+    unit = max(0.75 * low + 0.25 * high, 40 * arriving, 1e-3)
+    rates = length * log10(1 + 10 ** (snr / 10)) / np.log10(2) / unit
     probes = np.interp(_PROBES, np.arange(len(rates)), rates)
-    others = [mission["arrival_rate"] * 10, mission["charge_rate"] / 10]
+    others = [40 * arriving / unit, mission["charge_rate"] / 10]
     return Sea(
         world.chart,
         world.nodes,
         mission["zone_pads"][: mission["zones"]].copy(),
+        np.float32(unit),
         rates.astype(np.float32),
         np.array([*log10(probes + 1e-3), *others], np.float32),
     )
+
+
+def sea_kinds(missions: np.ndarray) -> np.ndarray:
+    """(B,) numbers that are equal for missions of a batch on the same sea."""
+    fields = [missions[name].reshape(len(missions), -1) for name in _FIELDS]
+    if all((field == field[:1]).all() for field in fields):
+        return np.zeros(len(missions), np.int64)
+    return np.unique(np.concatenate(fields, 1), axis=0, return_inverse=True)[1].ravel()
 
 
 class _Tables(NamedTuple):
@@ -125,15 +145,19 @@ class Sets:
 
     Attributes:
         sea: The sea.
-        shapes: The shapes of its arrays per row, for a lone UAV; teammates make them larger.
+        shapes: The shapes of its arrays per row; those of the class itself have empty sets.
     """
 
     version = 1  # of the encoding; weights trained with another version cannot be used
+    shapes: tuple[tuple[int, ...], ...] = (
+        *((OWN,), (5, ACTION), (0, NODE), (MOVES, 0)),
+        *((0, MATE), (MOVES, 0), (0, ZONE), (MOVES, 0)),
+    )
 
-    def __init__(self, sea: Sea):
+    def __init__(self, sea: Sea, uavs: int = 1):
         self.sea = sea
         self._tables = _tables(sea.chart.zones.tobytes(), sea.chart.zones.shape, sea.nodes.tobytes())
-        self.shapes = ((OWN,), (5, ACTION), *self._set_shapes(0))
+        self.shapes = ((OWN,), (5, ACTION), *self._set_shapes(uavs - 1))
 
     def _set_shapes(self, mates: int) -> tuple[tuple[int, int], ...]:
         sizes = {NODE: len(self.sea.nodes), MATE: mates, ZONE: len(self.sea.pads)}
@@ -162,12 +186,13 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
     zones, cells = sea.chart.zones, sea.nodes
     count, (rows, columns) = len(cells), zones.shape
     places, is_open = np.empty(5, np.int64), np.empty(5, np.bool_)
-    memory = np.empty((10, count), np.float32), np.empty(count, np.int16), np.empty((5, 8), np.float32)
+    data, units = np.empty(count, np.float32), np.float32(1.0) / sea.unit
+    memory = np.empty((7, count), np.float32), np.empty(count, np.int16), np.empty((5, 8), np.float32)
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         if i < 0:
             continue
-        mission, team, data = states.missions[b], states.uavs[b], states.residual[b]
+        mission, team, residual = states.missions[b], states.uavs[b], states.residual[b]
         x, y = np.int64(team[i, column.X]), np.int64(team[i, column.Y])
         for action in range(5):
             to_x, to_y = x + STEP_X[action], y + STEP_Y[action]
@@ -177,6 +202,7 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
             places[action] = to_y * columns + to_x if is_open[action] else y * columns + x
         total = np.float32(0.0)
         for k in range(count):
+            data[k] = residual[k] * units
             total += data[k]
         mean = total / np.float32(count)
         _own(mission, team, i, sea, mean, total, out[0][row])
@@ -190,7 +216,7 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
 def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     """Write the nodes; leave the sums of data times nearness, by move and of all, in memory."""
     me, cells, columns, count = team[i], sea.nodes, sea.chart.zones.shape[1], len(data)
-    (free, crowd, near_0, near_1, near_2, beyond_1, beyond_2, _, _, _), least, sums = memory
+    (free, crowd, near_0, near_1, near_2, beyond_1, beyond_2), least, sums = memory
     here = tables.ways[places[HOVER]]
     x, y = np.int64(me[column.X]), np.int64(me[column.Y])
     least[:] = 1000
@@ -221,10 +247,10 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
                 beyond_2[k] += full * around[2, k]
     needed, own_home = np.int64(me[column.NEEDED]), np.int64(tables.home[places[HOVER]])
     must_charge, battery = me[column.MUST_CHARGE] > 0, np.int64(me[column.BATTERY])
-    per_slot, per_mean = np.float32(1.0) / (needed + 1), np.float32(0.4) / (mean + np.float32(0.1))
+    per_slot, per_mean = np.float32(1.0) / (needed + 1), np.float32(0.4) / (mean + np.float32(0.01))
     sums[:] = 0.0
     for k in range(count):
-        line, way, units = lines[k], np.int64(here[k]), data[k] / DATA_UNIT
+        line, way, units = lines[k], np.int64(here[k]), data[k]
         home = np.int64(tables.node_home[k])
         lead, spare = np.int64(least[k]) - way, (battery - 1 - home if must_charge else needed) - way
         dx, dy = cells[k, 0] - x, cells[k, 1] - y
@@ -250,7 +276,7 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
         line[18] = beyond_2[k]
         line[19] = min(np.float32(way) * per_slot, np.float32(3.0))
         line[20] = line[1] * near[1]
-        line[21] = _rate(sea.rates, dx * dx + dy * dy) * np.float32(0.125)
+        line[21] = min(_rate(sea.rates, dx * dx + dy * dy), np.float32(2.0))
         line[22] = np.float32(min(abs(dx), abs(dy))) * tables.shares[way]
         line[23] = np.float32(min(max(home - own_home, -20), 20)) * np.float32(0.05)
         for move in range(4):
@@ -272,7 +298,7 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
 
 @inlined
 def _rate(rates, square):
-    """The data units that a UAV collects in a slot at a distance, given as its square."""
+    """The units of data that a UAV collects in a slot at a distance, given as its square."""
     distance = np.sqrt(np.float32(square))
     below = min(np.int64(distance), len(rates) - 2)
     part = min(distance - np.float32(below), np.float32(1.0))
@@ -314,8 +340,8 @@ def _own(mission, team, i, sea, mean, total, line):
     line[13] = min(max(needed - battery, -20), 60) / 40.0
     line[14] = min(active - 1, 8) / 4.0
     line[15] = active == 1
-    line[16] = min(mean / DATA_UNIT, np.float32(4.0))
-    line[17] = min(total / np.float32(max(needs, 1)), np.float32(20.0)) / np.float32(4.0)
+    line[16] = min(mean, np.float32(4.0))
+    line[17] = min(total / np.float32(max(needs, 1)) * np.float32(2.5), np.float32(5.0))
     line[18] = np.log(np.float32(len(sea.nodes))) / np.float32(4.0)
     line[19] = others / np.float32(4.0)
     line[20] = min(len(sea.pads), 4) / 4.0
@@ -431,6 +457,6 @@ def _actions(team, i, data, sea, tables, places, is_open, mean, sums, lines):
                 square, served = dx * dx + dy * dy, k
         if served >= 0:
             rate = _rate(sea.rates, square)
-            line[11] = rate * np.float32(0.125)
-            line[12] = min(rate, data[served]) * np.float32(0.125)
-            line[13] = min(data[served] / (mean + np.float32(0.1)) * np.float32(0.4), np.float32(2.0))
+            line[11] = min(rate, np.float32(2.0))
+            line[12] = min(rate, data[served])
+            line[13] = min(data[served] / (mean + np.float32(0.01)) * np.float32(0.4), np.float32(2.0))

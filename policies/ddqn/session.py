@@ -24,6 +24,7 @@ from dess.files.locks import locked
 from dess.files.reading import paths_in
 from dess.files.tables import write_table
 from dess.files.writing import check_folder, writable
+from dess.observations.observer import encoder_of
 from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV
@@ -66,8 +67,10 @@ def device_of(name: str) -> torch.device:
 
 def memory_of(config: TrainingConfig) -> int:
     """The size of the replay memory for a config [bytes]."""
-    space = config.space
-    return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
+    return sum(
+        ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
+        for space in config.spaces()
+    )
 
 
 def size_of(config: TrainingConfig) -> int:
@@ -75,17 +78,22 @@ def size_of(config: TrainingConfig) -> int:
 
     A checkpoint is written from a copy, so what it holds counts twice.
     """
-    space = config.space
-    fleet, nodes = space.uavs[1], len(space.nodes)
+    spaces = config.spaces()
+    fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
+    layout = None if config.observation == "sets" else layout_of(spaces[0])
     with torch.device("meta"):  # the sizes of the network, without its memory
-        observation, network = build(config, layout_of(space))
+        observation, network = build(config, layout)
+    shapes = observation.shapes
+    if layout is None:
+        largest = max(spaces, key=lambda space: len(space.nodes))
+        shapes = encoder_of("sets", largest).shapes
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
-    row = 3 * units_of(network, observation.shapes)  # outputs, their gradients, the later state
+    row = 3 * units_of(network, shapes)  # outputs, their gradients, the later state
     state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
-    held = 6 * 4 * weights + config.num_envs * state
+    held = 6 * 4 * weights + len(spaces) * config.num_envs * state
     held += memory_of(config) if config.checkpoint_replay else 0
     others = 0 if config.checkpoint_replay else memory_of(config)
     return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
