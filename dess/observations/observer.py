@@ -52,8 +52,8 @@ class Observer:
     """Encodes what UAVs observe, and the mask of their allowed actions.
 
     Attributes:
-        kind: ``vector``, ``nodes``, ``maps`` or ``sets``, the observations of the shipped learner, or
-            ``state``, the components that ``components.component_names`` lists.
+        kind: ``vector``, ``nodes``, ``maps`` or ``sets``, the observations of the shipped
+            learner, or ``state``, the components that ``components.component_names`` lists.
         guarded: Whether the masks are those of the return guard; if not, they have all legal
             actions.
         space: The space of one UAV's observation: a ``Box``, or a ``Dict`` of several.

@@ -23,8 +23,8 @@ from dess.sea.chart import NO_FLY, Chart, spread
 from dess.state import HOVER, STEP_X, STEP_Y
 
 OWN, NODE, MATE, ZONE, ACTION = 30, 24, 17, 11, 14
-# Per node, teammate and zone: for each of the four moves whether it makes the way there shorter, and
-# the share of the straight line there that it is along, from -1 to 1; last, whether it is there.
+# Per node, teammate and zone: for each of the four moves whether it makes the way there shorter,
+# and the share of the straight line there that it is along, from -1 to 1; last, that it exists.
 MOVES = 9
 # The nearness of a cell is exp(-way / scale), for each scale [cells].
 SCALES = np.array([1.5, 4.0, 12.0])
@@ -156,7 +156,9 @@ class Sets:
 
     def __init__(self, sea: Sea, uavs: int = 1):
         self.sea = sea
-        self._tables = _tables(sea.chart.zones.tobytes(), sea.chart.zones.shape, sea.nodes.tobytes())
+        self._tables = _tables(
+            sea.chart.zones.tobytes(), sea.chart.zones.shape, sea.nodes.tobytes()
+        )
         self.shapes = ((OWN,), (5, ACTION), *self._set_shapes(uavs - 1))
 
     def _set_shapes(self, mates: int) -> tuple[tuple[int, int], ...]:
@@ -187,7 +189,11 @@ def _encode(states, rows_mission, rows_uav, sea, tables, out):
     count, (rows, columns) = len(cells), zones.shape
     places, is_open = np.empty(5, np.int64), np.empty(5, np.bool_)
     data, units = np.empty(count, np.float32), np.float32(1.0) / sea.unit
-    memory = np.empty((7, count), np.float32), np.empty(count, np.int16), np.empty((5, 8), np.float32)
+    memory = (
+        np.empty((7, count), np.float32),
+        np.empty(count, np.int16),
+        np.empty((5, 8), np.float32),
+    )
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         if i < 0:
@@ -252,7 +258,10 @@ def _nodes(team, i, data, sea, tables, places, mean, memory, lines, moves):
     for k in range(count):
         line, way, units = lines[k], np.int64(here[k]), data[k]
         home = np.int64(tables.node_home[k])
-        lead, spare = np.int64(least[k]) - way, (battery - 1 - home if must_charge else needed) - way
+        lead, spare = (
+            np.int64(least[k]) - way,
+            (battery - 1 - home if must_charge else needed) - way,
+        )
         dx, dy = cells[k, 0] - x, cells[k, 1] - y
         near = tables.near[way]
         line[0] = 1.0
@@ -320,8 +329,9 @@ def _own(mission, team, i, sea, mean, total, line):
         np.int64(me[column.NEEDED]),
         np.int64(me[column.HOME]),
     )
-    start, complete = np.int64(mission[column.CHARGE_START]), np.int64(
-        mission[column.CHARGE_COMPLETE]
+    start, complete = (
+        np.int64(mission[column.CHARGE_START]),
+        np.int64(mission[column.CHARGE_COMPLETE]),
     )
     slack = battery - 1 - home
     line[0] = battery / 100.0
@@ -408,7 +418,10 @@ def _zones(team, i, sea, tables, places, columns, lines, moves):
                 if ways[zone] == 0:
                     charging += mate[column.CHARGING]
                     waiting += mate[column.LATCH] and not mate[column.CHARGING]
-                coming += mate[column.MUST_CHARGE] and ways[zone] == tables.home[mate[column.Y] * columns + mate[column.X]]
+                coming += (
+                    mate[column.MUST_CHARGE]
+                    and ways[zone] == tables.home[mate[column.Y] * columns + mate[column.X]]
+                )
         slack = np.int64(me[column.BATTERY]) - 1 - way
         line[0] = 1.0
         line[1] = min(way, 60) / 30.0
@@ -453,10 +466,15 @@ def _actions(team, i, data, sea, tables, places, is_open, mean, sums, lines):
         square, served = 1_000_000, -1
         for k in range(len(cells)):
             dx, dy = cells[k, 0] - x, cells[k, 1] - y
-            if dx * dx + dy * dy < square and data[k] > 0.0:
-                square, served = dx * dx + dy * dy, k
+            distance = dx * dx + dy * dy
+            if data[k] > 0.0 and (
+                distance < square or (distance == square and data[k] > data[served])
+            ):
+                square, served = distance, k
         if served >= 0:
             rate = _rate(sea.rates, square)
             line[11] = min(rate, np.float32(2.0))
             line[12] = min(rate, data[served])
-            line[13] = min(data[served] / (mean + np.float32(0.01)) * np.float32(0.4), np.float32(2.0))
+            line[13] = min(
+                data[served] / (mean + np.float32(0.01)) * np.float32(0.4), np.float32(2.0)
+            )

@@ -174,8 +174,7 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
     begun, end = starts[index], starts[index + 1]
     evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
     evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
-    seas, flown = len(training.seas), (now.tick - begun) * config.seas_per_tick
-    slots = [(flown - number + seas - 1) // seas for number in range(seas)]
+    slots = training.flown(now.tick - begun)
     slots = [count + (config.learning_starts if count else 0) for count in slots]
     seed, *replications = header.stepper
     right = {
@@ -189,7 +188,7 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
         and len(header.curve) >= evaluations,
         "replay": header.replay == _counts(slots, config),
         "stepper": seed == training.stepper.seed
-        and len(replications) == seas
+        and len(replications) == len(training.seas)
         and max(replications) < 2**32,
     }
     for name in (name for name, is_right in right.items() if not is_right):

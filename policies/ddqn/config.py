@@ -6,6 +6,7 @@ config.num_envs, config.n_step, config.phases[0].ticks
 
 import hashlib
 import json
+import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -117,7 +118,8 @@ class TrainingConfig(_Settings):
     seas: tuple[Place, ...] = Field(
         (),
         max_length=2000,
-        description="scenarios, or sets of generated seas, in place of the one scenario",
+        description="scenarios in place of the one scenario; FAMILY:FIRST..LAST are generated "
+        "seas, and train, validation and test are sets of them",
     )
     set: Annotated[dict[str, Any], AfterValidator(_in_lists_of_lists)] = Field(
         {}, description="fields of the scenario, in all missions"
@@ -251,8 +253,17 @@ class TrainingConfig(_Settings):
             InputError: If one of them does not exist or is not valid.
         """
         given = (of_evaluations and self.evaluation_seas) or self.seas or (self.scenario,)
-        names = [name for part in given for name in (seas_of(part) if part in SETS else [part])]
-        return [load_scenario(name, **self.set) for name in names]
+        return [load_scenario(name, **self.set) for part in given for name in _names_in(part)]
+
+
+def _names_in(part: str) -> list[str]:
+    """The names of scenarios that a part of ``seas`` stands for."""
+    if part in SETS:
+        return seas_of(part)
+    if several := re.fullmatch(r"(\w+):(\d{1,9})\.\.(\d{1,9})", part):
+        family, first, last = several.groups()
+        return [f"{family}:{seed}" for seed in range(int(first), int(last) + 1)]
+    return [part]
 
 
 def config_names() -> list[str]:
@@ -330,6 +341,7 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
         original = config
     words = ["dess", "train", name, "--out", str(out)]
     words += ["--seed", str(config.seed)] if config.seed != original.seed else []
+    words += ["--scenario", config.scenario] if config.scenario != original.scenario else []
     for key, value in config.set.items():
         words += ["--set", f"{key}={json.dumps(value)}"] if original.set.get(key) != value else []
     words += [] if device == "auto" else ["--device", device]

@@ -128,7 +128,8 @@ class Learner:
         when the next phase begins.
         """
         settings = self.settings
-        values = self.online(*self._observe((b.observation, b.state, b.rows, b.uav) for b in batches))
+        now = ((b.observation, b.state, b.rows, b.uav) for b in batches)
+        values = self.online(*self._observe(now))
         imitation = torch.zeros((), device=self.device)
         if batches[0].planned is not None:
             allowed = self._joined([masks(b.state, b.rows, b.uav) for b in batches])

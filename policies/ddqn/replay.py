@@ -51,9 +51,7 @@ class ReplayMemory:
         arrays: The arrays of the memory, by name.
     """
 
-    def __init__(
-        self, capacity: int, num_envs: int, uavs: int, nodes: int, imitates: bool = False
-    ):
+    def __init__(self, capacity: int, num_envs: int, uavs: int, nodes: int, imitates: bool = False):
         self.capacity, self.num_envs, self.uavs = capacity, num_envs, uavs
         self.count = 0
         self._states = empty_states(capacity * num_envs, uavs, nodes)

@@ -33,7 +33,7 @@ from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import MODEL
 from policies.ddqn.network import units_of
 from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.trained import save_policy
+from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training, build
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
@@ -106,6 +106,7 @@ def train(
     resume: bool = False,
     device: str = "auto",
     accept_size: bool = False,
+    start: str = "",
     announce: Callable[[int], None] | None = None,
     progress: Callable[[Training, int], None] | None = None,
 ) -> Training:
@@ -121,6 +122,7 @@ def train(
         resume: Whether to resume the training in the folder.
         device: ``auto``, ``cpu`` or ``cuda``.
         accept_size: Whether to train even if that takes more memory than is available.
+        start: The folder of a trained policy whose weights a new training begins with.
         announce: Called before any large allocation with the size of the replay memory [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
@@ -147,6 +149,8 @@ def train(
                 training = load_training(path, config, place, size_of(config))
             else:
                 training = Training(config, place)
+                if start:
+                    training.begin_with(load_policy(Path(start)).network.state_dict())
                 save_training(path, training)
         except (MemoryError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "alloc" not in str(error):

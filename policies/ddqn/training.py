@@ -6,6 +6,7 @@ config's ``evaluation_seed``, and missions for evaluations should have any other
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from policies.ddqn.learner import Learner
 from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork, SetNetwork
 from policies.ddqn.policy import DDQN
 from policies.ddqn.replay import Batch, ReplayMemory
+from policies.ddqn.tensors import require_forms
 from policies.planner import LongPlanner, Planner
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
@@ -39,6 +41,7 @@ SELECT_BY = "collection_ratio_and_communication"
 # there are several seas.
 DATA = 312.5
 TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner)}
+STRETCH = 64  # ticks for which the missions of some seas fly, before those of the next seas do
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
 _PROGRESS = (
@@ -167,8 +170,9 @@ class Training:
         """Run one tick: a slot of all environments, the updates and, if due, an evaluation."""
         share = (self.tick - self.phase_start) / self.phase.ticks
         epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
-        begins_random = self.tick == 0 and not self.phase.imitates
-        for self.sea in self.due(self.tick - self.phase_start):
+        begins_random = self.tick == 0 and self.config.observation != "sets"
+        for sea in self._due(self.tick - self.phase_start):
+            self.sea = sea
             if self.replay.count == 0:
                 for _ in range(self.config.learning_starts):
                     self._collect(1.0 if begins_random else epsilon)
@@ -190,18 +194,29 @@ class Training:
                     network.load_state_dict(self.best)
             self._enter_phase(self.phase_index + 1)
 
-    def due(self, tick: int) -> list[Waters]:
-        """The seas whose missions fly in a tick of the phase: some after the others, in turn."""
-        count = self.config.seas_per_tick
-        return [self.seas[n % len(self.seas)] for n in range(tick * count, (tick + 1) * count)]
+    def _due(self, tick: int) -> list[Waters]:
+        """The seas whose missions fly in a tick of the phase: some for a while, then the next."""
+        first = tick // STRETCH * self.config.seas_per_tick
+        order = range(first, first + self.config.seas_per_tick)
+        return [self.seas[number % len(self.seas)] for number in order]
+
+    def flown(self, ticks: int) -> list[int]:
+        """How often the missions of each sea have flown a slot in the first ticks of a phase."""
+        seas, each = len(self.seas), self.config.seas_per_tick
+        turns, last = divmod(ticks, STRETCH)
+        counts = [STRETCH * ((turns * each - number + seas - 1) // seas) for number in range(seas)]
+        for number in range(turns * each, (turns + 1) * each):
+            counts[number % seas] += last
+        return counts
 
     def _samples(self) -> list[Batch]:
         """The parts of a minibatch, each of one sea."""
         config = self.config
         flown = [sea for sea in self.seas if sea.replay.count]
         chosen = flown
-        if len(flown) > 1:
-            chosen = [flown[n] for n in self.generator.integers(0, len(flown), config.seas_per_tick)]
+        if len(self.seas) > 1:
+            picks = self.generator.integers(0, len(flown), config.seas_per_tick)
+            chosen = [flown[pick] for pick in picks]
         each = config.batch // len(chosen)
         draw = each, config.n_step, config.discount, self.generator
         return [sea.replay.sample(*draw)._replace(observation=sea.observation) for sea in chosen]
@@ -215,6 +230,19 @@ class Training:
     def _as_policy(self, network: nn.Module) -> DDQN:
         config = self.config
         return DDQN(config.name, self.observation, network, config.guard, self.layout)
+
+    def begin_with(self, weights: Mapping[str, torch.Tensor]) -> None:
+        """Begin with the weights of another training.
+
+        Raises:
+            InputError: If they are not those of such a network.
+        """
+        learner = self.learner
+        require_forms(weights, learner.online.state_dict(), "from")
+        for network in (learner.online, learner.target, learner.average):
+            if network is not None:
+                network.load_state_dict(weights)
+        self.best = _weights(learner.evaluated)
 
     @property
     def kept(self) -> dict[str, torch.Tensor]:
