@@ -63,9 +63,11 @@ class ReplayMemory:
         self.arrays = self._states._asdict() | outcomes
 
     @staticmethod
-    def bytes_for(capacity: int, num_envs: int, uavs: int, nodes: int) -> int:
+    def bytes_for(
+        capacity: int, num_envs: int, uavs: int, nodes: int, imitates: bool = False
+    ) -> int:
         """The size of such a memory [bytes]."""
-        one = ReplayMemory(1, 1, uavs, nodes, imitates=True)
+        one = ReplayMemory(1, 1, uavs, nodes, imitates)
         return capacity * num_envs * sum(array.nbytes for array in one.arrays.values())
 
     def add(self, states: CompactStates, *outcome: np.ndarray) -> None:

@@ -67,10 +67,10 @@ def device_of(name: str) -> torch.device:
 
 def memory_of(config: TrainingConfig) -> int:
     """The size of the replay memory for a config [bytes]."""
-    return sum(
-        ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
-        for space in config.spaces()
-    )
+    sizes = [(space.uavs[1], len(space.nodes)) for space in config.spaces()]
+    imitates = any(phase.imitates for phase in config.phases)
+    slots = config.replay, config.num_envs
+    return sum(ReplayMemory.bytes_for(*slots, *size, imitates) for size in sizes)
 
 
 def size_of(config: TrainingConfig) -> int:

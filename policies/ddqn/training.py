@@ -382,7 +382,9 @@ class Training:
         missions, cost = range(self.config.evaluation_missions), self.phase_space.flight_cost
         spaces = [ScenarioSpace.of(s, flight_cost=cost) for s in self.config.spaces(True)]
         records = simulate_batch(
-            [spaces[mission % len(spaces)] for mission in missions],
+            [spaces[mission % len(spaces)] for mission in missions]
+            if len(spaces) > 1
+            else spaces[0],
             self._as_policy(network),
             self.config.evaluation_seed,
             missions,

@@ -56,7 +56,9 @@ def train(
     if start and resume:
         raise InputError("--from: the training has begun; allowed: --resume without it")
     if start and not folder_of(start):
-        raise InputError(f"--from: {shown(start)} is no trained policy; allowed: one, or its folder")
+        raise InputError(
+            f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
+        )
     needs("learning", "dess train")
     from policies.ddqn.learner import DivergenceError
     from policies.ddqn.session import EVENTS, train
