@@ -94,9 +94,10 @@ class Phase(_Settings):
     learning_rate: tuple[Rate, Rate] = Field(
         (1e-3, 1e-4), description="of Adam at the beginning and the end"
     )
-    imitates: Literal["", "planner", "planner-long"] = Field(
+    imitates: Literal["", "planner", "planner-long", "planner-short"] = Field(
         "",
-        description="policy that decides and is imitated; epsilon is then the share of "
+        description="policy that decides and is imitated (planner-short searches a fifth as long "
+        "as planner); epsilon is then the share of "
         "the decisions that the network makes all the same",
     )
 

@@ -32,7 +32,7 @@ from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperN
 from policies.ddqn.policy import DDQN
 from policies.ddqn.replay import Batch, ReplayMemory
 from policies.ddqn.tensors import require_forms
-from policies.planner import LongPlanner, Planner
+from policies.planner import Budget, LongPlanner, Planner
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
@@ -40,7 +40,6 @@ SELECT_BY = "collection_ratio_and_communication"
 # The data of the paper's nodes at the start [data units], as much as all data of a sea count where
 # there are several seas.
 DATA = 312.5
-TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner)}
 STRETCH = 64  # ticks for which the missions of some seas fly, before those of the next seas do
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
@@ -65,6 +64,16 @@ def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module
     if config.observation == "nodes":
         return observation, NodeNetwork(observation.shapes, config.hidden, precision)
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
+
+
+class ShortPlanner(Planner):
+    """``planner`` with a fraction of its search: more of its decisions can be imitated in a time."""
+
+    name = "planner-short"
+    budget = Budget(8_000, 1_000, 60)
+
+
+TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner, ShortPlanner)}
 
 
 class Waters:
@@ -171,11 +180,10 @@ class Training:
         share = (self.tick - self.phase_start) / self.phase.ticks
         epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
         begins_random = self.tick == 0 and self.config.observation != "sets"
-        for sea in self._due(self.tick - self.phase_start):
-            self.sea = sea
-            if self.replay.count == 0:
-                for _ in range(self.config.learning_starts):
-                    self._collect(1.0 if begins_random else epsilon)
+        for self.sea in [sea for sea in self.seas if sea.replay.count == 0]:  # noqa: B020
+            for _ in range(self.config.learning_starts):
+                self._collect(1.0 if begins_random else epsilon)
+        for self.sea in self._due(self.tick - self.phase_start):  # noqa: B020
             self._collect(epsilon)
         for _ in range(self.config.updates):
             rate = _between(self.phase.learning_rate, share)
@@ -212,11 +220,10 @@ class Training:
     def _samples(self) -> list[Batch]:
         """The parts of a minibatch, each of one sea."""
         config = self.config
-        flown = [sea for sea in self.seas if sea.replay.count]
-        chosen = flown
-        if len(self.seas) > 1:
-            picks = self.generator.integers(0, len(flown), config.seas_per_tick)
-            chosen = [flown[pick] for pick in picks]
+        chosen = self.seas
+        if len(chosen) > 1:
+            picks = self.generator.integers(0, len(chosen), config.seas_per_tick)
+            chosen = [self.seas[pick] for pick in picks]
         each = config.batch // len(chosen)
         draw = each, config.n_step, config.discount, self.generator
         return [sea.replay.sample(*draw)._replace(observation=sea.observation) for sea in chosen]
