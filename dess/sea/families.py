@@ -60,8 +60,8 @@ class Family(NamedTuple):
 
 
 def is_generated(name: str) -> bool:
-    """Whether a name is that of a generated sea, be its seed right or wrong."""
-    return name.partition(":")[0] in FAMILIES
+    """Whether a name is that of a generated sea, be its family and seed right or wrong."""
+    return name.partition(":")[0] in FAMILIES or bool(re.fullmatch("[a-z]{2,}:[0-9]+", name))
 
 
 def sea_of(name: str) -> dict[str, Any]:
