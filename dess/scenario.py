@@ -5,7 +5,7 @@ space = ScenarioSpace.of(space, quota=200)         # the same with another quota
 scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -29,7 +29,7 @@ from dess.constants import (
     merged,
     validated,
 )
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from dess.files.shipped import Shipped
 from dess.sea.families import FAMILIES, is_generated, sea_of
 from dess.sea.no_fly import no_fly_in
@@ -40,6 +40,8 @@ __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario",
 __all__ += [
     "scenario_description",
     "scenario_families",
+    "scenario_at",
+    "SEA",
     "is_scenario_name",
     "dotted",
     "merged",
@@ -51,6 +53,9 @@ __all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", 
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
+
+# What a design calls the scenario of its points, if it differs from point to point.
+SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
@@ -212,6 +217,25 @@ def _from_files(
 def scenario_names() -> list[str]:
     """The names of the shipped scenarios."""
     return _SCENARIOS.names()
+
+
+def scenario_at(base: str | Path, values: Mapping[str, Any], /, **overrides: Any) -> ScenarioSpace:
+    """The scenario of a design point: ``scenario`` among its values names another sea.
+
+    Args:
+        base: The scenario if the values name none.
+        values: Fields of the scenario, and perhaps ``scenario``.
+        **overrides: Fields that are set in both.
+
+    Raises:
+        InputError: If it does not exist, is a file, or is not valid.
+    """
+    name = values.get(SEA, base)
+    if SEA in values and not (isinstance(name, str) and is_scenario_name(name)):
+        known = [*scenario_names(), *scenario_families()]
+        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, known)}")
+    fields = {field: value for field, value in values.items() if field != SEA}
+    return load_scenario(name, **overrides, **fields)
 
 
 def scenario_families() -> dict[str, str]:

@@ -189,7 +189,7 @@ def _goal(
     u = team[i]
     spare = guard.slots_needed(mission, u)
     if charge:
-        waiting = guard.waiting_time(mission, team, i, chart)
+        waiting = guard.waiting_time(mission, team, i, chart, home_x, home_y)
         spare = u.battery - 1 - guard.margin(mission, u) - waiting
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1

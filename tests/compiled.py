@@ -1,23 +1,45 @@
 """Rules that exist only inside compiled functions, so that tests can call them one by one."""
 
+import numpy as np
+
 from dess import rules
 from dess.code.kernels import kernel
 from dess.observations import guard
+from dess.sea.chart import FAR, distance, is_open
+from dess.state import STEP_X, STEP_Y
+from policies import heuristics
 
 
 @kernel
-def resolve(mission, uavs):
-    rules.resolve(mission, uavs)
+def resolve(mission, uavs, chart):
+    rules.resolve(mission, uavs, chart)
+
+
+@kernel
+def move(mission, uavs, chart):
+    rules.resolve(mission, uavs, chart)
+    rules.grant_pads(mission, uavs)
+    rules.spend(mission, uavs)
+
+
+@kernel
+def arrive(mission, residual, arrivals):
+    rules.arrive(mission, residual, arrivals)
+
+
+@kernel
+def settle(mission, uavs):
+    rules.settle(mission, uavs)
 
 
 @kernel
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
-    nodes, mean_snr, order, means, batches, search,
+    nodes, mean_snr, order, means, chart, batches, search,
 ):  # fmt: skip
     rules.advance(
         mission, uavs, residual, sensors, teeth, arrivals,
-        nodes, mean_snr, order, means, batches, search,
+        nodes, mean_snr, order, means, chart, batches, search,
     )  # fmt: skip
 
 
@@ -27,5 +49,41 @@ def must_charge(mission, u, data):
 
 
 @kernel
-def waiting_time(mission, uavs, i):
-    return guard.waiting_time(mission, uavs, i)
+def waiting_time(mission, uavs, i, chart, home_x, home_y):
+    return guard.waiting_time(mission, uavs, i, chart, home_x, home_y)
+
+
+@kernel
+def distances(chart, x, y, to):
+    """Shortest ways from cells, which may be closed, to cells."""
+    found = np.full(len(x), FAR)
+    for row in range(len(x)):
+        if is_open(chart, x[row], y[row]):
+            found[row] = distance(chart, x[row], y[row], to[row, 0], to[row, 1])
+    return found
+
+
+@kernel
+def parking_cell(mission, uavs, i, chart):
+    return guard.parking_cell(mission, uavs, i, chart, np.empty(len(chart.parking), np.bool_))
+
+
+@kernel
+def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
+    """The node that a heuristic chooses, and the way there."""
+    charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
+    home_x, home_y, _ = parking_cell(mission, uavs, i, chart)
+    node = heuristics._goal(
+        kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
+        home_x, home_y, reach,
+    )  # fmt: skip
+    return node
+
+
+@kernel
+def step_cost(mission, uavs, i, chart, action, x, y):
+    """What a heuristic counts for an action of a UAV that flies to a cell."""
+    u = uavs[i]
+    after = u.x + STEP_X[action], u.y + STEP_Y[action]
+    way = guard.path_length(mission, uavs, i, chart, after[0], after[1], x, y)
+    return way, guard.contest(mission, uavs, i, after[0], after[1])

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from dess import streams
 from dess.scenario import Scenario, ScenarioSpace
-from dess.state import HOVER
+from dess.state import HOVER, STEP_X, STEP_Y
 from dess.view import View
+from tests import compiled
 
 NORTH, EAST, SOUTH, WEST = range(4)
 
@@ -27,25 +28,77 @@ def _ranges(low: int, high: int) -> st.SearchStrategy[tuple[int, int]]:
     )
 
 
-def cells(grid: int) -> st.SearchStrategy[tuple[int, int]]:
+Cell = tuple[int, int]
+# The geometry of the paper, which observations for learning need.
+PLAIN_SEA: dict[str, Any] = {"rows": None, "zones": (), "no_fly": ()}
+
+
+def cells(grid: int, rows: int | None = None) -> st.SearchStrategy[Cell]:
     """Cells of a grid."""
-    return st.tuples(st.integers(0, grid - 1), st.integers(0, grid - 1))
+    return st.tuples(st.integers(0, grid - 1), st.integers(0, (rows or grid) - 1))
+
+
+def _in_rectangle(x: int, y: int, width: int, height: int) -> set[Cell]:
+    return {(x + i, y + j) for i in range(width) for j in range(height)}
+
+
+@st.composite
+def _rectangles(draw: st.DrawFn, grid: int, rows: int, width: int, height: int) -> Any:
+    """A rectangle of at most that size on a grid: x, y, width, height."""
+    width, height = (draw(st.integers(1, m)) for m in (min(width, grid), min(height, rows)))
+    return draw(st.integers(0, grid - width)), draw(st.integers(0, rows - height)), width, height
+
+
+def reached(start: Cell, grid: int, rows: int, no_fly: set[Cell]) -> dict[Cell, int]:
+    """The cells with a way from a cell, and the length of the shortest."""
+    ways, edge = {start: 0}, [start]
+    for x, y in edge:
+        for cell in ((x, y - 1), (x + 1, y), (x, y + 1), (x - 1, y)):
+            on_grid = 0 <= cell[0] < grid and 0 <= cell[1] < rows
+            if on_grid and cell not in no_fly and cell not in ways:
+                ways[cell] = ways[x, y] + 1
+                edge.append(cell)
+    return ways
+
+
+@st.composite
+def seas(draw: st.DrawFn, nodes: Any = None, **fixed: Any) -> dict[str, Any]:
+    """The geometry of a sea: a third of the paper's kind, the others with all that it has not."""
+    grid = fixed.get("grid") or draw(st.integers(4, 12))
+    is_plain = {*PLAIN_SEA} <= {*fixed} or draw(st.sampled_from([True, False, False]))
+    rows = None if is_plain else draw(st.integers(4, 12))
+    size = grid, rows or grid
+    zone = fixed.get("zone") or draw(_rectangles(*size, 4, 3))
+    nodes = nodes or draw(st.lists(cells(*size), min_size=1, max_size=9, unique=True))
+    sea = {"grid": grid, "rows": rows, "zone": zone, "nodes": tuple(nodes)}
+    if is_plain:
+        return sea
+    zones, taken = [], _in_rectangle(*zone)
+    for cells_of in draw(st.lists(_rectangles(*size, 3, 2), min_size=1, max_size=3)):
+        if not taken & _in_rectangle(*cells_of):
+            taken |= _in_rectangle(*cells_of)
+            zones.append({"cells": cells_of, "pads": draw(st.sampled_from([1, None]))})
+    # Coasts and islands, each of which leaves a way to all zones and nodes.
+    no_fly, kept = set[Cell](), taken | {*nodes}
+    for island in draw(
+        st.lists(_rectangles(*size, 7, 7) | _rectangles(*size, 9, 1), min_size=2, max_size=5)
+    ):
+        more = no_fly | _in_rectangle(*island) - kept
+        if kept <= {*reached(zone[:2], *size, more)}:
+            no_fly = more
+    return sea | {"zones": tuple(zones), "no_fly": tuple(sorted(no_fly))}
 
 
 @st.composite
 def spaces(draw: st.DrawFn, **fixed: Any) -> ScenarioSpace:
     """Small, odd scenario spaces: fleets of up to 6, few pads, all constants off the paper's."""
-    width, height = draw(st.integers(1, 4)), draw(st.integers(1, 3))
-    grid = draw(st.integers(4, 12))
-    zone = (draw(st.integers(0, grid - width)), draw(st.integers(0, grid - height)), width, height)
-    spots = width * height
+    sea = draw(seas(**fixed))
+    spots = sea["zone"][2] * sea["zone"][3]
     start = draw(_ranges(10, 50))
     values = {
-        "grid": grid,
-        "zone": zone,
+        **sea,
         "uavs": draw(_ranges(1, min(6, spots))),
         "pads": draw(st.sampled_from([1, min(2, spots), None])),
-        "nodes": tuple(draw(st.lists(cells(grid), min_size=1, max_size=9, unique=True))),
         "cell_size": draw(_numbers(1.0, 1000.0)),
         "altitude": draw(_numbers(1.0, 200.0)),
         "forbid_swaps": draw(st.booleans()),
@@ -146,16 +199,16 @@ def scenarios(draw: st.DrawFn, **fixed: Any) -> Scenario:
     return space.scenario_at(**low, **high)
 
 
-def random_actions(view: View) -> np.ndarray:
-    """(R,) random legal actions, from the policies' own stream."""
-    constants = view.constants
+def random_actions(view: View, legal: Any = None) -> np.ndarray:
+    """(R,) random actions of the legal ones, or of others, from the policies' own stream."""
+    constants, legal = view.constants, view.legal if legal is None else legal
     words = [
         streams.block(c["seed"], c["replication"], streams.POLICY, 0, c["slot"], i)[0]
         for c, i in zip(constants, view.uav, strict=True)
     ]
-    choices = view.legal.sum(1)
+    choices = legal.sum(1)
     pick = np.array([streams.integer(w, 0, n - 1) for w, n in zip(words, choices, strict=True)])
-    return np.argmax(view.legal.cumsum(1) > pick[:, None], 1)
+    return np.argmax(legal.cumsum(1) > pick[:, None], 1)
 
 
 class Wanderer:
@@ -170,30 +223,35 @@ class Wanderer:
 class Commuter:
     """Wanders while the battery lasts, then makes for the zone and hovers there until charged.
 
-    With fewer pads than UAVs it queues; all make for their own cell but take no notice of others.
+    With fewer pads than UAVs it queues; all make for their own cell, of each zone in turn, around
+    islands, but take no notice of others.
     """
 
     name = "commuter"
 
     def act(self, view: View) -> np.ndarray:
-        own, c = view.own, view.constants
-        spot = view.uav % (c["zone_width"] * c["zone_height"])
-        dx = c["zone_x"] + spot % c["zone_width"] - own["x"]
-        dy = c["zone_y"] + spot // c["zone_width"] - own["y"]
-        home = np.select([dx > 0, dx < 0, dy > 0, dy < 0], [EAST, WEST, SOUTH, NORTH], HOVER)
-        distance = np.abs(dx) + np.abs(dy)
-        must = own["latch"] | (own["battery"] <= distance + 3)
-        return np.where(must, home, random_actions(view))
+        own, chart = view.own, view.world.chart
+        zones = chart.zones[chart.parking[:, 1], chart.parking[:, 0]]
+        places = np.arange(len(zones)) - np.searchsorted(zones, zones)  # in their zones
+        spots = chart.parking[np.lexsort((zones, places))][view.uav % len(zones)]
+        x, y = own["x"][:, None] + STEP_X, own["y"][:, None] + STEP_Y
+        steps = compiled.distances(chart, x.ravel(), y.ravel(), np.repeat(spots, 5, axis=0))
+        steps = steps.reshape(x.shape)
+        must = own["latch"] | (own["battery"] <= steps[:, HOVER] + 3)
+        return np.where(must, steps.argmin(1), random_actions(view))
 
 
 class Fidget(Commuter):
-    """Commutes, but now and then does something else: it leaves queues, even with a pad granted."""
+    """Commutes, but now and then does anything else: it leaves queues, even with a pad granted.
+
+    It also asks for moves off the grid and into no-fly cells.
+    """
 
     name = "fidget"
 
     def act(self, view: View) -> np.ndarray:
         restless = (view.constants["slot"] + 3 * view.uav) % 4 == 0
-        return np.where(restless, random_actions(view), super().act(view))
+        return np.where(restless, random_actions(view, np.ones((len(view), 5))), super().act(view))
 
 
 class Script:

@@ -28,6 +28,7 @@ from analysis.results.chunks import short_hash
 from analysis.results.files import MANIFEST
 from analysis.results.provenance import engine_code, team_of
 from analysis.results.tables import Results
+from analysis.study.best import BASELINE, policies_for
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Grid
@@ -49,7 +50,7 @@ LITTLE = 0.01  # as a share of the prices: a saving that does not matter
 def question(
     values: Mapping[str, Sequence[Any]],
     scenario: str | Path = "paper",
-    policies: Iterable[str] = ("greedy",),
+    policies: Iterable[str] | None = None,
     missions: int = 300,
     seed: int = 0,
     prices: Mapping[str, Any] | None = None,
@@ -61,7 +62,8 @@ def question(
     Args:
         values: For each field of the scenario its values. A field with one value is fixed.
         scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams: ``"P"`` or ``"P,P,..."``.
+        policies: Teams: ``"P"`` or ``"P,P,..."``. Without any, the best policy that five minutes
+            allow, and ``greedy``.
         missions: Number of missions of every setting. With requirements, the number of additional
             missions that check each selected setting.
         seed: Seed of the missions.
@@ -86,13 +88,17 @@ def question(
         "scenario": str(scenario),
         "set": fixed,
         "design": {"kind": "grid", "values": swept},
-        "policies": typed([policies] if isinstance(policies, str) else policies),
+        "policies": typed([policies] if isinstance(policies, str) else policies or [BASELINE]),
         "seed": seed,
         **({"costs": dict(prices)} if prices else {}),
         **({} if requirements else {"missions": missions}),
     }
     if requirements:
         data["selection"] = _cheapest(requirements, missions, _study(data))
+    if policies is None:
+        points = _study(data).points
+        chosen = policies_for((point.scenario for point in points), missions + FIRST)
+        data["policies"] = chosen
     study = _study(data)
     return study if name is not None else study.model_copy(update={"name": _name_of(study, swept)})
 

@@ -152,7 +152,7 @@ def _nearest_free(mission, uavs, i, chart, taken):
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
     slots = distance(chart, u.x, u.y, x, y)
-    free = slots == 0 or not taken[cell]
+    free = (slots == 0 or not taken[cell]) and not _is_given_up(mission, chart.zones[y, x])
     if free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
         return cell, slots
     best, least = -1, -1
@@ -160,10 +160,19 @@ def _nearest_free(mission, uavs, i, chart, taken):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         if taken[cell] and not (u.x == x and u.y == y):
             continue
+        if _is_given_up(mission, chart.zones[y, x]):
+            continue
         slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
         if best < 0 or slots < least:
             best, least = cell, slots
     return best, least
+
+
+@extension
+def _is_given_up(mission, zone):
+    """Whether no pad of one of several zones will ever work again."""
+    never = mission.zones > 1 and mission.pad_rate > 0.0 and mission.pad_repair == 0.0
+    return never and working_pads(mission, zone) == 0
 
 
 @inlined
@@ -176,8 +185,8 @@ def margin(mission, u):
 
 
 @inlined
-def waiting_time(mission, uavs, i, chart):
-    """The slots for which UAV ``i`` must expect to wait for a pad of the zone nearest to it.
+def waiting_time(mission, uavs, i, chart, home_x, home_y):
+    """The slots for which UAV ``i`` must expect to wait for a pad at its parking cell.
 
     Before it, pads are given to the teammates there that have asked, and to those in the air that
     must charge, are nearest to this zone and have less battery (on a tie, a lower index). If they
@@ -189,9 +198,10 @@ def waiting_time(mission, uavs, i, chart):
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
         chart: ``Chart``.
+        home_x, home_y: Its parking cell.
     """
     u = uavs[i]
-    zone = nearest_zone(chart, u)
+    zone = zone_near(chart, home_x, home_y)
     few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
     if u.pad_request >= 0 or not (mission.pad_rate > 0.0 or few):
         return 0
@@ -201,7 +211,7 @@ def waiting_time(mission, uavs, i, chart):
         has_asked = o.active and o.pad_request >= 0
         is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
         must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
-        if j != i and nearest_zone(chart, o) == zone and (has_asked or (must and is_lower)):
+        if j != i and zone_near(chart, o.x, o.y) == zone and (has_asked or (must and is_lower)):
             ahead += 1
             lacking += mission.charge_complete - min(o.battery, mission.charge_start)
     pads = working_pads(mission, zone)
@@ -214,32 +224,51 @@ def waiting_time(mission, uavs, i, chart):
 
 
 @inlined
-def nearest_zone(chart, u):
-    """The number of the zone that is nearest to a UAV."""
-    cell = chart.nearest[u.y, u.x]
+def zone_near(chart, x, y):
+    """The number of the zone that is nearest to a cell."""
+    cell = chart.nearest[y, x]
     return np.int64(chart.zones[chart.parking[cell, 1], chart.parking[cell, 0]])
 
 
 @inlined
-def battery_home(mission, u, chart, slots, reach):
+def battery_home(mission, u, chart, home_x, home_y, slots, reach):
     """The battery [%] that UAV ``u`` needs to reach its parking cell.
 
     Args:
         mission: ``MISSION`` record.
         u: ``UAV`` record.
-        slots: Slots to its parking cell, as ``parking_cell`` returns them.
+        chart: ``Chart``.
+        home_x, home_y, slots: Its parking cell and the slots to it, as of ``parking_cell``.
         reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
             in it; if the parking cell is farther, each further cell may cost the most.
     """
     if reach is None:
         return slots
-    return reach[u.slots_per_cell - 1, u.y, u.x] + _further(mission, u, chart, slots)
+    table = _table_home(mission, u, chart, home_x, home_y)
+    further = _further(mission, u, chart, table, slots)
+    return reach[table, u.slots_per_cell - 1, u.y, u.x] + further
 
 
 @inlined
-def _further(mission, u, chart, slots):
-    """The battery [%] for the cells by which the parking cell is farther than the zone."""
-    return (slots - distance_home(chart, u.x, u.y)) * (u.slots_per_cell + mission.wind_most)
+def _table_home(mission, u, chart, home_x, home_y):
+    """The number of the table of the way home: that of any zone, unless the nearest one is full."""
+    home = distance(chart, u.x, u.y, home_x, home_y)
+    if mission.zones == 1 or home == distance_home(chart, u.x, u.y):
+        return 0
+    return 1 + zone_near(chart, home_x, home_y)
+
+
+@inlined
+def _further(mission, u, chart, table, slots):
+    """The battery [%] for the cells by which the parking cell is farther than its zone."""
+    nearest = distance_home(chart, u.x, u.y)
+    if table > 0:
+        nearest = slots
+        for cell in range(len(chart.parking)):
+            x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+            if chart.zones[y, x] == table - 1:
+                nearest = min(nearest, distance(chart, u.x, u.y, x, y))
+    return (slots - nearest) * (u.slots_per_cell + mission.wind_most)
 
 
 @inlined
@@ -250,9 +279,11 @@ def round_trip(mission, u, chart, x, y, home_x, home_y, reach):
     """
     cells = distance(chart, u.x, u.y, x, y)
     if reach is None:
+        if mission.zones > 1:  # once there, another zone may be nearer
+            return cells + min(distance(chart, x, y, home_x, home_y), distance_home(chart, x, y))
         return cells + distance(chart, x, y, home_x, home_y)
     against = max(mission.wind_x * (u.x - x), 0.0) + max(mission.wind_y * (u.y - y), 0.0)
-    return cells * u.slots_per_cell + int(against) + reach[u.slots_per_cell - 1, y, x]
+    return cells * u.slots_per_cell + int(against) + reach[0, u.slots_per_cell - 1, y, x]
 
 
 @inlined
@@ -306,7 +337,9 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
     """
     u = uavs[i]
     spare = margin(mission, u)
-    reserve = spare + waiting_time(mission, uavs, i, chart) if charge else 0
+    reserve = 0
+    if charge:
+        reserve = spare + waiting_time(mission, uavs, i, chart, home_x, home_y)
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those that are not later than the margin allows.
     clear = nearest = in_time = 0
@@ -349,8 +382,10 @@ def _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach):
         cost = 0 if u.latch and in_zone(chart, x, y) else 1
     else:
         cost = u.slots_per_cell + move_surcharge(mission, STEP_X[action], STEP_Y[action], x, y)
+    table = _table_home(mission, u, chart, home_x, home_y)
     slots = path_length(mission, uavs, i, chart, u.x, u.y, home_x, home_y)
-    return cost + reach[u.slots_per_cell - 1, y, x] + _further(mission, u, chart, slots)
+    further = _further(mission, u, chart, table, slots)
+    return cost + reach[table, u.slots_per_cell - 1, y, x] + further
 
 
 @kernel

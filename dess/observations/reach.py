@@ -1,13 +1,14 @@
 """How much battery a UAV needs to reach the charging zone, where that is not one percent per cell.
 
     table = reach_of(view.state.missions, view.world.chart)
-    table[s - 1, y, x]          # [%] from a cell, for a UAV that takes s mission slots per cell
+    table[0, s - 1, y, x]       # [%] from a cell, for a UAV that takes s mission slots per cell
 
 The cost of a way depends on the wind and on the speed of the UAV. A table has the cheapest way from
 every cell (Bellman and Ford's algorithm). Without wind and slow UAVs there is no table.
 """
 
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -22,9 +23,10 @@ _FIELDS = ("slowest", "wind_x", "wind_y", "wind_gusts", "wind_seed")
 
 
 def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
-    """(S, H, W) battery [%] to the nearest cell of a zone, for 1 to S slots per cell.
+    """(1 + Z, S, H, W) battery [%] to any zone and to each of Z zones, for 1 to S slots per cell.
 
-    None if every cell costs one percent; then the compiler leaves out the code for the table.
+    A single zone has only the first of these. None if every cell costs one percent; then the
+    compiler leaves out the code for the table.
 
     Args:
         missions: (B,) ``MISSION`` records of one batch, which share wind and fleet.
@@ -40,9 +42,11 @@ def reach_of(missions: np.ndarray, chart: Chart) -> np.ndarray | None:
 @lru_cache(maxsize=16)
 def _table(shape: tuple[int, int], zones: bytes, slowest: int, *wind) -> np.ndarray:
     cells, (rows, columns) = np.frombuffer(zones, np.int8).reshape(shape), shape
-    table = np.full((slowest, *shape), _FAR)
-    table[:, cells >= 0] = 0
-    for s, costs in enumerate(table, 1):
+    count = int(cells.max()) + 1
+    table = np.full((1 + count if count > 1 else 1, slowest, *shape), _FAR)
+    for number, s in product(range(len(table)), range(1, slowest + 1)):
+        costs = table[number, s - 1]
+        costs[cells == number - 1 if number else cells >= 0] = 0
         before = np.zeros(0)
         while not np.array_equal(before, costs):
             before = costs.copy()

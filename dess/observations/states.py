@@ -78,9 +78,13 @@ def layout_of(space: ScenarioSpace) -> Layout:
     Raises:
         InputError: If it has no such layout.
     """
-    needs = {"rows": "a square grid", "zones": "a single zone", "no_fly": "no no-fly cells"}
-    for field, allowed in needs.items():
-        if space.has(field):
+    misfits = [
+        ("rows", space.size[0] != space.size[1], "a square grid"),
+        ("zones", space.has("zones"), "a single zone"),
+        ("no_fly", space.has("no_fly"), "no no-fly cells"),
+    ]
+    for field, is_wrong, allowed in misfits:
+        if is_wrong:
             raise InputError(
                 f"{field}: the observations vector, nodes and maps need {allowed}; "
                 "allowed: the observation state"
@@ -130,7 +134,8 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
             home_x, home_y, slots = guard.parking_cell(mission, team, i, chart, taken)
-            row[HOME] = min(guard.battery_home(mission, u, chart, slots, reach), _MOST)
+            home = guard.battery_home(mission, u, chart, home_x, home_y, slots, reach)
+            row[HOME] = min(home, _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0

@@ -101,7 +101,7 @@ def spread(zones: np.ndarray, sources: np.ndarray) -> tuple[np.ndarray, np.ndarr
         (H * W,) the cells on the way, ``FAR`` where there is none, and (H * W,) the number of the
         nearest source, the lowest on a tie.
     """
-    lengths, nearest = np.full(zones.size, FAR, np.int16), np.zeros(zones.size, np.int16)
+    lengths, nearest = np.full(zones.size, FAR, np.int16), np.zeros(zones.size, np.int32)
     _spread(zones, sources, lengths, nearest)
     return lengths, nearest
 

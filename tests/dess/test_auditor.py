@@ -1,9 +1,9 @@
 """An event log tells the whole mission: an auditor that knows only the page can replay it."""
 
-import math
 import re
 from functools import cache
 from itertools import product
+from math import isnan, nan
 from typing import Any
 
 import pytest
@@ -35,7 +35,7 @@ def _check(record: MissionRecord, scenario: Scenario | ScenarioSpace) -> None:
     metrics = report["metrics"]
     wanted = {name: pytest.approx(record.metrics[name], abs=1e-6) for name in metrics}
     assert metrics == wanted and {*metrics} == {*(MISSION_RECORD.names or ())}
-    measured = {n: v for n, v in report["measured"].items() if not math.isnan(v)}
+    measured = {n: v for n, v in report["measured"].items() if not isnan(v)}
     assert measured == pytest.approx(record.measured, abs=1e-6)
     for u, row, found in zip(record.uavs, record.uav_rows(), report["uavs"], strict=True):
         assert (found["end"], found["communications"]) == (row["end"], row["quota"])
@@ -90,7 +90,15 @@ PACKETS = ScenarioSpace.of(
     arrivals={"process": "continuous", "buffer": 2, "service": "newest", "rates": [0.8, 2.5]},
     initial_data=5,
 )
+# An island between the nodes and two zones with a pad each.
+SEA: dict[str, Any] = {
+    **{"rows": 8, "zone": [1, 1, 2, 2], "pads": 1, "uavs": 4},
+    **{"zones": [{"cells": [3, 7, 2, 1], "pads": 1}], "no_fly": [[2, 4], [3, 4], [3, 5], [5, 0]]},
+    **{"nodes": [[0, 5], [4, 3]], "max_slots": 200, "shadowing_variance": 0.01},
+}
+ISLANDS, ALL = ScenarioSpace.of(SCENARIO, **SEA), ScenarioSpace.of(BEYOND, **SEA)
 SCENARIOS = {"paper": SCENARIO, "beyond": BEYOND, "data lost": DATA_LOST, "packets": PACKETS}
+SCENARIOS |= {"islands": ISLANDS, "all": ALL}
 # What they must have logged, beside what every mission of theirs logs.
 EVENTS = {"collision", "charge_request", "charge_withdrawal", "charge_end"}
 BEYONDS = EVENTS | {"uav_failure", "pad_failure", "pad_repair", "node_failure", "node_repair"}
@@ -99,6 +107,8 @@ LOGGED = {
     "beyond": BEYONDS | {"uav_repair"},
     "data lost": BEYONDS | {"data_lost"},
     "packets": BEYONDS | {"loss", "delivery"},
+    "islands": EVENTS | {"quota_filled", "battery_empty"},
+    "all": BEYONDS | {"uav_repair"},
 }
 # What the log alone cannot contradict: the key of the random streams, a level between two
 # batteries, and the SNR at which a node is emptied.
@@ -107,32 +117,33 @@ FREE |= {("mission_charge_start", "value"), ("communication", "snr")}
 
 
 @cache
-def _log_of(name: str) -> Rows:
-    """The log of a mission in which everything happens."""
+def _log_of(name: str) -> tuple[Rows, float]:
+    """The log of a mission in which everything happens, and its reward."""
     for replication in range(200):
-        events = simulate(SCENARIOS[name], Fidget(), 5, replication, events=True).events
-        assert events is not None
-        if LOGGED[name] <= {*events.event}:
-            return [row._asdict() for row in events]
+        record = simulate(SCENARIOS[name], Fidget(), 5, replication, events=True)
+        assert record.events is not None
+        if LOGGED[name] <= {*record.events.event}:
+            return [row._asdict() for row in record.events], record.reward
     raise AssertionError("no mission in which everything happens")
 
 
-def _is_wrong(rows: Rows, scenario: Scenario | ScenarioSpace) -> bool:
+def _is_wrong(rows: Rows, scenario: Scenario | ScenarioSpace, reward: float = nan) -> bool:
+    """Whether the auditor finds a wrong row, or another reward: only it tells some collisions."""
     columns = {name: [row[name] for row in rows] for name in rows[0]}
     try:
-        audit(columns, scenario.model_dump())
+        found = audit(columns, scenario.model_dump())["metrics"]["reward"]
+        return abs(found - reward) > 1e-6
     except WrongLogError as error:
         assert re.match(r"row \d+, slot \d+: ", str(error))
         return True
-    return False
 
 
 @pytest.mark.parametrize("every", [pytest.param(1, marks=pytest.mark.slow), 7])
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_every_column_of_every_event_counts(name: str, every: int) -> None:
     """A row that is missing, or a number that is one more, is found; or some of them."""
-    log, scenario, accepted = _log_of(name), SCENARIOS[name], set()
-    assert not _is_wrong(log, scenario)
+    (log, reward), scenario, accepted = _log_of(name), SCENARIOS[name], set()
+    assert not _is_wrong(log, scenario, reward)
     assert _is_wrong(log[: len(log) // 2], scenario) and _is_wrong([*log, log[-1]], scenario)
     for event, column in [*product(sorted({row["event"] for row in log}), log[0])][::every]:
         places = [i for i, row in enumerate(log) if row["event"] == event]
@@ -141,6 +152,32 @@ def test_every_column_of_every_event_counts(name: str, every: int) -> None:
             del rows[place]
         else:
             rows[place][column] += 1
-        if str(rows) != str(log) and not _is_wrong(rows, scenario):  # it was nan
+        if str(rows) != str(log) and not _is_wrong(rows, scenario, reward):  # it was nan
             accepted.add((event, column))
     assert accepted <= FREE
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"pads": 2},
+        {"zones": [{"cells": [3, 7, 2, 1], "pads": 2}]},
+        {"zones": [{"cells": [2, 7, 2, 1], "pads": 1}]},
+        {"zones": []},
+        {"no_fly": [[3, 4], [3, 5], [5, 0]]},  # a move was cancelled that would be free
+        {"no_fly": [[0, 4], [2, 4], [3, 4], [3, 5], [5, 0]]},  # UAVs were there
+        {"rows": 9},  # half the diagonal is longer, and so are all mean SNRs
+        {"charging": {"order": "lowest-battery", "power": 9}},
+    ],
+)
+@pytest.mark.parametrize("name", ["islands", "all"])
+def test_the_logs_of_another_sea_are_wrong(name: str, other: dict[str, Any]) -> None:
+    """Some mission of ten contradicts any other zones, pads of a zone, no-fly cells and rows."""
+    scenario = ScenarioSpace.of(SCENARIOS[name], **other)
+    assert any(_is_wrong(log, scenario) for log in _logs_of(name))
+
+
+@cache
+def _logs_of(name: str) -> list[Rows]:
+    events = [simulate(SCENARIOS[name], Fidget(), 6, k, events=True).events for k in range(10)]
+    return [[row._asdict() for row in rows] for rows in events if rows is not None]

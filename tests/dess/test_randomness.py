@@ -42,7 +42,7 @@ def _snr(scenario: Scenario, words: _Words, row: dict[str, Any]) -> np.ndarray:
     n = round((row["time"] - slot) * m)
     across = (np.array(scenario.nodes) - (row["x"], row["y"])) * scenario.cell_size
     distance = np.sqrt((across**2).sum(1) + scenario.altitude**2)
-    edge = np.sqrt(2) / 2 * scenario.grid * scenario.cell_size
+    edge = np.hypot(*scenario.size) / 2 * scenario.cell_size
     mean = scenario.edge_snr - 10 * scenario.path_loss_exponent * np.log10(distance / edge)
     place = streams.SHADOWING, ((n - 1) // 4) * 2**16 + row["uav"], slot
     draws = [words.uniform(*place, k, (n - 1) % 4) for k in range(len(distance))]

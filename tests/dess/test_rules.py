@@ -26,7 +26,7 @@ def _resolve(
     team = state.uavs[0]
     for i, ((x, y), action) in enumerate(uavs):
         team[i]["x"], team[i]["y"], team[i]["action"] = x, y, action
-    compiled.resolve(state.missions[0], team)
+    compiled.resolve(state.missions[0], team, space.chart)
     after = list(zip(team["x"].tolist(), team["y"].tolist(), strict=True))
     for u in team[team["active"]]:
         dx, dy = STEPS[u["executed"]]

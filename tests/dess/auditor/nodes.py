@@ -97,7 +97,7 @@ class Nodes:
 
     def _mean_snr(self, row: Any, k: int) -> float:
         c, (x, y) = self.c, self.cells[k]
-        edge = math.sqrt(2) / 2 * c["grid"] * c["cell_size"]
+        edge = math.hypot(c["grid"], c.get("rows") or c["grid"]) / 2 * c["cell_size"]
         distance = math.hypot(c["cell_size"] * math.hypot(row.x - x, row.y - y), c["altitude"])
         return c["edge_snr"] - 10 * c["path_loss_exponent"] * math.log10(distance / edge)
 

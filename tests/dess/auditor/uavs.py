@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Mapping
+from itertools import product
 from types import SimpleNamespace
 from typing import Any
 
 from tests.dess.auditor.log import Log
 
+Cell = tuple[int, int]
 STEPS = ((0, -1), (1, 0), (0, 1), (-1, 0), (0, 0))  # north, east, south, west, hover
 HOVER = 4
 LARGEST_DEVIATE = 6.34  # of a gust, and of the shadowing, in standard deviations
@@ -19,7 +21,7 @@ class Uav(SimpleNamespace):
     """What is known of a UAV.
 
     ``requested`` is the slot in which it asked for a pad, ``other`` who overruled it in this slot:
-    -1 for the edge of the grid.
+    -1 for the edge of the grid or a no-fly cell.
     """
 
     def __init__(self, **known: Any):
@@ -28,7 +30,7 @@ class Uav(SimpleNamespace):
         super().__init__(**dict.fromkeys(_ZEROS, 0), **flags, **none, **known)
 
     @property
-    def cell(self) -> tuple[int, int]:
+    def cell(self) -> Cell:
         return self.x, self.y
 
     @property
@@ -40,11 +42,22 @@ class Uav(SimpleNamespace):
         return not (self.end or self.charging or self.grounded)
 
 
+def cells_of_zones(constants: Mapping[str, Any]) -> list[list[Cell]]:
+    """The cells of each charging zone, the start zone first."""
+    rectangles = [constants["zone"], *(zone["cells"] for zone in constants.get("zones", ()))]
+    return [
+        [*product(range(x, x + width), range(y, y + height))] for x, y, width, height in rectangles
+    ]
+
+
 class Fleet:
     """The UAVs of a mission."""
 
     def __init__(self, log: Log, constants: Mapping[str, Any]):
         self.log, self.c, self.uavs = log, constants, list[Uav]()
+        self.zones = cells_of_zones(constants)
+        size = constants["grid"], constants.get("rows") or constants["grid"]
+        self.open = {*product(*map(range, size))} - {(x, y) for x, y in constants.get("no_fly", ())}
         wind = constants.get("wind", {"strength": 0.0, "direction": 0.0, "gusts": 0.0})
         comes_from, strength = math.radians(wind["direction"]), wind["strength"]
         self.push = -strength * math.sin(comes_from), strength * math.cos(comes_from)
@@ -62,9 +75,9 @@ class Fleet:
         values = {"uav": i, "x": u.x, "y": u.y, "battery": u.battery, "value": u.battery}
         return self.log.take(event, time, **(values | expected))
 
-    def in_zone(self, x: float, y: float) -> bool:
-        zone_x, zone_y, width, height = self.c["zone"]
-        return 0 <= x - zone_x < width and 0 <= y - zone_y < height
+    def zone_of(self, u: Uav) -> int:
+        """The number of the charging zone that a UAV is in, or -1."""
+        return next((zone for zone, cells in enumerate(self.zones) if u.cell in cells), -1)
 
     def type_of(self, i: int) -> Mapping[str, Any]:
         plain = {"slots_per_cell": 1, "quota": None, "rate": 1.0, "flying_time": None}
@@ -80,7 +93,7 @@ class Fleet:
             x, y = int(row.x), int(row.y)
             self.uavs.append(Uav(x=x, y=y, from_x=x, from_y=y, battery=row.battery, **known))
             self.take("mission_start", 0.0, i)
-            self.log.require(self.in_zone(row.x, row.y), "a UAV starts outside the zone")
+            self.log.require((x, y) in self.zones[0], "a UAV starts outside the zone")
         cells = {u.cell for u in self.uavs}
         self.log.require(len(cells) == len(self.uavs), "a cell with two UAVs")
 
@@ -94,7 +107,7 @@ class Fleet:
 
     def read_moves(self) -> None:
         """Read what the UAVs asked for, and decide as the safety controller."""
-        log, targets, moving = self.log, dict[int, tuple[int, int]](), []
+        log, targets, moving = self.log, dict[int, Cell](), []
         for i, u in self.active:
             u.other, over = None, None
             if log.next_is(log.slot, "collision"):
@@ -117,10 +130,9 @@ class Fleet:
         for u in moving:
             u.slots_left = u.slots_per_cell - 1 if u.cell != (u.from_x, u.from_y) else 0
 
-    def _resolve(self, targets: dict[int, tuple[int, int]]) -> None:
+    def _resolve(self, targets: dict[int, Cell]) -> None:
         """The safety controller: cancel moves until no UAV is in the way of another."""
-        grid = self.c["grid"]
-        cancelled = {i: -1 for i, cell in targets.items() if min(cell) < 0 or max(cell) >= grid}
+        cancelled = {i: -1 for i, cell in targets.items() if cell not in self.open}
         while True:
             for i, other in cancelled.items():
                 targets[i], self.uavs[i].other = self.uavs[i].cell, other
@@ -130,7 +142,7 @@ class Fleet:
         for i, (x, y) in targets.items():
             self.uavs[i].x, self.uavs[i].y = x, y
 
-    def _in_the_way(self, i: int, targets: dict[int, tuple[int, int]]) -> int:
+    def _in_the_way(self, i: int, targets: dict[int, Cell]) -> int:
         """The first UAV in the way of the move of UAV ``i``, or -1."""
         here = self.uavs[i].cell
         for j in targets:

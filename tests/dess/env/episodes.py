@@ -7,6 +7,7 @@ import numpy as np
 from dess.env.parallel import HarvestEnv
 from dess.env.stepper import MissionStepper
 from dess.scenario import Scenario, ScenarioSpace, load_scenario
+from dess.sea.chart import Chart
 from dess.state import State
 
 PAPER = load_scenario("paper")
@@ -23,7 +24,7 @@ def small(**values: Any) -> Scenario:
     return Scenario.of(**(SMALL | values))
 
 
-def placed(uavs: list[dict[str, Any]], **scenario: Any) -> State:
+def placed(uavs: list[dict[str, Any]], **scenario: Any) -> tuple[State, Chart]:
     """One mission with UAVs in given states, 400 communications short of the quota."""
     stepper = MissionStepper(
         ScenarioSpace.of(**{"uavs": len(uavs), "charge_start": 30} | scenario), 1, 1
@@ -32,7 +33,8 @@ def placed(uavs: list[dict[str, Any]], **scenario: Any) -> State:
     for u, values in zip(stepper.state.uavs[0], uavs, strict=True):
         for name, value in ({"battery": 60, "communications": 40} | values).items():
             u[name] = value
-    return stepper.state
+        u["zone"] = stepper.world.chart.zones[u["y"], u["x"]]
+    return stepper.state, stepper.world.chart
 
 
 def masks_of(observations: dict[str, Any], infos: dict[str, Any]) -> dict[str, np.ndarray]:

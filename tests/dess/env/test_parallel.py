@@ -33,7 +33,7 @@ def test_the_same_actions_give_the_record_of_simulate(
 ) -> None:
     recorder = Recorder(policy)
     record = dess.simulate(space, recorder, seed, replication)
-    env = dess.parallel_env(space, seed)
+    env = dess.parallel_env(space, seed, observation="state")
     env.reset(options={"replication": replication})
     generator = np.random.default_rng(whims)
     rewards, ends = dict.fromkeys(env.agents, 0.0), {}
@@ -66,8 +66,9 @@ def test_who_stays_observes_zeros_and_changes_nothing(
     space: ScenarioSpace, seed: int, whims: int
 ) -> None:
     """With ``ended="stay"`` the mission is the same, and only flying UAVs have something in it."""
-    leave = dess.parallel_env(space, seed, mask="info")
-    stay = dess.parallel_env(space, seed, mask="info", ended="stay")
+    kind: dict[str, Any] = {"mask": "info", "observation": "state"}
+    leave = dess.parallel_env(space, seed, **kind)
+    stay = dess.parallel_env(space, seed, **kind, ended="stay")
     (_, infos), (_, all_infos) = leave.reset(), stay.reset()
     generator, rewards = np.random.default_rng(whims), dict.fromkeys(stay.possible_agents, 0.0)
     while leave.agents:

@@ -9,6 +9,7 @@ from hypothesis import given
 import dess
 from dess import ScenarioSpace
 from dess.observations.components import component_names
+from dess.sea.chart import NO_FLY
 from dess.state import HOVER, STEP_X, STEP_Y
 from tests.dess.env.episodes import play, small
 from tests.drawn import extended_spaces, seeds, spaces
@@ -19,14 +20,14 @@ def test_observations_lie_in_their_space_and_masks_name_the_moves_on_the_grid(
     space: ScenarioSpace, seed: int
 ) -> None:
     env = dess.parallel_env(space, seed, observation="state")
-    names, edge = component_names(space), space.grid - 1
+    names, zones = component_names(space), np.pad(space.chart.zones, 1, constant_values=NO_FLY)
     for step in play(env, 0):
         assert env.state_space.shape == env.state().shape
         for agent, observation in step[0].items():
             assert env.observation_space(agent).contains(observation)
             values = dict(zip(names, observation["observation"].tolist(), strict=True))
-            x, y = round(values["x"] * edge) + STEP_X, round(values["y"] * edge) + STEP_Y
-            inside = (np.clip(x, 0, edge) == x) & (np.clip(y, 0, edge) == y)
+            x, y = (round(values[n] * (m - 1)) for n, m in zip("xy", space.size, strict=True))
+            inside = zones[y + 1 + STEP_Y, x + 1 + STEP_X] != NO_FLY
             held = values["charging"] or not values["active"] or values.get("grounded")
             expected = np.arange(5) == HOVER if held else inside
             assert observation["action_mask"].tolist() == expected.tolist()

@@ -1,5 +1,6 @@
 """The return guard: UAVs that follow it reach the charger in time."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,9 @@ def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
 
 def _mask(*uavs: dict[str, Any]) -> np.ndarray:
     """The guard's masks for UAVs in given states, 400 communications short of the quota."""
-    here: Any = None  # the guard takes nothing from the channel
     rows = np.zeros(len(uavs), int), np.arange(len(uavs))
-    return guard(View(placed([*uavs]), here, *rows))
+    state, chart = placed([*uavs])
+    return guard(View(state, SimpleNamespace(chart=chart), *rows))
 
 
 def test_at_the_last_moment_only_the_way_home_is_left() -> None:
@@ -115,12 +116,12 @@ def test_the_time_that_a_uav_expects_to_wait(
     uavs = [{"battery": b, "pad_request": -1, "communications": 0, "x": 0} for b in batteries]
     for i in asked:
         uavs[i]["pad_request"] = 0
-    state = placed(uavs, **QUEUE | scenario)
-    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0) == slots
+    state, chart = placed(uavs, **QUEUE | scenario)
+    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0, chart, 26, 2) == slots
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
-    state = placed([{"battery": 5}], **QUEUE, failures={"pad_rate": 0.1})
+    state, _ = placed([{"battery": 5}], **QUEUE, failures={"pad_rate": 0.1})
     mission, u = state.missions[0], state.uavs[0, 0]
     assert compiled.must_charge(mission, u, 1e6)
     mission["pads_out"][0] = 1

@@ -33,7 +33,7 @@ class _Compared:
         # Who charges, and who is done, can only hover.
         idle = np.nonzero(present & (state.uavs["charging"] | ~state.uavs["active"]))
         for guarded, mask in ((True, guard(view)), (False, view.legal)):
-            states = compact_states(state, guarded)
+            states = compact_states(state, view.world.chart, guarded)
             assert (masks(states, view.mission, view.uav) == mask).all()
             assert (masks(states, *idle) == (np.arange(5) == HOVER)).all()
             assert not states.uavs[~present].any()
@@ -57,12 +57,12 @@ def test_compact_states_tell_what_the_view_tells(
 def test_each_has_its_own_parking_cell() -> None:
     # Both are nearest to (26, 5); the one with less battery chooses first.
     first, second = {"x": 23, "y": 5, "battery": 20}, {"x": 26, "y": 8, "battery": 19}
-    states = compact_states(placed([first, second]), True)
+    states = compact_states(*placed([first, second]), True)
     assert states.uavs[0, :, column.HOME].tolist() == [3 + 1, 3]
 
 
 def test_a_quota_beyond_all_bounds_is_just_far_away() -> None:
-    states = compact_states(placed([{}], quota=1_000_000, communication_slots=1), True)
+    states = compact_states(*placed([{}], quota=1_000_000, communication_slots=1), True)
     assert states.uavs[0, 0, column.NEEDED] == np.iinfo(np.int16).max
 
 

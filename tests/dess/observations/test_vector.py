@@ -79,7 +79,7 @@ def test_all_of_a_fleet_are_the_plain_ones_bit_for_bit() -> None:
     generator = np.random.default_rng(0)
     rows, _ = env.reset(seed=2)
     for slot in range(60):
-        states = compact_states(env.state, False)
+        states = compact_states(env.state, space.chart, False)
         for row in np.flatnonzero(env.state.uavs["active"])[slot % 5 :: 5]:
             plain = line_of(states, layout_of(space), *divmod(row, space.uavs[1]))
             assert rows[row].tobytes() == plain.tobytes()

@@ -22,7 +22,7 @@ def test_a_uav_on_its_way_is_not_asked_and_may_only_hover() -> None:
         def act(self, view: View) -> np.ndarray:
             everyone = View(view.state, view.world, np.zeros(2, int), np.arange(2))
             legal = everyone.legal
-            states = compact_states(view.state, guarded=False)
+            states = compact_states(view.state, view.world.chart, guarded=False)
             assert (masks(states, everyone.mission, everyone.uav) == legal).all()
             seen.append((view.uav.tolist(), legal.sum(1).tolist()))
             return super().act(view)

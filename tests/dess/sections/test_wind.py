@@ -1,5 +1,7 @@
 """Wind: what moves against it cost, the same field in all missions, and a guard that counts it."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,11 +11,12 @@ import policies
 from dess import simulate
 from dess.observations.reach import reach_of
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import parking_of
 from dess.sections.wind import Wind, surcharges
 from dess.state import BATTERY, constants_of
 from policies.registry import HEURISTICS
 from tests.dess.flights import batteries, flown
-from tests.drawn import replications, seeds, spaces
+from tests.drawn import reached, replications, seeds, spaces
 
 OPEN = {"grid": 9, "zone": [4, 4, 1, 1], "nodes": [[0, 0]], "uavs": 1, "flying_time": 60}
 GUARDED = st.sampled_from([name for name in HEURISTICS if name != "random-unguarded"])
@@ -26,8 +29,8 @@ winds = st.builds(
 )
 
 
-def _table(wind: Wind, grid: int) -> np.ndarray:
-    return surcharges(grid, *wind.push(), wind.gusts, wind.seed)
+def _table(wind: Wind, grid: int, rows: int | None = None) -> np.ndarray:
+    return surcharges((grid, rows or grid), *wind.push(), wind.gusts, wind.seed)
 
 
 def test_a_move_against_the_wind_costs_its_strength_more_and_no_other_does() -> None:
@@ -64,18 +67,20 @@ def test_gusts_are_normal_and_a_tail_wind_saves_nothing() -> None:
 def test_the_way_home_costs_as_much_as_the_best_neighbour_and_the_move_there(
     space: ScenarioSpace, wind: Wind
 ) -> None:
-    """The table satisfies the equation of the shortest way, in every cell outside the zone."""
+    """The table satisfies the equation of the shortest way, in every cell outside the zones."""
     fleet = [{"slots_per_cell": 2}]
     space = ScenarioSpace.of(space, wind=wind.model_dump(), fleet=fleet)
-    reach, extra, grid = reach_of(constants_of(space)), _table(wind, space.grid), space.grid
-    x0, y0, width, height = space.zone
-    for s in (1, 2):
-        for y, x in np.ndindex(grid, grid):
-            steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
-            inside = [step for step in steps if min(step[1:]) >= 0 and max(step[1:]) < grid]
-            ways = [s + extra[action, b, a] + reach[s - 1, b, a] for action, a, b in inside]
-            in_zone = x0 <= x < x0 + width and y0 <= y < y0 + height
-            assert reach[s - 1, y, x] == (0 if in_zone else min(ways))
+    reach, extra = reach_of(constants_of(space), space.chart), _table(wind, *space.size)
+    water = reached(space.zone[:2], *space.size, {*space.no_fly})
+    zones = [space.rectangles, *([zone] for zone in space.rectangles)]
+    for (number, among), s, (x, y) in product(enumerate(zones[: len(reach)]), (1, 2), water):
+        steps = [(0, x, y - 1), (1, x + 1, y), (2, x, y + 1), (3, x - 1, y)]
+        ways = [
+            s + extra[action, b, a] + reach[number, s - 1, b, a]
+            for action, a, b in steps
+            if 0 <= a < space.size[0] and 0 <= b < space.size[1] and (a, b) not in space.no_fly
+        ]
+        assert reach[number, s - 1, y, x] == (0 if (x, y) in parking_of(among) else min(ways))
 
 
 @given(spaces(uavs=1, initial_data=1e6), winds, GUARDED, st.integers(1, 3), seeds, replications)

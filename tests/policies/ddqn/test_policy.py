@@ -18,7 +18,7 @@ from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace, load_scenario
 from policies.ddqn.network import DuelingNetwork
 from policies.ddqn.policy import DDQN
-from tests.drawn import Checked, Recorder, Wanderer, replications, seeds, spaces
+from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
 
 PAPER = load_scenario("paper")
 
@@ -57,7 +57,7 @@ def _checked(policy: DDQN) -> Checked:
     return Checked(policy, guard if policy.guarded else lambda view: view.legal)
 
 
-@given(spaces(), st.booleans(), seeds, replications)
+@given(spaces(**PLAIN_SEA), st.booleans(), seeds, replications)
 def test_what_is_not_allowed_is_never_chosen(
     space: ScenarioSpace, guarded: bool, seed: int, replication: int
 ) -> None:

@@ -218,7 +218,8 @@ def test_rates_move_over_their_phase(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def _acting(training: Training) -> tuple[Any, np.ndarray, np.ndarray]:
     """Compact states of the environments, and their UAVs that act, many times over."""
-    states = compact_states(training.stepper.state, training.config.guard)
+    stepper = training.stepper
+    states = compact_states(stepper.state, stepper.world.chart, training.config.guard)
     missions, uavs = np.nonzero(states.uavs[..., ACTIVE] > states.uavs[..., CHARGING])
     return states, np.tile(missions, 2000), np.tile(uavs, 2000)
 
