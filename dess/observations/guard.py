@@ -15,7 +15,7 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
-from dess.sea.chart import FAR, distance, distance_home, in_zone, is_open, length_around
+from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -101,7 +101,7 @@ def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
 def _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y):
     """``path_length`` where there are no-fly cells: the way around all parked teammates.
 
-    Where they block all ways, it takes until one is charged.
+    Or, if that is shorter, the way through and the time that a teammate charges in it.
     """
     length, width = distance(chart, x, y, to_x, to_y), chart.zones.shape[1]
     closed, count, is_met = np.empty(mission.uavs, np.int64), 0, False
@@ -115,10 +115,8 @@ def _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y):
     if not is_met:
         return length
     around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
-    if around < FAR:
-        return around
     lacking = mission.charge_complete - mission.charge_start
-    return length + (lacking + mission.charge_rate - 1) // mission.charge_rate
+    return min(around, length + (lacking + mission.charge_rate - 1) // mission.charge_rate)
 
 
 @kernel

@@ -133,7 +133,7 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     """How far away the cells are where UAV ``i`` may charge, and whether the choice was clear.
 
     In plain Python: the UAVs choose one after the other, the lowest battery first. Parked teammates
-    are islands, and where there is no way around them a UAV waits for a charge. Without other
+    are islands, where the way around them is not longer than to wait for a charge. Without other
     islands, they take two cells more on a way that is in line.
     """
     team, space = [u for u in sea.state.uavs[0] if u["active"]], sea.space
@@ -160,7 +160,7 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
             length = reached(place, *space.size, islands)[cell]
             if islands:
                 around = reached(place, *space.size, islands | mates)
-                ways[cell] = around.get(cell, length + wait)
+                ways[cell] = min(around.get(cell, math.inf), length + wait)
             else:
                 corners = map(min, place, cell), map(max, place, cell)
                 (left, top), (right, bottom) = corners
