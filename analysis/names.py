@@ -118,6 +118,7 @@ PARAMETERS = {
 }
 # Other parameters that studies vary.
 _OTHERS = {
+    "scenario": Parameter("Sea", "Sea"),
     "pads": Parameter("Number of charging pads", "Pads"),
     "zone": Parameter("Start and charging zone", "Zone"),
     "zones": Parameter("Further charging zones", "Zones"),

@@ -123,6 +123,10 @@ def validation_line(error: "ValidationError", where: str, model: "type[BaseModel
     if kind == "literal_error":
         known = [word.strip("'") for word in re.split(", | or ", first["ctx"]["expected"])]
         return f"{place}: {shown(value)} is unknown{one_of(value, known)}"
+    if kind == "union_tag_invalid":
+        known = re.findall("'([^']*)'", first["ctx"]["expected_tags"])
+        named, tag = first["ctx"]["discriminator"].strip("'"), first["ctx"]["tag"]
+        return f"{place}.{named}: {shown(tag)} is unknown{one_of(tag, known)}"
     allowed = form_of(field) if field else f"a table of {listed(fields)}"
     if kind == "value_error":
         line = f"{place}: {first['msg'].removeprefix('Value error, ')}"

@@ -5,7 +5,7 @@ space = ScenarioSpace.of(space, quota=200)         # the same with another quota
 scenario = Scenario.of(uavs=2, forbid_swaps=True)  # a single scenario; Table III for the rest
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from math import inf
 from pathlib import Path
@@ -17,6 +17,7 @@ from pydantic.fields import FieldInfo
 from dess.constants import (
     AS_RANGE,
     EXTENSIONS,
+    GEOMETRY,
     MOST_CELLS,
     MOST_DATA,
     MOST_NODES,
@@ -28,17 +29,33 @@ from dess.constants import (
     merged,
     validated,
 )
-from dess.errors import InputError, one_of
+from dess.errors import InputError, one_of, shown
 from dess.files.shipped import Shipped
-from dess.sea.files import nodes_in
+from dess.sea.families import FAMILIES, is_generated, sea_of
+from dess.sea.no_fly import no_fly_in
+from dess.sea.nodes import nodes_in, projection_in
 from dess.sections.section import Integer, Number, Section
 
 __all__ = ["SAMPLED", "Scenario", "ScenarioSpace", "fields_of", "load_scenario", "scenario_names"]
-__all__ += ["scenario_description", "dotted", "merged", "validated", "Integer", "Number"]
-__all__ += ["EXTENSIONS", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
+__all__ += [
+    "scenario_description",
+    "scenario_families",
+    "scenario_at",
+    "SEA",
+    "is_scenario_name",
+    "dotted",
+    "merged",
+    "validated",
+    "Integer",
+    "Number",
+]
+__all__ += ["EXTENSIONS", "GEOMETRY", "MOST_CELLS", "MOST_NODES", "MOST_SLOTS", "MOST_UAVS"]
 
 # The parameters that vary from mission to mission (Table II), in the order in which they are drawn.
 SAMPLED = ("uavs", "flying_time", "charge_start", "charge_complete")
+
+# What a design calls the scenario of its points, if it differs from point to point.
+SEA = "scenario"
 
 _SCENARIOS = Shipped("scenario", "dess", "scenarios")
 
@@ -158,31 +175,77 @@ def fields_of(model: type[Constants]) -> dict[str, FieldInfo]:
 
 
 def load_scenario(name_or_path: str | Path = "paper", /, **overrides: Any) -> ScenarioSpace:
-    """A shipped scenario by name, or one from a TOML file.
+    """A shipped scenario by name, a generated one by family and seed, or one from a TOML file.
 
     Args:
-        name_or_path: One of ``scenario_names()``, or the path of a TOML file. In such a file,
-            ``nodes`` may be the name of a file in the same folder, which ``dess.sea.files`` reads.
+        name_or_path: One of ``scenario_names()``, a sea such as ``archipelago:7``
+            (``dess.sea.families``), or the path of a TOML file. In such a file, ``nodes`` may be
+            the name of a file in the same folder, which ``dess.sea.nodes`` reads, and ``no_fly``
+            one that ``dess.sea.no_fly`` reads.
         **overrides: Values that replace those of the file. A sampled field that is set to a single
             value is no longer sampled.
 
     Raises:
         InputError: If there is no such scenario, or it is not valid.
     """
-    where, read = _SCENARIOS.load(name_or_path)
+    where, read = _read(name_or_path)
     read.pop("description", None)
-    values = merged(read, overrides)
-    if isinstance(read.get("nodes"), str) and "nodes" not in overrides:
-        placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
-        without = validated(ScenarioSpace, values | placeless, where)
-        path = _SCENARIOS.beside(name_or_path, "nodes", read["nodes"])
-        values["nodes"] = nodes_in(path, without.size, without.cell_size)
+    values = merged(read, overrides) | _from_files(name_or_path, where, read, overrides)
     return validated(ScenarioSpace, values, where)
+
+
+def _from_files(
+    name_or_path: str | Path, where: str, read: dict[str, Any], overrides: dict[str, Any]
+) -> dict[str, Any]:
+    """The nodes and no-fly cells that a scenario names files of, unless others replace them."""
+    named = [key for key in ("nodes", "no_fly") if isinstance(read.get(key), str)]
+    if not {*named} - overrides.keys():
+        return {}
+    placeless = {"nodes": [[0, 0]], "no_fly": [], "arrivals": {}}
+    without = validated(ScenarioSpace, merged(read, overrides) | placeless, where)
+    about = without.size, without.cell_size
+    paths = {key: _SCENARIOS.beside(name_or_path, key, read[key]) for key in named}
+    cells = {}
+    if "nodes" in paths and "nodes" not in overrides:
+        cells["nodes"] = nodes_in(paths["nodes"], *about)
+    if "no_fly" in paths and "no_fly" not in overrides:
+        projection = projection_in(paths["nodes"], *about) if "nodes" in paths else None
+        cells["no_fly"] = no_fly_in(paths["no_fly"], without.size, projection)
+    return cells
 
 
 def scenario_names() -> list[str]:
     """The names of the shipped scenarios."""
     return _SCENARIOS.names()
+
+
+def scenario_at(base: str | Path, values: Mapping[str, Any], /, **overrides: Any) -> ScenarioSpace:
+    """The scenario of a design point: ``scenario`` among its values names another sea.
+
+    Args:
+        base: The scenario if the values name none.
+        values: Fields of the scenario, and perhaps ``scenario``.
+        **overrides: Fields that are set in both.
+
+    Raises:
+        InputError: If it does not exist, is a file, or is not valid.
+    """
+    name = values.get(SEA, base)
+    if SEA in values and not (isinstance(name, str) and is_scenario_name(name)):
+        known = [*scenario_names(), *scenario_families()]
+        raise InputError(f"{SEA}: {shown(name)} is unknown{one_of(name, known)}")
+    fields = {field: value for field, value in values.items() if field != SEA}
+    return load_scenario(name, **overrides, **fields)
+
+
+def scenario_families() -> dict[str, str]:
+    """The families of generated seas as ``FAMILY:SEED``, each with its description."""
+    return {f"{name}:SEED": f"{f.description}, e.g. {name}:7" for name, f in FAMILIES.items()}
+
+
+def is_scenario_name(name: str) -> bool:
+    """Whether a scenario is named by what is shipped or generated, and not by its file."""
+    return name in scenario_names() or is_generated(name)
 
 
 def scenario_description(name_or_path: str | Path) -> str:
@@ -191,4 +254,12 @@ def scenario_description(name_or_path: str | Path) -> str:
     Raises:
         InputError: If there is no such scenario.
     """
-    return str(_SCENARIOS.load(name_or_path)[1].get("description", ""))
+    return str(_read(name_or_path)[1].get("description", ""))
+
+
+def _read(name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
+    """The name or path of a scenario, for messages, and its fields."""
+    name = str(name_or_path)
+    if is_generated(name):
+        return f"scenario {name}", sea_of(name)
+    return _SCENARIOS.load(name_or_path, others=scenario_families())

@@ -16,6 +16,23 @@ def resolve(mission, uavs, chart):
 
 
 @kernel
+def move(mission, uavs, chart):
+    rules.resolve(mission, uavs, chart)
+    rules.grant_pads(mission, uavs)
+    rules.spend(mission, uavs)
+
+
+@kernel
+def arrive(mission, residual, arrivals):
+    rules.arrive(mission, residual, arrivals)
+
+
+@kernel
+def settle(mission, uavs):
+    rules.settle(mission, uavs)
+
+
+@kernel
 def advance(
     mission, uavs, residual, sensors, teeth, arrivals,
     nodes, mean_snr, order, means, chart, batches, search,

@@ -25,7 +25,7 @@ QUICK = (
     *("dess/test_scenario.py", "dess/sections/test_age.py", "dess/sections/test_arrivals.py"),
     *("dess/sections/test_failures.py", "dess/sections/test_fleet.py", "dess/test_errors.py"),
     *("dess/test_files.py", "dess/test_missions.py"),
-    *("dess/test_paper_records.py", "dess/test_rules.py", "dess/test_sea.py"),
+    *("dess/test_paper_records.py", "dess/test_rules.py", "dess/sea"),
     *("dess/test_streams.py", "policies/test_trained.py", "analysis/stats", "test_doors.py"),
 )
 # Files that take longest; they come first, so that workers end together.

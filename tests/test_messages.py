@@ -18,10 +18,11 @@ from analysis.results.evidence import Evidence
 from analysis.results.manifest import Manifest
 from analysis.study.study import Study
 from analysis.verification.cross_check import CrossCheck
-from dess import InputError, sea
+from dess import InputError
 from dess.files.documents import Document
 from dess.record import MISSION_RECORD, UAV_RECORD
 from dess.scenario import Scenario, ScenarioSpace, validated
+from dess.sea import no_fly, nodes
 from policies.ddqn.checkpoint import Header
 from policies.ddqn.config import TrainingConfig, load_config
 from policies.ddqn.description import Description
@@ -80,7 +81,10 @@ def documents() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:
     cost = {"policy": "greedy", "calls": 1, "median": 1e-6, "slow": 1e-6}
     yield Times, {"processor": "x", "costs": [cost]}
     point = {"type": "Point", "coordinates": [1.0, 2.0]}
-    yield sea._Collection, {"features": [{"geometry": point}]}
+    yield nodes._Collection, {"features": [{"geometry": point}]}
+    ring = [[1.0, 2.0], [3.0, 2.0], [3.0, 4.0], [1.0, 2.0]]
+    polygon = {"type": "Polygon", "coordinates": [ring]}
+    yield no_fly._Collection, {"features": [{"geometry": polygon}]}
 
 
 def tables() -> Iterator[tuple[type[BaseModel], dict[str, Any]]]:

@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import COST, DECISIONS, METRICS, SUCCESS, parameter, value_text
-from analysis.questions.settings import points, ranked
+from analysis.names import COST, DECISIONS, METRICS, SUCCESS
+from analysis.questions.settings import points, ranked, value_in_words
 from analysis.results.tables import Results
 from analysis.stats.front import membership, on_front
 from analysis.study.cheapest import Cheapest, CheapestChoice
@@ -29,7 +29,6 @@ from dess.errors import InputError, one_of
 MISSED, OPEN, MET = "missed", "open", "met"  # the most serious first
 VERDICTS = {MET: "shown", OPEN: "not shown", MISSED: "refuted"}  # the words used in tables
 EVERYWHERE = "all conditions"
-_UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
 _WHY_NOT = {
     MET: "meets the requirements as well, and saves less than the indifference",
     OPEN: "is not known to meet the requirements",
@@ -171,6 +170,27 @@ def answers(results: Results, table: pd.DataFrame) -> list[str]:
     return sentences
 
 
+def answer(results: Results) -> str:
+    """In words: the cheapest setting of the first policy, and what the others would have said.
+
+    If there are several conditions, it is the setting for all of them together.
+    """
+    table, first = judged(results), results.policies[0]
+    return " ".join([answers(results, table[table["policy"] == first])[-1], *dependence(results)])
+
+
+def dependence(results: Results) -> list[str]:
+    """A sentence for each further policy: what its cheapest fleet is, so how much depends on it."""
+    fleets = selections(results).groupby("policy", sort=False)["setting"].last()
+    first, *others = results.policies
+    return [
+        f"`{policy}` gives the same answer."
+        if fleets[policy] == fleets[first]
+        else f"With `{policy}`, it would be **{fleets[policy]}**."
+        for policy in others
+    ]
+
+
 def cheapest_fleet(results: Results) -> str:
     """The cheapest fleet of the first policy that meets the requirements under every condition."""
     found = selections(results)
@@ -277,13 +297,6 @@ def _words(results: Results, decisions: bool) -> list[list[str]]:
     """The fields of every design point that an operator decides on, or all others, in words."""
     rows = points(results).to_dict("records")
     return [
-        [_value(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions] for r in rows
+        [value_in_words(str(f), v) for f, v in r.items() if (f in DECISIONS) == decisions]
+        for r in rows
     ]
-
-
-def _value(field: str, value: Any) -> str:
-    """``3 UAVs``, or ``arrival rate 0.02``."""
-    text = value_text(value)
-    if unit := _UNITS.get(field):
-        return f"{text} {unit}{'' if text == '1' else 's'}"
-    return f"{parameter(field).within} {text}"

@@ -24,7 +24,7 @@ from analysis.questions.missions import FOLDER
 from analysis.results.provenance import Count, Finite
 from analysis.results.tables import Results
 from analysis.study.stopping import Text
-from dess import InputError, simulate
+from dess import InputError, simulate, simulate_batch
 from dess.files.documents import Document
 from dess.files.reading import read_text
 from dess.files.writing import check_target, write_file
@@ -33,6 +33,9 @@ from policies.base import Policy
 from policies.registry import load_team
 
 CALLS = 60  # calls of every policy that are timed at least: those of about one mission
+# In batches: the most design points, and the missions of each that are simulated side by side; one
+# of a policy that is too slow for many (``Policy.chunk``).
+POINTS, SIDE_BY_SIDE = 20, 16
 SLOW = 0.95  # the quantile that is reported for slow calls
 
 Seconds = Annotated[Finite, Field(gt=0, le=1e6)]
@@ -49,12 +52,15 @@ class Cost(Document):
         calls: The number of calls.
         median: Their median time [s].
         slow: The ``SLOW`` quantile of their times [s].
+        batch: The mean time of the decision for one UAV, where many missions are simulated side by
+            side [s]; None where only the SimPy engine can simulate them.
     """
 
     policy: Text
     calls: Count
     median: Seconds
     slow: Seconds
+    batch: Seconds | None = None
 
 
 class Times(Document):
@@ -116,7 +122,10 @@ def measure(
         if team:
             seconds = _calls(team, results, clock)
             median, slow = np.quantile(seconds, [0.5, SLOW]).tolist()
-            costs.append(Cost(policy=policy, calls=len(seconds), median=median, slow=slow))
+            batch = _in_batches(team, results, clock)
+            costs.append(
+                Cost(policy=policy, calls=len(seconds), median=median, slow=slow, batch=batch)
+            )
         if progress:
             progress(done, len(results.policies))
     return Times(processor=_processor(), costs=costs)
@@ -134,11 +143,26 @@ def _calls(team: list[Policy], results: Results, clock: Clock) -> list[float]:
     return calls
 
 
+def _in_batches(team: list[Policy], results: Results, clock: Clock) -> float | None:
+    """The mean time of a decision [s], over design points that are spread over the design."""
+    scenarios, seed = results.store.manifest.scenarios, results.store.manifest.seed
+    if any(space.needs_events for space in scenarios):
+        return None
+    calls: list[float] = []
+    timed = [_Timed(policy, clock, calls) for policy in team]
+    missions = 1 if any(hasattr(policy, "chunk") for policy in team) else SIDE_BY_SIDE
+    with threadpool_limits(1):
+        for space in scenarios[:: -(-len(scenarios) // POINTS)]:
+            simulate_batch(space, timed, seed, range(missions))
+    return sum(calls) / max(sum(policy.decisions for policy in timed), 1)
+
+
 class _Timed:
     """A policy whose calls are timed; the first one is made twice, since it compiles and loads."""
 
     def __init__(self, policy: Policy, clock: Clock, calls: list[float]):
         self.name, self.policy, self.clock, self.calls = policy.name, policy, clock, calls
+        self.decisions = 0
 
     def act(self, view: View) -> np.ndarray:
         """Return the actions of the policy, and note the time."""
@@ -147,6 +171,7 @@ class _Timed:
         begin = self.clock()
         actions = self.policy.act(view)
         self.calls.append(self.clock() - begin)
+        self.decisions += len(view)
         return actions
 
 
@@ -167,6 +192,7 @@ def listed(times: Times) -> pd.DataFrame:
             "Policy": cost.policy,
             "Median": numbers.seconds(cost.median),
             "95 % below": numbers.seconds(cost.slow),
+            "In batches, per UAV": numbers.seconds(cost.batch) if cost.batch else "",
             "Calls": f"{cost.calls:,}",
         }
         for cost in times.costs

@@ -73,11 +73,13 @@ class LoggedMission:
 def answer(missions: Sequence[LoggedMission]) -> str:
     """What share of the data single missions of fleets of different sizes collect."""
     parts = [
-        f"{m.fleet} {numbers.percent(m.row[RATIO])} in {m.row['slots']} slots" for m in missions
+        f"{numbers.percent(m.row[RATIO])} with {m.fleet} in {m.row['slots']} slots"
+        for m in missions
     ]
     return (
-        f"In one mission of {missions[0].row['policy']} each, {numbers.words(parts)}: the UAVs "
-        "share the nodes, and fly home to charge before their batteries are empty."
+        f"Of the data, single missions of {missions[0].row['policy']} collect "
+        f"{numbers.words(parts)}: the UAVs share the nodes, and fly home to charge before their "
+        "batteries are empty."
     )
 
 

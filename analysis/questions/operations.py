@@ -94,7 +94,7 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
 
     A number of pads is enough if with it, and with every larger number, the product is at most
     ``margin`` below that with most pads: the lower end of the 95 % interval says so. It is too few
-    if the whole interval is below 0. What is neither is open.
+    if the whole interval says that more is lost. What is neither is open.
 
     Args:
         results: The study ``pads``, or another one that varies ``uavs`` and ``pads``.
@@ -113,7 +113,7 @@ def enough_pads(results: Results, margin: float) -> pd.DataFrame:
     for (policy, uavs), part in lost.groupby(["policy", "uavs"], sort=False):
         short = part.loc[part["low"] < -margin, "pads"].max()
         enough = min(n for n in (*part["pads"], max(pads)) if not n <= short)
-        few = part.loc[(part["high"] < 0) & (part["pads"] < enough), "pads"].max()
+        few = part.loc[(part["high"] < -margin) & (part["pads"] < enough), "pads"].max()
         few = 0 if np.isnan(few) else int(few)
         rows.append((policy, uavs, enough, few, [n for n in part["pads"] if few < n < enough]))
     return pd.DataFrame(rows, columns=["policy", "uavs", "pads", "too_few", "open"])

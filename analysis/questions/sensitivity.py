@@ -1,9 +1,10 @@
-"""Global sensitivity analysis: Sobol indices of a Saltelli design, computed with SALib."""
+"""Global sensitivity analysis: Sobol indices of a Saltelli design."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from scipy import stats
 
 from analysis import numbers
 from analysis.names import MEANS, SHARES, parameter, value_text
@@ -92,20 +93,22 @@ def ranges_in_words(ranges: Mapping[str, Sequence[float]]) -> str:
 
 
 def _indices(design: Saltelli, values: np.ndarray) -> pd.DataFrame:
-    """A row per parameter: first-order and total indices, each with the ends of its interval."""
-    from SALib.analyze import sobol
+    """A row per parameter: first-order and total indices, each with the ends of its interval.
 
-    samples = values.reshape(design.base, -1)[:, [0, -1]]  # A and B
-    varies = np.ptp(samples) > np.finfo(float).eps * np.ptp(values)
-    indices: dict = dict.fromkeys(("S1", "S1_conf", "ST", "ST_conf"), np.nan)
-    if varies:
-        # Not the seed itself, since SALib takes 0 for "no seed".
-        options: dict = {"num_resamples": RESAMPLES, "conf_level": LEVEL}
-        options["seed"] = np.random.default_rng(0)
-        indices = sobol.analyze(design.problem, values, calc_second_order=False, **options)
+    The estimators are those of SALib (Saltelli and others 2010), for all resamples at once.
+    """
+    rows = (values - values.mean()).reshape(design.base, -1)
+    a, b, mixed = rows[:, :1], rows[:, -1:], rows[:, 1:-1]  # A, B, and A with a column of B
+    drawn = np.random.default_rng(0).integers(design.base, size=(design.base, RESAMPLES))
+    counts = [np.bincount(blocks, minlength=design.base) for blocks in drawn.T]
+    weights = np.array([np.ones(design.base), *counts]) / design.base  # the design itself first
+    variance = weights @ (a**2 + b**2) / 2 - (weights @ (a + b) / 2) ** 2
+    varies = np.ptp([a, b]) > np.finfo(float).eps * np.ptp(values)
+    variance[variance <= 0] = np.inf  # of a resample in which nothing varies: its indices are 0
     table = pd.DataFrame({"parameter": design.problem["names"]})
-    for name, index in (("first", "S1"), ("total", "ST")):
-        half = indices[f"{index}_conf"]
-        table[name] = indices[index]
-        table[f"{name}_low"], table[f"{name}_high"] = table[name] - half, table[name] + half
+    half = stats.norm.ppf(0.5 + LEVEL / 2)
+    for name, share in (("first", b * (mixed - a)), ("total", (a - mixed) ** 2 / 2)):
+        indices = weights @ share / variance if varies else np.full((3, len(table)), np.nan)
+        table[name], error = indices[0], half * indices[1:].std(axis=0, ddof=1)
+        table[f"{name}_low"], table[f"{name}_high"] = table[name] - error, table[name] + error
     return table.assign(n=len(values))

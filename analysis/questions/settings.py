@@ -33,6 +33,7 @@ from analysis.stats.screening import may_be_best
 from dess.errors import InputError, one_of
 
 AS_IT_IS = "the scenario"  # a design point in words, if the design varies nothing
+_UNITS = {"uavs": "UAV", "pads": "pad"}  # fields that are counts
 MOST_VALUES, BINS = 12, 5  # a field with more than MOST_VALUES numbers is divided into BINS bins
 
 
@@ -59,7 +60,7 @@ def points(results: Results) -> pd.DataFrame:
     for field in manifest.values[0]:
         values = [of_point[field] for of_point in manifest.values]
         if field == "pads":  # without a number, it depends on the zone
-            values = [results.scenario(number).charging_pads for number in range(len(values))]
+            values = [results.scenario(number).zone_pads[0] for number in range(len(values))]
         texts = _texts(field, values)
         if len({*texts}) > 1:
             columns[field] = texts
@@ -67,12 +68,19 @@ def points(results: Results) -> pd.DataFrame:
 
 
 def in_words(results: Results) -> list[str]:
-    """Every design point in words, as ``number of UAVs 3, arrival rate 0.02``."""
+    """Every design point in words, as ``3 UAVs, arrival rate 0.02``."""
     rows = points(results).to_dict("records")
     return [
-        ", ".join(f"{parameter(str(f)).within} {value_text(v)}" for f, v in row.items()) or AS_IT_IS
-        for row in rows
+        ", ".join(value_in_words(str(f), v) for f, v in row.items()) or AS_IT_IS for row in rows
     ]
+
+
+def value_in_words(field: str, value: Any) -> str:
+    """``3 UAVs``, or ``arrival rate 0.02``."""
+    text = value_text(value)
+    if unit := _UNITS.get(field):
+        return f"{text} {unit}{'' if text == '1' else 's'}"
+    return f"{parameter(field).within} {text}"
 
 
 def ranked(results: Results, metric: str = PRODUCT, policy: str | None = None) -> pd.DataFrame:

@@ -163,11 +163,11 @@ def against_paper(means: pd.DataFrame, policy: str, printed: Mapping[str, float]
         policy: The policy.
         printed: The paper's numbers by metric.
     """
-    texts, n = of_policy(means, policy), means["n"].min()
+    texts, n, count = of_policy(means, policy), means["n"].min(), means["policy"].nunique()
     return (
-        f"The best policy, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions with a product "
-        f"of {texts[PRODUCT]}; the paper prints {numbers.percent(printed[SUCCESS])} and "
-        f"{numbers.percent(printed[PRODUCT])}."
+        f"The best of {count} policies, {policy}, succeeds in {texts[SUCCESS]} of {n:,} missions "
+        f"with a product of {texts[PRODUCT]}; the paper prints "
+        f"{numbers.percent(printed[SUCCESS])} and {numbers.percent(printed[PRODUCT])}."
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from analysis.results.manifest import Cell, Manifest
 from analysis.results.provenance import Origin
-from dess.scenario import dotted, load_scenario, scenario_names
+from dess.scenario import SEA, dotted, is_scenario_name, load_scenario
 
 
 def of_folder(folder: str | Path, manifest: Manifest, cell: Cell, replication: int) -> str:
@@ -41,8 +41,9 @@ def of_fields(origin: Origin, policy: str, values: dict[str, Any], replication: 
         values: Of the mission's design point.
         replication: Of the mission.
     """
-    name, changes = origin.study["scenario"], origin.study["set"] | values
-    if name not in scenario_names():
+    changes = origin.study["set"] | values
+    name = changes.pop(SEA, origin.study["scenario"])
+    if not is_scenario_name(name):
         name, paper = "paper", load_scenario("paper").model_dump(mode="json")
         fields = origin.space(values).model_dump(mode="json")
         changes = {k: v for k, v in fields.items() if k not in paper or v != paper[k]}

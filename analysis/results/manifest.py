@@ -27,7 +27,7 @@ from analysis.study.costs import Costs
 from analysis.study.design import DesignPoint
 from analysis.study.study import CHECK, Point, Study, StudyData
 from dess import InputError
-from dess.scenario import ScenarioSpace, load_scenario
+from dess.scenario import SEA, ScenarioSpace, load_scenario
 from dess.streams import MAX_REPLICATION
 
 SCHEMA_VERSION = 3
@@ -245,7 +245,8 @@ class Manifest(Origin):
         """
         fields = dict.fromkeys(field for point in self.points for field in point.values)
         base = self.space({})
-        unset = {field: base.plain_value(field) for field in fields}
+        unset = {field: base.plain_value(field) for field in fields if field != SEA}
+        unset |= {SEA: self.study["scenario"]} if SEA in fields else {}
         return [unset | point.values for point in self.points]
 
     @cached_property

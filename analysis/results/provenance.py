@@ -24,7 +24,7 @@ from analysis.study.study import StudyData
 from dess.code.sources import OURS, code_of, combined
 from dess.errors import InputError, validation_line
 from dess.files.documents import Document
-from dess.scenario import ScenarioSpace, fields_of, merged
+from dess.scenario import SEA, ScenarioSpace, fields_of, merged, scenario_at
 from dess.streams import MAX_REPLICATION, MAX_SEED
 from policies.base import Policy
 from policies.registry import TypedByUser, confirmed, load_team
@@ -149,6 +149,8 @@ class Origin(Document):
         Raises:
             InputError: If it is not valid.
         """
+        if SEA in values:
+            return scenario_at(self.study["scenario"], values, **self.study["set"])
         return scenario_of(merged(self.scenario, values))
 
     def changes_here(self, named: Collection[str] = ()) -> list[str]:

@@ -1,8 +1,8 @@
 """Experimental designs: the points of the parameter space that a study simulates.
 
-A design is the table ``[design]`` of a study's TOML file. There are five kinds: ``grid``,
-``one-at-a-time``, ``table``, ``latin-hypercube`` and ``saltelli``. The design points are a pure
-function of the fields of the design, in the order in which these are written.
+A design is the table ``[design]`` of a study's TOML file. There are six kinds: ``grid``,
+``one-at-a-time``, ``table``, ``seas``, ``latin-hypercube`` and ``saltelli``. The design points are
+a pure function of the fields of the design, in the order in which these are written.
 """
 
 import sys
@@ -19,7 +19,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from analysis.study.stopping import StrictTable, of_its_kind
 from dess.errors import InputError, shown
-from dess.scenario import Integer, Scenario, dotted, fields_of
+from dess.scenario import SEA, Integer, Scenario, dotted, fields_of
+from dess.sea.families import seas_of
 from dess.sections.section import tuples
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
@@ -167,6 +168,21 @@ class Table(_Design):
         return map(DesignPoint, self.rows)
 
 
+class Seas(_Design):
+    """Generated seas: every sea of a set is a design point (``dess.sea.families``)."""
+
+    kind: Literal["seas"] = "seas"
+    set: Literal["train", "validation", "test"] = Field("test", description="the set of seas")
+
+    @property
+    def count(self) -> int:
+        """The number of seas."""
+        return len(seas_of(self.set))
+
+    def _points(self) -> Iterator[DesignPoint]:
+        return (DesignPoint({SEA: name}) for name in seas_of(self.set))
+
+
 class _Sampled(_Design):
     """Points drawn uniformly from the ranges; integer fields take each integer equally often."""
 
@@ -273,7 +289,7 @@ def _scaled(u: float, ends: tuple[Any, Any], is_integer: bool) -> Any:
 
 
 Design = Annotated[
-    Grid | OneAtATime | Table | LatinHypercube | Saltelli,
+    Grid | OneAtATime | Table | Seas | LatinHypercube | Saltelli,
     Field(discriminator="kind"),
-    of_its_kind("kind", Grid, OneAtATime, Table, LatinHypercube, Saltelli),
+    of_its_kind("kind", Grid, OneAtATime, Table, Seas, LatinHypercube, Saltelli),
 ]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -27,7 +28,15 @@ from analysis.study.stopping import MOST, Precision, StrictTable, Text
 from dess.errors import InputError, cut, listed, one_of, validation_line
 from dess.files.shipped import Shipped
 from dess.record import measures_of
-from dess.scenario import Integer, ScenarioSpace, dotted, load_scenario, scenario_names
+from dess.scenario import (
+    SEA,
+    Integer,
+    ScenarioSpace,
+    dotted,
+    is_scenario_name,
+    load_scenario,
+    scenario_at,
+)
 from dess.sections.section import tuples
 from dess.streams import MAX_SEED
 from policies.registry import load_team, typed
@@ -52,7 +61,8 @@ class Point(NamedTuple):
     @property
     def key(self) -> frozenset[tuple[str, Any]]:
         """What the design sets, as the scenario has it: it is the same for 1 and 1.0."""
-        return frozenset((field, self.scenario.value(field)) for field in self.values)
+        values = self.values.items()
+        return frozenset((f, v if f == SEA else self.scenario.value(f)) for f, v in values)
 
 
 def _by_field(values: Any) -> Any:
@@ -283,14 +293,15 @@ class Study(StudyData):
         return Point(row.values, self._scenario_at(row.values), row.replication)
 
     def _scenario_at(self, values: dict[str, Any]) -> ScenarioSpace:
-        if not values.keys() & {"grid", "rows", "cell_size"}:  # these move the nodes of a file
+        if not values.keys() & {SEA, "grid", "rows", "cell_size"}:  # these move nodes of a file
             with suppress(InputError):  # raised below, in the words of the scenario's file
                 return ScenarioSpace.of(**self._fields | values)
         try:
-            space = load_scenario(self.scenario, **self.set, **values)
-            for field in ("grid", "rows", "cell_size"):
-                if field in values and "nodes" not in values and space.nodes != self._base.nodes:
-                    raise InputError(f"{field} moves the nodes of a file; allowed: nodes as cells")
+            space = scenario_at(self.scenario, values, **self.set)
+            for field, cells in product(("grid", "rows", "cell_size"), ("nodes", "no_fly")):
+                moves = getattr(space, cells) != getattr(self._base, cells)
+                if values.keys() & {field, cells, SEA} == {field} and moves:
+                    raise InputError(f"{field} moves the {cells} of a file; allowed: cells")
             return space
         except InputError as error:
             raise InputError(f"at {_shown(values)}: {error}" if values else str(error)) from None
@@ -313,7 +324,7 @@ def load_study(name_or_path: str | Path, /, **overrides: Any) -> Study:
     where, values = _STUDIES.load(name_or_path)
     values = {"name": text if text in study_names() else Path(text).stem} | values
     scenario = values.get("scenario")
-    if isinstance(scenario, str) and scenario not in scenario_names():
+    if isinstance(scenario, str) and not is_scenario_name(scenario):
         values["scenario"] = str(Path(text).parent / scenario)
     if "policies" in overrides:
         overrides["policies"] = typed(overrides["policies"])

@@ -28,6 +28,7 @@ from analysis.results.chunks import short_hash
 from analysis.results.files import MANIFEST
 from analysis.results.provenance import engine_code, team_of
 from analysis.results.tables import Results
+from analysis.study.best import BASELINE, policies_for
 from analysis.study.cheapest import Cheapest
 from analysis.study.costs import Costs
 from analysis.study.design import Grid
@@ -35,7 +36,7 @@ from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files.reading import paths_in
 from dess.files.writing import write_file
-from dess.scenario import load_scenario, scenario_names
+from dess.scenario import is_scenario_name, load_scenario
 from policies.registry import typed
 
 LONGEST = 60  # largest number of characters for the fields in a name
@@ -49,7 +50,7 @@ LITTLE = 0.01  # as a share of the prices: a saving that does not matter
 def question(
     values: Mapping[str, Sequence[Any]],
     scenario: str | Path = "paper",
-    policies: Iterable[str] = ("greedy",),
+    policies: Iterable[str] | None = None,
     missions: int = 300,
     seed: int = 0,
     prices: Mapping[str, Any] | None = None,
@@ -61,7 +62,8 @@ def question(
     Args:
         values: For each field of the scenario its values. A field with one value is fixed.
         scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams: ``"P"`` or ``"P,P,..."``.
+        policies: Teams: ``"P"`` or ``"P,P,..."``. Without any, the best policy that five minutes
+            allow, and ``greedy``.
         missions: Number of missions of every setting. With requirements, the number of additional
             missions that check each selected setting.
         seed: Seed of the missions.
@@ -86,13 +88,17 @@ def question(
         "scenario": str(scenario),
         "set": fixed,
         "design": {"kind": "grid", "values": swept},
-        "policies": typed([policies] if isinstance(policies, str) else policies),
+        "policies": typed([policies] if isinstance(policies, str) else policies or [BASELINE]),
         "seed": seed,
         **({"costs": dict(prices)} if prices else {}),
         **({} if requirements else {"missions": missions}),
     }
     if requirements:
         data["selection"] = _cheapest(requirements, missions, _study(data))
+    if policies is None:
+        points = _study(data).points
+        chosen = policies_for((point.scenario for point in points), missions + FIRST)
+        data["policies"] = chosen
     study = _study(data)
     return study if name is not None else study.model_copy(update={"name": _name_of(study, swept)})
 
@@ -167,7 +173,7 @@ def write(study: Study, folder: str | Path) -> Path:
     """Write the file of the study, which ``dess study run`` reads, and return its path."""
     path = file_of(study, folder)
     data = study.model_dump(mode="json", exclude_unset=True)
-    if study.scenario not in scenario_names():
+    if not is_scenario_name(study.scenario):
         data["scenario"] = Path(os.path.relpath(study.scenario, path.parent)).as_posix()
     write_file(path, tomli_w.dumps(data))
     return path

@@ -81,6 +81,7 @@ class Sweep:
         if not self.study.selection:
             return []
         lines = costs.answers(self.results, costs.judged(self.results))
+        lines += costs.dependence(self.results)
         return [line.replace("**", "").replace("`", "") for line in lines]
 
     def cheapest(self) -> str:
@@ -126,7 +127,7 @@ class Sweep:
 
 def sweep(
     scenario: str | Path = "paper",
-    policies: Iterable[str] = ("greedy",),
+    policies: Iterable[str] | None = None,
     missions: int = 300,
     seed: int = 0,
     folder: str | Path = "results",
@@ -146,7 +147,8 @@ def sweep(
 
     Args:
         scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams to compare: ``"P"`` or ``"P,P,..."``.
+        policies: Teams to compare: ``"P"`` or ``"P,P,..."``. Without any, the best policy that
+            five minutes allow, and ``greedy``.
         missions: Number of missions of every setting. With requirements, the number of additional
             missions that check each selected setting.
         seed: Seed of the missions.

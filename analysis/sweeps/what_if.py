@@ -129,7 +129,7 @@ def what_if(
     settings: Mapping[str, Any],
     baseline: Mapping[str, Any] | None = None,
     scenario: str | Path = "paper",
-    policies: Sequence[str] = ("ddqn", "greedy"),
+    policies: Sequence[str] | None = None,
     missions: int = 500,
     seed: int = 0,
     folder: str | Path = "results",
@@ -148,7 +148,8 @@ def what_if(
         baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
             first.
         scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``.
+        policies: Teams, each compared with itself: ``"P"`` or ``"P,P,..."``. Without any, the best
+            policy that five minutes allow, and ``greedy``.
         missions: Number of missions of each policy on each side, at least 2.
         seed: Seed of the missions.
         folder: Folder in which results are stored.

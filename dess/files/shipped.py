@@ -3,6 +3,7 @@
 where, values = Shipped("scenario", "dess", "scenarios").load("paper")
 """
 
+from collections.abc import Iterable
 from importlib import resources
 from os.path import realpath
 from pathlib import Path
@@ -56,8 +57,14 @@ class Shipped(NamedTuple):
             )
         return folder / file
 
-    def load(self, name_or_path: str | Path) -> tuple[str, dict[str, Any]]:
+    def load(
+        self, name_or_path: str | Path, others: Iterable[str] = ()
+    ) -> tuple[str, dict[str, Any]]:
         """Read a shipped file by its name, or any TOML file by its path.
+
+        Args:
+            name_or_path: The name or path.
+            others: Further names that a message about an unknown one lists.
 
         Returns:
             The name or path, for messages, and the content.
@@ -75,5 +82,5 @@ class Shipped(NamedTuple):
         try:
             return text, parse_toml(read_text(Path(text), TOML_LIMIT), text)
         except Missing:
-            allowed = one_of(text, self.names(), "a TOML file")
+            allowed = one_of(text, [*self.names(), *others], "a TOML file")
             raise InputError(f"{text}: no such {self.kind}{allowed}") from None

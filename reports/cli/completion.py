@@ -15,10 +15,11 @@ def policies(start: str) -> list[str]:
 
 
 def scenarios(start: str) -> list[str]:
-    """Names of shipped scenarios."""
-    from dess import scenario_names
+    """Names of shipped scenarios, and of families of generated ones up to the seed."""
+    from dess.scenario import scenario_families, scenario_names
 
-    return _beginning(scenario_names(), start)
+    families = [name.removesuffix("SEED") for name in scenario_families()]
+    return _beginning([*scenario_names(), *families], start)
 
 
 def studies(start: str) -> list[str]:

@@ -53,11 +53,12 @@ def show_policy(
 
 @scenarios.callback()
 def list_scenarios(context: typer.Context) -> None:
-    """List the shipped scenarios, or show one."""
-    from dess.scenario import scenario_description, scenario_names
+    """List the shipped scenarios and the families of generated ones, or show one."""
+    from dess.scenario import scenario_description, scenario_families, scenario_names
 
     if context.invoked_subcommand is None:
-        console.print_list((name, scenario_description(name)) for name in scenario_names())
+        shipped = [(name, scenario_description(name)) for name in scenario_names()]
+        console.print_list([*shipped, *scenario_families().items()])
 
 
 @command(scenarios, "show")
@@ -70,7 +71,7 @@ def show_scenario(
     """Show every field of a scenario: its value and what it is.
 
     Args:
-        name: A shipped scenario or a TOML file.
+        name: A shipped scenario, a generated one such as archipelago:7, or a TOML file.
         everything: Show the defaults and what is allowed as well, in full.
     """
     from analysis.names import fields

@@ -61,7 +61,8 @@ def sweep(
     Args:
         settings: The values of a field: 2..5, 0.01..0.05:5 (five values) or 1,2,4. A field with
             one value is fixed; repeatable.
-        policy: Policies to compare; repeatable.  [default: greedy]
+        policy: Policies to compare; repeatable.  [default: the best that five minutes allow, and
+            greedy]
         metric: The metric that ranks the settings: success, ratio, product, reward, cost, or
             what the scenario measures, such as age.  [default: product]
         missions: Missions per setting; with --require, additional missions that check each
@@ -81,7 +82,7 @@ def sweep(
     study = question.question(
         all_values(settings or []),
         scenario,
-        [name for text in policy or ["greedy"] for name in text.split(",")],
+        [name for text in policy for name in text.split(",")] if policy else None,
         missions,
         seed,
         all_settings(map(_with_quotes, price or []), "--price", PRICE),

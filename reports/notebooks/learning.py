@@ -72,9 +72,8 @@ html.figure(drawing, "The product that every variant reaches", DOTS.format(basel
 # ## <a id="fig-3"></a>Transfer learning: the paper's Fig. 3
 #
 # The paper claims a higher reward at every step, and a higher product in the end. With its methods
-# alone most trainings do not learn to charge: after the first updates hardly a UAV enters the zone
-# below its charging start and waits there, so the replay memory has no transition that shows what
-# a charge is worth.
+# alone most trainings do not learn to charge: hardly a UAV enters the zone with a low battery and
+# waits there, so the replay memory has no transition that shows what a charge is worth.
 
 
 # %%
@@ -108,9 +107,8 @@ html.gallery(
 # %% [markdown]
 # ## How far to trust it
 #
-# Trainings of a variant differ only in their seed. A variant that was trained once has neither
-# interval nor mean; only large differences of it can be significant. P-values are corrected for the
-# number of tests (Holm).
+# Trainings of a variant differ only in their seed. A variant that was trained once has no interval.
+# P-values are corrected for the number of tests (Holm).
 
 # %%
 transfers = learning.transfers(trainings, metrics, shortest=paper.CROSSING)

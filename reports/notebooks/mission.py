@@ -70,9 +70,8 @@ played(shown[-1], "player")
 html.say("{reading}", reading=READING)
 
 # %% [markdown]
-# On the maps, an arrow is a move in one slot, in the colour of the node that was served most in it;
-# it is grey if none was. A cross is a slot of hovering, a star one of charging, a numbered diamond
-# the start, a dot the end. The y axis points south.
+# On the maps, an arrow is a move in one slot, in the colour of the node that was served most, or
+# grey. A cross is hovering, a star charging, a numbered diamond the start, a dot the end.
 
 # %% [markdown]
 # ## Two policies in step

@@ -25,6 +25,7 @@ import numpy as np
 from IPython.display import display
 
 from analysis import distribution, load_results, names
+from analysis.questions import costs as questions
 from analysis.questions import settings, summary
 from reports.pages import html
 from reports.pages.study import costs, drawings, tables, words
@@ -35,7 +36,7 @@ by = words.metric_of(study, metric)
 metrics, called = words.metrics_of(by), names.metric_name(by).lower()
 
 # %% tags=["if-cheapest"]
-html.answer(costs.cheapest(study)[-1])
+html.answer(questions.answer(study))
 
 # %% tags=["if-ranked"]
 ranked = settings.ranked(study, by)

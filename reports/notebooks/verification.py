@@ -82,8 +82,7 @@ html.gallery(figures, f"Dots should lie on the bars, and inside {band}")
 # ## The channel
 #
 # The mean rate of a UAV that hovers near one node must equal the integral of δ log<sub>2</sub>(1 +
-# SNR) over the shadowing (Figure 1). Every communication in the logs is computed again: which node
-# has the highest SNR, and how much data it sends.
+# SNR) over the shadowing (Figure 1). Every communication in the logs is computed again.
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.CHANNEL))
@@ -113,7 +112,7 @@ html.say("{verdicts} The missions are those of {names}.", verdicts=verdicts, nam
 # %% [markdown]
 # ## The draws of a mission
 #
-# Every mission draws its parameters and the initial data of every node from uniform distributions.
+# Every value is drawn from a uniform distribution.
 
 # %%
 display(html.say("{text}", text=html.composed(checks.on_topics(judged, checks.DRAWS))))
@@ -131,8 +130,8 @@ html.gallery(figures, f"All values should be drawn equally often: dots should li
 # ## Coverage of the confidence intervals
 #
 # The share of intervals of blocks of missions that contain the mean of all missions. Wilson's
-# interval, used for success, is too short where nearly all missions succeed: its exact coverage
-# (hypergeometric distribution) is the known value in the table.
+# interval of the success is too short where nearly all missions succeed: its exact coverage is the
+# known value in the table.
 
 # %%
 verdicts = html.composed(checks.on_topics(judged, checks.COVERAGE))

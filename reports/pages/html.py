@@ -162,7 +162,7 @@ def weights(folder: Path) -> HTML:
     """A table of the files of the learned policies in a folder, and the evidence to verify it."""
     files = learned_files(folder)
     rows = [(name, digest[:SHORT]) for name, digest in files.items()]
-    shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]))
+    shown = table(pd.DataFrame(rows, columns=["File", "SHA-256"]), "The learned policies")
     return HTML(shown.data + _embedded(FILES, json.dumps(files)))
 
 

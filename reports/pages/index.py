@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 LARGEST = 512 * 2**20  # bytes of a page
 TILES = {  # pages whose number has a tile, and what it is
-    "performance": "The best policy on the paper's missions",
+    "performance": "Against the paper's policy",
     "planner": "Planning against learning",
     "own-sea": "The cheapest fleet of the example",
 }

@@ -29,7 +29,7 @@ SCORECARD = "scorecard"
 # The reports in the order of the index, by what people ask.
 GROUPS = {
     "Our sea, our fleet": ("own-sea", "sweep", "what-if", "pads", "failures", "age", "explorer"),
-    "The policies": ("planner", "comparison", "mission", "learning"),
+    "The policies": ("seas", "planner", "comparison", "mission", "learning"),
     "The paper": ("performance", SCORECARD, "parameters"),
     "Is it right?": ("verification",),
 }

@@ -5,6 +5,7 @@ The same results give the same bytes, since a page contains no time and no path 
 
 import logging
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -138,7 +139,8 @@ def _write(
         report.key = "" if values else key_of(report, _folders(report, results))
     changed = [report for report in reports if not has_key(out / report.page, report.key)]
     missions.make([report.name for report in changed], results, values, progress)
-    kernels.run(changed, progress)
+    read_by = Counter(f for report in changed for f in _folders(report, results).values())
+    kernels.run(changed, progress, [folder for folder, count in read_by.items() if count > 1])
     files = {report.page: _page(report) for report in changed}
     complete = [report for report in reports if not report.failure]
     files |= {f"{r.name}.ipynb": r.for_jupyter(results, out, values) for r in complete}
@@ -189,7 +191,8 @@ def _check_results(folder: Path) -> None:
 
 def _page(report: Report) -> str:
     """The page of a report that has been run."""
-    code = Markup(highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter()))
+    code = highlight("\n\n\n".join(report.code), PythonLexer(), HtmlFormatter())
+    code = Markup(code.replace("<pre>", '<pre tabindex="0">', 1))  # it scrolls on a phone
     body = body_of(report.notebook)
     return fill("report.html", scripts=report.scripts, report=report, body=body, code=code)
 

@@ -137,9 +137,17 @@ def _parameters(space: ScenarioSpace) -> pd.DataFrame:
 
 def _value(space: ScenarioSpace, field: str) -> str:
     """The value of a field as text."""
-    value: Any = space.charging_pads if field == "pads" else space.value(field)
+    value: Any = space.zone_pads[0] if field == "pads" else space.value(field)
     if field == "nodes":
         return _cells(value)
+    if field == "no_fly":
+        return _counted(len(value), "cell")
+    if field == "zones":
+        value = [
+            f"{[*zone.cells]}, {_counted(n, 'pad')}"
+            for zone, n in zip(value, space.zone_pads[1:], strict=True)
+        ]
+        return "; ".join(value)
     if field in SAMPLED or field == "initial_data":
         return _span(value)
     if isinstance(value, bool):

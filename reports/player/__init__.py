@@ -19,11 +19,10 @@ from reports.player.playback import Playback
 
 READING = (
     "A disc shows the data left at a node, and its ring the most that it ever had. A numbered dot "
-    "is a UAV, with its last moves and a line to the node that it serves in most communication "
-    "slots; it turns pale when its mission is over. A full yellow square is a UAV that charges, an "
-    "empty one a UAV that waits for a pad. A click in the panels goes to another slot. At the end "
-    "of a row, a tick means that the quota was filled, a cross that it was not. Keys: space plays "
-    "and pauses, the arrows, Home and End change the slot."
+    "is a UAV, with its last moves and a line to the node that it serves most; it turns pale when "
+    "its mission is over. A full square is a UAV that charges, an empty one a UAV that waits for a "
+    "pad. A tick means that the quota was filled. A click in the panels goes to another slot; "
+    "space plays and pauses, the arrows, Home and End change the slot."
 )
 
 AGE_READING = (

@@ -39,7 +39,7 @@ const line = (x1, y1, x2, y2, style) => drawn("line", {x1, y1, x2, y2, "stroke-w
 function drawDot(svg, [mean, low, high], colour) {
     const ends = [low, high].map((end) => percent(inside(end)));
     svg.replaceChildren(
-        ...["0%", "50%", "100%"].map((x) => line(x, "0%", x, "100%", {stroke: "#dde4e9", "stroke-width": 1})),
+        ...["0%", "50%", "100%"].map((x) => line(x, "0%", x, "100%", {stroke: "var(--line)", "stroke-width": 1})),
         line(ends[0], "50%", ends[1], "50%", {stroke: colour}),
         ...ends.map((x) => line(x, "25%", x, "75%", {stroke: colour})),
         drawn("circle", {cx: percent(inside(mean)), cy: "50%", r: 5, fill: colour}),
@@ -47,8 +47,8 @@ function drawDot(svg, [mean, low, high], colour) {
 }
 
 function axes(slider, position) {
-    const width = 100 / slider.values.length, grid = {stroke: "#dde4e9", "stroke-width": 1};
-    const band = {x: `${position * width}%`, width: `${width}%`, y: 0, height: "100%", fill: "#f3f8fb"};
+    const width = 100 / slider.values.length, grid = {stroke: "var(--line)", "stroke-width": 1};
+    const band = {x: `${position * width}%`, width: `${width}%`, y: 0, height: "100%", fill: "var(--pale)"};
     return [
         drawn("rect", band),
         ...[0, 25, 50, 75, 100].flatMap((y) => [

@@ -125,7 +125,10 @@ function playMission(id, mission) {
     const battery = overTime("Battery [%]", [103, 0], (p) => {
         for (const [name, level] of Object.entries(mission.thresholds)) {
             line([[p.px(0), p.py(level)], [p.px(p.x[1]), p.py(level)]], MUTED, 1);
-            text(`${name} ${level}`, p.box.x + p.box.w + 4, p.py(level), "left", "11px");
+            const x = p.box.x + p.box.w + 4, y = p.py(level);
+            text("C", x, y, "left", "11px");
+            text(name.slice(2), x + 8, y + 4, "left", "9px");
+            text(level, x + 17, y, "left", "11px");
         }
         uavs.forEach((colour, i) =>
             line(range(ends[i] + 1).map((t) => [p.px(t), p.py(fleet.battery[t][i])]), colour));

@@ -17,7 +17,8 @@ from analysis import numbers
 from analysis.names import METRICS, PRODUCT, RATIO, SUCCESS, measured_in, metric_label
 from analysis.questions import summary
 from analysis.questions.missions import estimate
-from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, settings_of
+from analysis.questions.settings import value_in_words
+from analysis.questions.what_if.question import BASELINE, SIDES, VARIATION, fields, settings_of
 from analysis.results.tables import Results
 from analysis.stats.intervals import LEVEL
 from analysis.stats.paired import compare
@@ -169,17 +170,15 @@ def sentence(results: Results, table: pd.DataFrame) -> str:
         results: The results of the question.
         table: The ``answers``.
     """
-    sides = zip(*settings_of(results), strict=True)
-    changed = numbers.words(
-        [f"{after} instead of {before.split(' ', 1)[1]}" for before, after in sides]
-    )
+    sides = fields(results, results.store.manifest.points[VARIATION].values).itertuples()
+    new = [f"{value_in_words(s.Field, s.Variation)} instead of {s.Baseline}" for s in sides]
     parts = [
         f"that of {row.policy} by {change(row)} points"
         + " (inconclusive)" * (verdict(row) == INCONCLUSIVE)
         for row in table[table["metric"] == PRODUCT].itertuples()
     ]
     n = numbers.span(table["n"])
-    return f"With {changed}, the product changes: {numbers.words(parts)}; n = {n} pairs."
+    return f"With {numbers.words(new)}, the product changes: {numbers.words(parts)}; n = {n} pairs."
 
 
 def conclusions(table: pd.DataFrame) -> str:
@@ -276,8 +275,8 @@ def effect(results: Results, policy: str, replication: int) -> str:
     """By how much the variation changes a mission, in a sentence."""
     gap = numbers.difference(differences(results, policy)[replication], 0)
     return (
-        f"Replication {replication} with **{policy}**: the variation changes collection ratio and "
-        f"communication by {gap} points."
+        f"Replication {replication} with **{policy}**: the variation changes the product "
+        f"by {gap} points."
     )
 
 

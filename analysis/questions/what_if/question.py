@@ -27,6 +27,7 @@ from analysis.results.chunks import short_hash
 from analysis.results.files import MANIFEST
 from analysis.results.manifest import Manifest
 from analysis.results.tables import Results
+from analysis.study.best import policies_for
 from analysis.study.study import Study
 from dess.errors import InputError, one_of, validation_line
 from dess.files.reading import paths_in
@@ -44,7 +45,7 @@ def question(
     settings: Mapping[str, Any],
     baseline: Mapping[str, Any] | None = None,
     scenario: str | Path = "paper",
-    policies: Sequence[str] = ("ddqn", "greedy"),
+    policies: Sequence[str] | None = None,
     missions: int = 500,
     seed: int = 0,
 ) -> Study:
@@ -57,7 +58,8 @@ def question(
         baseline: Fields of the scenario that are set in both; in the variation, ``settings`` comes
             first.
         scenario: The name of a shipped scenario, or a TOML file.
-        policies: Teams, each compared with itself.
+        policies: Teams, each compared with itself. Without any, the best policy that five minutes
+            allow, and ``greedy``.
         missions: Number of missions of each policy on each side, at least 2.
         seed: Seed of the missions.
 
@@ -73,9 +75,8 @@ def question(
     if changed.keys() - measuring:  # what changes is something else, which both sides measure
         fixed |= {field: changed.pop(field) for field in sorted(measuring)}
     fixed = _measured(fixed | changed) | fixed
-    _check_changes(
-        load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed), changed
-    )
+    sides = load_scenario(scenario, **fixed), load_scenario(scenario, **fixed | changed)
+    _check_changes(*sides, changed)
     if isinstance(missions, int) and missions < 2:
         raise InputError(f"missions: {missions} is too few; allowed: 2 or more")
     before = {field: fixed[field] for field in changed if field in fixed}
@@ -85,7 +86,7 @@ def question(
         "scenario": str(scenario),
         "set": {field: value for field, value in fixed.items() if field not in changed},
         "design": {"kind": "table", "rows": [before, changed]},
-        "policies": typed(policies),
+        "policies": typed(policies_for(sides, missions) if policies is None else policies),
         "missions": missions,
         "seed": seed,
     }
@@ -235,4 +236,4 @@ def _assignments(values: Mapping[str, Any]) -> list[str]:
 def _value(space: ScenarioSpace, field: str) -> Any:
     """The value of a field; for ``pads``, the number of pads also if it follows from the zone."""
     value = space.value(field)
-    return space.charging_pads if field == "pads" else value
+    return space.zone_pads[0] if field == "pads" else value

@@ -36,7 +36,8 @@ class Station:
             times: (N,) for how long each UAV charges.
         """
         mission, self._uavs = np.zeros(1, MISSION), np.zeros(_UAVS, UAV)
-        mission["pads"], mission["uavs"] = pads, _UAVS
+        mission["zones"], mission["uavs"] = 1, _UAVS
+        mission["zone_pads"][0, 0] = pads
         self._env = simpy.Environment()
         self._zone = ChargingZone(self._env, mission[0], self._uavs)
         self.waits, self.queues = np.full(len(gaps), np.nan), np.zeros(len(gaps))

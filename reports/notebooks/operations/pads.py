@@ -82,7 +82,7 @@ html.gallery([drawn[metric] for metric in (*uses, names.SUCCESS)])
 # %%
 html.say(
     "Pads are enough if the interval of the loss against a pad for every UAV is above −{margin}, "
-    "here and with more pads. They are too few if the interval is below 0. Between the two, more "
+    "here and with more pads. They are too few if it is below −{margin}. Between the two, more "
     "missions or other numbers of pads would decide.",
     margin=numbers.margin(margin),
 )

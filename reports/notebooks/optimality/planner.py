@@ -46,13 +46,11 @@ logged = study.manifest["study"]["logged"]
 html.answer(questions.answer(differences, planner), questions.ahead(differences, planner))
 
 # %%
-points = questions.front(study, times)
+by_product = differences[differences["metric"] == PRODUCT]
 html.lead(
-    fronts.decision_times(points),
-    "Decision time against the product of all policies, and their Pareto front",
-    f"n = {len(missions):,} missions per policy; bars are 95 % intervals. Times are medians for "
-    "the UAVs of a mission on one core. No policy is both faster and better than one on the line.",
-    points,
+    figures.differences(by_product),
+    f"Paired differences from {learner} in the product, by number of UAVs",
+    f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals.",
 )
 
 # %% [markdown]
@@ -118,17 +116,15 @@ html.gallery(
 html.say("{gap}", gap=html.composed(gap.in_words(study, planners[-1])))
 
 # %%
-by_product = differences[differences["metric"] == PRODUCT]
-gaps = gap.by_fleet(study)
+points, gaps = questions.front(study, times), gap.by_fleet(study)
 useful = gap.useful(gaps)
-caption = f"n = {numbers.span(by_product['n'])} missions; bars are 95 % intervals."
-drawn = [
-    (figures.differences(by_product), f"Paired differences from {learner} in the product", caption)
-]
+alt = "Decision time against the product of all policies, and their Pareto front"
+caption = "No policy is both faster and better than one on the line. Medians on one core."
+drawn: list[html.Drawing] = [(fronts.decision_times(points), alt, caption, points)]
 if len(useful):
     alt = "The product of every policy and the upper bound, by number of UAVs"
-    drawn.append((figures.gaps(useful), alt, f"{caption[:-1]}, the band as well."))
-html.gallery(drawn)
+    drawn.append((figures.gaps(useful), alt, "The band is the 95 % interval of the bound."))
+html.gallery(drawn, f"n = {len(missions):,} missions per policy; bars are 95 % intervals.")
 
 # %% [markdown]
 # ## Tables

@@ -26,18 +26,26 @@ from IPython.core.displaypub import CapturingDisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
 from traitlets.config import Config
 
+from analysis.results.tables import keep
+from dess.errors import InputError
+
 AT_ONCE = 2
 
 
 def _serve() -> None:
     """Run the notebooks that a line of standard input has; print what becomes of every cell.
 
-    The line is a list of notebooks, each a list of cells. An answer is a list of the number of the
-    notebook, the outputs of its next cell, and its error. A notebook whose child dies has no more.
+    The line has a list of notebooks, each a list of cells, and the results folders that several of
+    them read. An answer is a list of the number of the notebook, the outputs of its next cell, and
+    its error. A notebook whose child dies has no more.
     """
-    codes = json.loads(sys.stdin.readline())
+    work = json.loads(sys.stdin.readline())
+    codes = work["cells"]
     Thread(target=_end_with_parent, daemon=True).start()
     _import_all(cell for cells in codes for cell in cells)
+    for folder in work["folders"]:
+        with suppress(InputError):  # will be that of the notebook
+            keep(folder)
     set_start_method("fork" if hasattr(os, "fork") else "spawn")
     waiting, running = iter(enumerate(codes)), set[Connection]()
     while True:

@@ -32,12 +32,15 @@ HOME = "dess-pages-"  # beginning of the name of the folder in which the noteboo
 PACKAGES = Path(__file__).parents[3]  # the folder from which this package was imported
 
 
-def run(reports: Sequence[Report], progress: Progress | None = None) -> None:
+def run(
+    reports: Sequence[Report], progress: Progress | None = None, shared: Sequence[Path] = ()
+) -> None:
     """Run reports. If one fails, the error is stored in it and the others are still run.
 
     Args:
         reports: The reports, which get the outputs of their cells.
         progress: Called after every cell.
+        shared: Results folders that several of them read, and that are loaded once.
 
     Raises:
         InputError: If a notebook refuses its parameters or results.
@@ -46,10 +49,11 @@ def run(reports: Sequence[Report], progress: Progress | None = None) -> None:
         return
     total = sum(len(report.cells) for report in reports)
     codes = [[cell.source for cell in report.cells] for report in reports]
+    work = {"cells": codes, "folders": [str(folder.absolute()) for folder in shared]}
     with temporary_folder(Path(gettempdir()), HOME) as home, TemporaryFile() as log:
         with _process(home, log) as (asked, answers):
             with suppress(BrokenPipeError):
-                asked.write(json.dumps(codes).encode() + b"\n")
+                asked.write(json.dumps(work).encode() + b"\n")
                 asked.flush()
             for number, outputs, error in map(json.loads, answers):
                 report = reports[number]

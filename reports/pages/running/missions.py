@@ -18,7 +18,8 @@ from analysis.verification import cross_check
 from reports.pages.running.kernels import Progress
 
 COMPARISON, VERIFICATION = "comparison", "verification"  # names of the pages and of their studies
-PLANNER, GAP = "planner", "gap"  # a page and its study
+# The pages that show times of decisions, and their studies.
+TIMED = {COMPARISON: COMPARISON, "planner": "gap", "seas": "seas"}
 
 
 def make(
@@ -48,8 +49,7 @@ def make(
         pair = head_to_head.pair_of(study, parameters.get("learned"), parameters.get("heuristic"))
         drawn = head_to_head.drawn(head_to_head.duels(study, pair), pair)
         keep_logs(study, drawn, results, show)
-        decision_times.make(results, study, show)
-    if PLANNER in pages:
-        decision_times.make(results, load_results(results / GAP), show)
+    for page in TIMED.keys() & {*pages}:
+        decision_times.make(results, load_results(results / TIMED[page]), show)
     if VERIFICATION in pages:
         cross_check.make(results, load_results(results / VERIFICATION), show)

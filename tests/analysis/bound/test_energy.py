@@ -3,8 +3,11 @@
 from functools import cache
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from analysis.bound.energy import most_charging, phases_of
+from analysis.bound.paths import last_slot
 from dess.scenario import Scenario
 
 
@@ -51,3 +54,44 @@ def test_no_way_to_charge_takes_longer(start: int, low: int, full: int, rate: in
         return max(ways)
 
     assert most.tolist() == [longest(start, f) for f in range(20)]
+
+
+@given(
+    start=st.integers(1, 15),
+    low=st.integers(10, 12),
+    charge=st.integers(1, 10),
+    rate=st.integers(1, 12),
+    cost=st.integers(0, 1),
+    slots=st.integers(1, 30),
+    longest=st.integers(1, 60),
+)
+@example(start=10, low=10, charge=8, rate=1, cost=0, slots=5, longest=60)
+@example(start=1, low=10, charge=4, rate=3, cost=1, slots=30, longest=60)
+@example(start=12, low=10, charge=1, rate=1, cost=1, slots=30, longest=33)
+def test_the_phases_allow_all_that_a_battery_allows(
+    start: int, low: int, charge: int, rate: int, cost: int, slots: int, longest: int
+) -> None:
+    full = low + charge
+    values = {"flying_time": start, "charge_start": low, "charge_complete": full}
+    phases = phases_of(
+        scenario(**values, charge_rate=rate, flight_cost=cost, quota=4 * slots, max_slots=longest)
+    )
+    free = len(phases.deadline) - 1  # the phase in which batteries count no more
+
+    @cache
+    def go(slot: int, f: int, battery: int, latch: bool, phase: int) -> None:
+        """All that can come after f flying slots."""
+        assert slot <= phases.slots
+        if battery == 0 or f == min(slots, longest) or slot == longest:
+            return
+        assert f < phases.deadline[phase]
+        assert last_slot(phases, phase, f + 1, phases.slots) <= slot <= phases.clock[phase, f]
+        left = battery - cost
+        go(slot + 1, f + 1, left, latch or left <= low, phase)
+        if latch:
+            if phase < free:
+                assert phases.opens[phase] <= f <= phases.closes[phase]
+                phase = phases.after[f]
+            go(min(slot - (battery - full) // rate, longest), f, full, False, phase)
+
+    go(0, 0, start, start <= low, 0)

@@ -96,7 +96,7 @@ HOVER = {"a lone UAV over its node": {"nodes": ((1, 1),), "max_slots": 4}}
 
 
 def shadowed(**values: object) -> ScenarioSpace:
-    """UAVs that fly all slots of a mission and do not charge."""
+    """UAVs that, if nothing else is said, fly all slots of a mission and do not charge."""
     space = {"grid": 3, "zone": (1, 1, 1, 1), "uavs": 1, "communication_slots": 1, "max_slots": 3}
     battery = {"flying_time": 40, "charge_start": 10, "charge_complete": 50}
     quota = {"quota": values.get("max_slots", 3)}

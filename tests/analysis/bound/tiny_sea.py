@@ -1,12 +1,12 @@
 """The exact optimum of a tiny mission with shadowing, by trying everything.
 
-The shadowing has a few values here, each of them the mean of the normal distribution over a part
-of the line. That is a mean-preserving contraction of the normal distribution, so inequality 5 of
-docs/concepts/bound.md holds for it, and with it the bound. With many values, the optimum is that
-of the simulator's shadowing.
+UAVs move, charge and end by the rules of the simulator. The shadowing has a few values here, each
+of them the mean of the normal distribution over a part of the line. That is a mean-preserving
+contraction of the normal distribution, so inequality 5 of docs/concepts/bound.md holds for it, and
+with it the bound. With many values, the optimum is that of the simulator's shadowing.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property, lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -14,11 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from analysis.bound.prices import known_of
+from dess import rules
 from dess.scenario import ScenarioSpace
-from dess.state import STEP_X, STEP_Y
+from dess.state import starts_of, state_of
+from tests import compiled
 
-Cells = tuple[tuple[int, int], ...]
+# What the future of a UAV depends on.
+FIELDS = ["active", "x", "y", "charging", "latch", "battery", "pad_request", "end"]
+FIELDS += ["communications"]
+Team = tuple[tuple, ...]  # the fields of each UAV
+Aim = Callable[[float, np.ndarray], np.ndarray]  # by the data that there were, and what is left
 
 
 class Deviates(NamedTuple):
@@ -28,6 +33,22 @@ class Deviates(NamedTuple):
     chances: np.ndarray
 
 
+class Outcome(NamedTuple):
+    """What a choice of actions can lead to, by the team after the slot.
+
+    Attributes:
+        team: The team.
+        origin: (N,) row of the residual data before the slot.
+        chance: (N,) chance, given this row.
+        residual: (N, K) residual data [data units].
+    """
+
+    team: Team
+    origin: np.ndarray
+    chance: np.ndarray
+    residual: np.ndarray
+
+
 def contraction(count: int) -> Deviates:
     """The means of the standard normal distribution over parts with equal chances."""
     density = norm.pdf(norm.ppf(np.linspace(0, 1, count + 1)))
@@ -35,66 +56,119 @@ def contraction(count: int) -> Deviates:
 
 
 class TinySea:
-    """A mission whose UAVs fly all of its slots: none charges, and no battery is empty before.
+    """A mission, with all that can happen in it.
 
     Args:
-        space: The scenario.
-        seed: Seed of the mission.
+        space: The scenario, with no parameter sampled.
+        seed: Seed of the mission; its replication is 0.
         deviates: The shadowing, in standard deviations.
     """
 
     def __init__(self, space: ScenarioSpace, seed: int, deviates: Deviates):
-        assert space.quota == space.max_slots * space.communication_slots
-        assert space.flying_time[0] - space.charge_start[1] > space.max_slots
-        known = known_of(space, seed, 0)
-        self.space, self.deviates, self.data = space, deviates, known.data
-        self.starts: Cells = tuple((int(x), int(y)) for x, y in known.starts)
+        self.space, self.deviates = space, deviates
+        state = state_of([space], 1)
+        rules.launch(state, 0, starts_of([space], seed), 0, 0)
+        self.mission, self.uavs, residual = state.missions[0], state.uavs[0], state.residual[0]
+        self.start, self.data = self._team(), [residual.copy()]
+        arrivals = np.empty(len(residual), np.int64)
+        for slot in range(space.max_slots):
+            self.mission["slot"] = slot
+            compiled.arrive(self.mission, residual, arrivals)
+            self.data.append(residual.copy())
 
     @cached_property
     def optimum(self) -> float:
         """The highest expected collection ratio of all policies, arrivals known."""
-        return float(self._future(0, self.starts, self.data[:1])[0]) / self.data[-1].sum()
+        return self._best(lambda had, left: (had - left) / had)
 
-    def _future(self, slot: int, cells: Cells, residual: np.ndarray) -> np.ndarray:
-        """(N,) the most that can be expected from a slot on, for (N, K) of residual data."""
-        best = np.zeros(len(residual))
-        if slot == self.space.max_slots:
+    @cached_property
+    def most_collected(self) -> float:
+        """The most data that any policy can be expected to collect, arrivals known."""
+        return self._best(lambda had, left: had - left)
+
+    def _best(self, aim: Aim) -> float:
+        return float(self._futures(0, {self.start: self.data[0][None]}, aim)[self.start][0])
+
+    def _futures(
+        self, slot: int, states: dict[Team, np.ndarray], aim: Aim
+    ) -> dict[Team, np.ndarray]:
+        """The most (N,) that can be expected at the start of a slot, by team.
+
+        Args:
+            slot: Mission slots that are over.
+            states: (N, K) residual data that each team can have.
+            aim: What a mission is worth in the end.
+        """
+        best, choices = {}, []
+        for team, residual in states.items():
+            if _is_active(team):
+                best[team] = np.zeros(len(residual))
+                choices += [(team, made) for made in self._choices(slot, team, residual)]
+            else:
+                best[team] = aim(self.data[slot].sum(), residual.sum(axis=1))
+        if not choices:
             return best
-        arrivals = self.data[slot + 1] - self.data[slot]
-        for after in self._moves(cells):
-            origin, chance, left = self._flown(cells, after, residual)
-            future = self._future(slot + 1, after, left + arrivals)
-            taken = (residual[origin] - left).sum(axis=1)
-            best = np.maximum(best, np.bincount(origin, chance * (taken + future)))
+        merged, places = _merge([outcome for _, made in choices for outcome in made])
+        after, place = self._futures(slot + 1, merged, aim), iter(places)
+        for team, made in choices:
+            expected = np.zeros(len(best[team]))
+            for outcome in made:
+                worth = outcome.chance * after[outcome.team][next(place)]
+                expected += np.bincount(outcome.origin, worth, len(expected))
+            best[team] = np.maximum(best[team], expected)
         return best
 
-    def _moves(self, cells: Cells) -> Iterator[Cells]:
-        """The cells to which the UAVs can fly together."""
-        for actions in product(range(5), repeat=len(cells)):
-            after = tuple(
-                (x + int(STEP_X[action]), y + int(STEP_Y[action]))
-                for (x, y), action in zip(cells, actions, strict=True)
-            )
-            if (
-                len({*after}) == len(after)
-                and 0 <= np.min(after) <= np.max(after) < self.space.grid
-            ):
-                yield after
+    def _choices(self, slot: int, team: Team, residual: np.ndarray) -> Iterator[list[Outcome]]:
+        """The outcomes of a slot for each way in which the UAVs can act."""
+        moved: dict[Team, None] = {}
+        for actions in product(range(5), repeat=len(team)):
+            self._set(slot, team)
+            self.uavs["action"] = actions
+            compiled.move(self.mission, self.uavs, self.space.chart)
+            moved[self._team()] = None
+        for after in moved:
+            outcomes = self._flown(team, after, residual, self.data[slot + 1] - self.data[slot])
+            yield [o._replace(team=self._settled(slot, o.team)) for o in outcomes]
 
     def _flown(
-        self, cells: Cells, after: Cells, residual: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All that a slot can leave: the row of the data before, the chance, the residual data."""
+        self, team: Team, after: Team, residual: np.ndarray, arrivals: np.ndarray
+    ) -> list[Outcome]:
+        """What the communication slots of a slot can lead to, by the quotas that are used."""
         origin, chance, left = np.arange(len(residual)), np.ones(len(residual)), residual
+        served = np.zeros((len(residual), len(team)), np.int64)
         for n in range(1, self.space.communication_slots + 1):
             part = n / self.space.communication_slots
-            for (x, y), (x2, y2) in zip(cells, after, strict=True):
+            for i, ((_, x, y, *_), uav) in enumerate(zip(team, after, strict=True)):
+                active, x2, y2, charging, *_ = uav
+                if charging or not active:
+                    continue
                 rates, chances = self._service(x + part * (x2 - x), y + part * (y2 - y))
                 chances = chances[(left > 0) @ (1 << np.arange(left.shape[1]))]
-                row, outcome = np.nonzero(chances)
-                origin, chance = origin[row], chance[row] * chances[row, outcome]
-                left = np.maximum(left[row] - rates[outcome], 0.0)
-        return origin, chance, left
+                row, drawn = np.nonzero(chances)
+                origin, chance = origin[row], chance[row] * chances[row, drawn]
+                left = np.maximum(left[row] - rates[drawn], 0.0)
+                served = served[row]
+                served[:, i] += drawn < len(rates) - 1
+        counts, group = np.unique(served, axis=0, return_inverse=True)
+        outcomes = []
+        for number, count in enumerate(counts):
+            of = group.ravel() == number
+            used = tuple((*u[:-1], u[-1] + int(c)) for u, c in zip(after, count, strict=True))
+            outcomes.append(Outcome(used, origin[of], chance[of], left[of] + arrivals))
+        return outcomes
+
+    def _settled(self, slot: int, team: Team) -> Team:
+        """The team after the end of a slot."""
+        self._set(slot, team)
+        compiled.settle(self.mission, self.uavs)
+        return self._team()
+
+    def _set(self, slot: int, team: Team) -> None:
+        self.uavs[FIELDS] = np.array([*team], self.uavs[FIELDS].dtype)
+        self.mission["slot"], self.mission["active"] = slot, sum(uav[0] for uav in team)
+
+    def _team(self) -> Team:
+        return tuple(self.uavs[FIELDS].tolist())
 
     @lru_cache  # noqa: B019
     def _service(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
@@ -123,3 +197,26 @@ class TinySea:
                 best = int(np.argmax(snr[able, drawn]))  # on a tie the lower index
                 found[mask, able[best] * count + drawn[best]] += chances[[*drawn]].prod()
         return rates, found
+
+
+def _merge(outcomes: list[Outcome]) -> tuple[dict[Team, np.ndarray], list[np.ndarray]]:
+    """The different residual data of each team, and the places in them of each outcome's rows."""
+    parts: dict[Team, list[np.ndarray]] = {}
+    for outcome in outcomes:
+        parts.setdefault(outcome.team, []).append(outcome.residual)
+    merged, places = {}, {}
+    for team, rows in parts.items():
+        together = np.concatenate(rows)
+        first = place = np.arange(len(together))
+        if _is_active(team):  # otherwise nothing comes after it that merging would save
+            # Rounding unites sums that differ by the order of their terms.
+            _, first, place = np.unique(
+                np.round(together, 9), axis=0, return_index=True, return_inverse=True
+            )
+        merged[team] = together[first]
+        places[team] = iter(np.split(place.ravel(), np.cumsum([len(part) for part in rows])[:-1]))
+    return merged, [next(places[outcome.team]) for outcome in outcomes]
+
+
+def _is_active(team: Team) -> bool:
+    return any(uav[0] for uav in team)

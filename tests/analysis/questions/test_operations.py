@@ -62,8 +62,8 @@ def test_the_lower_end_decides_and_one_pad_may_be_enough(pads):
 
     unsure = operations.enough_pads(planted(pads, PRODUCT, value), 0.08)
     assert unsure["pads"].tolist() == [2, 2]
-    assert unsure["too_few"].tolist() == [1, 1]
-    # Lack of proof is not need: a loss that may be none leaves the number of pads open.
+    assert unsure["open"].tolist() == [[1], [1]]
+    # Lack of proof is not need: a loss that may not matter leaves the number of pads open.
     noisy = planted(
         pads, PRODUCT, lambda row: 0.5 + (row["pads"] < 3) * (row["replication"] % 2 - 0.55) / 2
     )

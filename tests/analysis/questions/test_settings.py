@@ -185,7 +185,7 @@ def test_what_the_study_has_not_is_refused(results, ask, message):
 def test_varied_fields_have_their_values_in_order(results, tmp_path):
     assert settings.varied(results) == {"uavs": [1, 2, 3], "initial_data": ["5–7.5", "10–20"]}
     assert settings.points(results).iloc[1].tolist() == [3, "10–20"]
-    assert settings.in_words(results)[1] == "number of UAVs 3, initial data per node 10–20"
+    assert settings.in_words(results)[1] == "3 UAVs, initial data per node 10–20"
     single = run(tmp_path)
     assert settings.varied(single) == {} and settings.main_effects(single).empty
     assert settings.in_words(single) == [settings.AS_IT_IS]

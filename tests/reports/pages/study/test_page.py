@@ -81,10 +81,8 @@ def test_there_are_a_page_a_notebook_and_an_index_with_a_card(page, out):
 def test_it_states_the_answer_first(page, folder):
     best = settings.ranked(load_results(folder)).iloc[0]
     lead = re.findall('<p class="lead">(.*?)</p>', page)[0]
-    assert (
-        f"The best setting is {best['policy']} with number of UAVs {best['uavs']}, "
-        f"number of charging pads {best['pads']}"
-    ) in lead
+    fleet = settings.in_words(load_results(folder))[best["point"]]
+    assert f"The best setting is {best['policy']} with {fleet}" in lead
     text = words_of(page)
     for heading in (
         "Effects of the fields",

@@ -104,8 +104,8 @@ def test_parameters_choose_the_metric_and_the_baseline(tmp_path):
     study = small_study(tmp_path, design=grid(uavs=[1, 2]), policies=["greedy"])
     run_study(study, tmp_path / "out")
     text = page_of(tmp_path / "out", metric="reward", baseline=1)
-    assert "compared with itself at design point 1: number of UAVs 2." in text
-    assert re.search(r"The best setting is greedy with number of UAVs \d: reward −?[\d,.]+ ", text)
+    assert "compared with itself at design point 1: 2 UAVs." in text
+    assert re.search(r"The best setting is greedy with \d UAVs?: reward −?[\d,.]+ ", text)
 
 
 def test_the_title_is_that_of_the_study(tmp_path):

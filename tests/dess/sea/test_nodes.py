@@ -1,16 +1,14 @@
 """Nodes from files: hand-worked projections, and refusals in one clear line."""
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from dess import InputError, load_scenario, sea
-from dess.sea import EARTH_RADIUS, nodes_in
-
-METRES_PER_DEGREE = EARTH_RADIUS * math.pi / 180  # of latitude: 111,195 m
+from dess import InputError, load_scenario
+from dess.sea import positions
+from dess.sea.nodes import nodes_in
 
 
 def _csv(folder: Path, text: str) -> Path:
@@ -31,7 +29,7 @@ def _point(*coordinates: float) -> dict[str, Any]:
 
 def test_columns_x_and_y_are_cells(tmp_path: Path) -> None:
     text = "\ufeffname, y ,x\na,3,1\n\nb,0,7\r\n"
-    assert nodes_in(_csv(tmp_path, text), 8, 800.0) == ((1, 3), (7, 0))
+    assert nodes_in(_csv(tmp_path, text), (8, 8), 800.0) == ((1, 3), (7, 0))
 
 
 def test_degrees_are_projected_about_the_centre_of_their_box(tmp_path: Path) -> None:
@@ -40,12 +38,20 @@ def test_degrees_are_projected_about_the_centre_of_their_box(tmp_path: Path) -> 
     # 0.09 x 55,597 m = 5,004 m and 0.045 x 111,195 m = 5,004 m: five cells of 1 km and a bit.
     expected = ((10, 10), (4, 10), (15, 10), (10, 4), (10, 15))
     rows = "".join(f"{lon},{lat}\n" for lon, lat in places)
-    assert nodes_in(_csv(tmp_path, f"lon,lat\n{rows}"), 20, 1000.0) == expected
+    assert nodes_in(_csv(tmp_path, f"lon,lat\n{rows}"), (20, 20), 1000.0) == expected
     across = [(lon + 170 - 360 * (lon >= 10), lat - 60) for lon, lat in places]
     rows = "".join(f"{lon},{lat}\n" for lon, lat in across)  # at the 180th meridian and equator
-    assert len({x for x, _ in nodes_in(_csv(tmp_path, f"lon,lat\n{rows}"), 40, 1000.0)}) == 3
+    assert len({x for x, _ in nodes_in(_csv(tmp_path, f"lon,lat\n{rows}"), (40, 40), 1000.0)}) == 3
     features = [_point(*place, 0.5) for place in places]  # with an altitude
-    assert nodes_in(_geojson(tmp_path, *features), 20, 1000.0) == expected
+    assert nodes_in(_geojson(tmp_path, *features), (20, 20), 1000.0) == expected
+
+
+def test_a_grid_that_is_not_square_has_the_same_centre(tmp_path: Path) -> None:
+    """0.09 degrees of latitude at the equator are ten cells of 1 km and a bit."""
+    path = _csv(tmp_path, "lon,lat\n0,0.045\n0,-0.045\n0.045,0\n-0.045,0\n")
+    assert nodes_in(path, (20, 12), 1000.0) == ((10, 0), (10, 11), (15, 6), (4, 6))
+    with pytest.raises(InputError, match=r"at \[10, -1\]; allowed: grid = 20, rows = 12 or"):
+        nodes_in(path, (20, 10), 1000.0)
 
 
 # --- in a scenario ---
@@ -93,7 +99,7 @@ TABLES = {
 @pytest.mark.parametrize("text", TABLES)
 def test_a_table_that_is_refused(text: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"buoys.csv: .*{TABLES[text]}") as error:
-        nodes_in(_csv(tmp_path, text), 8, 800.0)
+        nodes_in(_csv(tmp_path, text), (8, 8), 800.0)
     assert "\n" not in str(error.value)
 
 
@@ -114,7 +120,7 @@ def test_a_geojson_file_that_is_refused(line: str, tmp_path: Path) -> None:
     path = tmp_path / "buoys.json"
     path.write_text(json.dumps(FEATURES[line]))
     with pytest.raises(InputError, match=f"buoys.json: {line}"):
-        nodes_in(path, 8, 800.0)
+        nodes_in(path, (8, 8), 800.0)
 
 
 FILES = {
@@ -132,9 +138,9 @@ def test_a_file_that_is_none(name: str, tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "bytes.csv").write_bytes(b"x,y\n\xff")
     (tmp_path / "no.json").write_text("{")
     (tmp_path / "large.csv").write_text("x,y\n1,1\n")
-    monkeypatch.setattr(sea, "LIMIT", 7)
+    monkeypatch.setattr(positions, "LIMIT", 7)
     with pytest.raises(InputError, match=f"{name}: {FILES[name]}"):
-        nodes_in(tmp_path / name, 8, 800.0)
+        nodes_in(tmp_path / name, (8, 8), 800.0)
 
 
 @pytest.mark.parametrize(

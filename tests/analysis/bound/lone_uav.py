@@ -1,0 +1,27 @@
+"""What a lone UAV can collect, by the table of the bound alone.
+
+In the bound of the ratio, an early end costs something, and what arrives after it counts as
+collected (relaxation 2 of docs/concepts/bound.md). That can hide an error in the table.
+"""
+
+import numpy as np
+
+from analysis.bound.paths import bound_paths
+from analysis.bound.prices import Bounds, Detail, known_of
+from dess.scenario import ScenarioSpace
+
+
+def bound_of_data(space: ScenarioSpace, seed: int) -> float:
+    """An upper bound on the data [data units] that a lone UAV is expected to collect."""
+    known = known_of(space, seed, 0)
+    bounds = Bounds(known, Detail(cuts=()))
+    bounds.at(np.zeros((1, len(known.nodes))))  # sets the worth of the steps
+    local = np.tile(bounds.parts, (len(known.nodes), 1))
+    bound_paths(
+        known.record, known.phases, known.data, bounds.period, bounds.blocks, local,
+        bounds.values, np.zeros(len(known.data)), bounds.ceilings,
+    )  # fmt: skip
+    x, y = known.starts[0]
+    home = bounds.blocks.home[x, y]
+    had = known.data[known.phases.clock[0, 0], home]
+    return float((bounds.ceilings[0, 0, x, y, 0] + local[home] * had).min())
