@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 import policies
 from dess import load_scenario, simulate, simulate_batch
+from dess.env.stepper import MissionStepper
 from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace
-from dess.view import View
+from dess.view import View, acting_rows
 from policies.planner import Planner, plan_of
 from policies.planner import policy as module
-from policies.planner.policy import _MEMORIES, Budget
+from policies.planner.policy import _MEMORIES, Budget, memory_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 
 
@@ -106,6 +107,31 @@ def test_plans_go_with_the_missions_that_they_belong_to() -> None:
     simulate_batch(load_scenario("paper", uavs=1, quota=20), QUICK, 1, 3, batch_size=2)
     gc.collect()
     assert len(_MEMORIES) == before
+
+
+def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav() -> None:
+    """Small surprises add up, and cancel out; those of nodes count over several slots."""
+    stepper = MissionStepper(load_scenario("paper", uavs=2), 1, 1)
+    stepper.start_at(1, 0)
+    stepper.launch(stepper.indices)
+    state = stepper.state
+    QUICK.act(View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0)))
+    mission, memory = state.missions[0], memory_of(state, QUICK.budget)
+    uavs, expected = state.uavs[0], memory.sea[0] + mission["arrival_rate"]
+    for name in ("x", "y", "charging"):
+        uavs[name] = memory.first[0][name]
+
+    def departs(residual: np.ndarray) -> bool:
+        return module._departs(mission, uavs, residual, memory, 0, 1)
+
+    surprise = np.zeros(len(expected))
+    surprise[3] = 1.0
+    assert not departs(expected)
+    assert not departs(expected + surprise) and not departs(expected - surprise)
+    assert not departs(expected - surprise) and departs(expected - surprise)
+    memory.surplus[0] = 0.0
+    uavs["x"][1] += 1
+    assert departs(expected)
 
 
 # --- how good it is ---
