@@ -44,7 +44,7 @@ def about(name: str) -> About:
     """
     policy, folder = load(TypedByUser(name)), folder_of(name)
     described = read_description(folder) if folder else None
-    requires = described.layout.model_dump() if described else {}
+    requires = described.layout.model_dump() if described and described.layout else {}
     scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
     trained_on = described.training.scenario if described else ""
     return About(

@@ -262,7 +262,7 @@ def battery_home(mission, u, chart, home_x, home_y, slots, reach):
         mission: ``MISSION`` record.
         u: ``UAV`` record.
         chart: ``Chart``.
-        home_x, home_y, slots: Its parking cell and the slots to it, as of ``parking_cell``.
+        home_x, home_y, slots: Its parking cell and the slots to it: the result of ``parking_cell``.
         reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
             in it; if the parking cell is farther, each further cell may cost the most.
     """

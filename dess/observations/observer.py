@@ -9,31 +9,51 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
+from dess.channel import world_of
 from dess.errors import InputError, one_of, shown
 from dess.observations.components import Components, component_bounds
 from dess.observations.maps import Maps
 from dess.observations.nodes import Nodes
+from dess.observations.sets import Sets, sea_of
 from dess.observations.states import compact_states, layout_of, masks
 from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace
-from dess.state import State
+from dess.state import State, constants_of
 from dess.view import legal_actions
 
 # The encoders that learners use, by the kind of observation, and the names of their arrays.
-ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps}
-_PARTS = {"nodes": ("vector", "nodes"), "maps": ("local", "global", "battery")}
+ENCODERS: dict[str, Any] = {"vector": Vector, "nodes": Nodes, "maps": Maps, "sets": Sets}
+_PARTS = {
+    "nodes": ("vector", "nodes"),
+    "maps": ("local", "global", "battery"),
+    "sets": (
+        *("own", "actions", "nodes", "node_moves"),
+        *("mates", "mate_moves", "zones", "zone_moves"),
+    ),
+}
 KINDS = (*ENCODERS, "state")
 
 # One array, or one for each name.
 Observation = np.ndarray | dict[str, np.ndarray]
 
 
+def encoder_of(kind: str, space: ScenarioSpace) -> Any:
+    """The encoder of a kind of observation for a scenario.
+
+    Raises:
+        InputError: If it does not fit the scenario.
+    """
+    if kind == "sets":
+        return Sets(sea_of(constants_of(space)[0], world_of(space)), space.uavs[1])
+    return ENCODERS[kind](layout_of(space))
+
+
 class Observer:
     """Encodes what UAVs observe, and the mask of their allowed actions.
 
     Attributes:
-        kind: ``vector``, ``nodes`` or ``maps``, the observations of the shipped learner, or
-            ``state``, the components that ``components.component_names`` lists.
+        kind: ``vector``, ``nodes``, ``maps`` or ``sets``, the observations of the shipped
+            learner, or ``state``, the components that ``components.component_names`` lists.
         guarded: Whether the masks are those of the return guard; if not, they have all legal
             actions.
         space: The space of one UAV's observation: a ``Box``, or a ``Dict`` of several.
@@ -52,7 +72,7 @@ class Observer:
             self._encoder: Any = Components(scenario)
             self.space: spaces.Space = spaces.Box(*component_bounds(scenario), dtype=np.float32)
             return
-        self._encoder = ENCODERS[kind](layout_of(scenario))
+        self._encoder = encoder_of(kind, scenario)
         boxes = [spaces.Box(-np.inf, np.inf, shape) for shape in self._encoder.shapes]
         names = _PARTS.get(kind)
         self.space = spaces.Dict(dict(zip(names, boxes, strict=True))) if names else boxes[0]

@@ -80,10 +80,12 @@ class Header(Document):
     observation_version: Number = Field(description="version of the encoding of observations")
     progress: Progress = Field(description="progress of the training")
     random: dict[str, Any] = Field(description="state of numpy's generator, which checks it")
-    stepper: Annotated[list[Number], Field(min_length=2, max_length=2)] = Field(
-        description="seed and next replication of the missions"
+    stepper: Annotated[list[Number], Field(min_length=2)] = Field(
+        description="seed of the missions, and the next replication on each sea"
     )
-    replay: Number | None = Field(description="slots that were added to the replay memory")
+    replay: list[Number] | Number | None = Field(
+        description="slots that were added to the replay memories"
+    )
     curve: list[Row] = Field(description="rows of the learning curve")
     sha256: Sha256 = Field(description="checksum of all else")
 
@@ -108,8 +110,8 @@ def save_training(path: Path, training: Training) -> None:
         "observation_version": training.observation.version,
         "progress": training.progress(),
         "random": training.generator.bit_generator.state,
-        "stepper": [training.stepper.seed, training.stepper.replication],
-        "replay": training.replay.count if training.config.checkpoint_replay else None,
+        "stepper": [training.stepper.seed, *(sea.stepper.replication for sea in training.seas)],
+        "replay": _counts([sea.replay.count for sea in training.seas], training.config),
         "curve": training.curve,
     }
     header["sha256"] = tensors.digest(header, values)
@@ -172,8 +174,9 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
     begun, end = starts[index], starts[index + 1]
     evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
     evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
-    slots = now.tick - begun + (config.learning_starts if now.tick > begun else 0)
-    seed, replication = training.stepper.seed, header.stepper[1]
+    slots = training.flown(now.tick - begun)
+    slots = [count + (config.learning_starts if now.tick > begun else 0) for count in slots]
+    seed, *replications = header.stepper
     right = {
         "phase_index": now.phase_index == index,
         "phase_start": now.phase_start == begun,
@@ -183,8 +186,10 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
         "best_score": (now.best_score is None) == (evaluations == 0),
         "curve": all(row.tick <= now.tick for row in header.curve)
         and len(header.curve) >= evaluations,
-        "replay": header.replay == (slots if config.checkpoint_replay else None),
-        "stepper": header.stepper[0] == seed and replication < 2**32,
+        "replay": header.replay == _counts(slots, config),
+        "stepper": seed == training.stepper.seed
+        and len(replications) == len(training.seas)
+        and max(replications) < 2**32,
     }
     for name in (name for name, is_right in right.items() if not is_right):
         raise InputError(f"{path}: {name} does not fit the config; allowed: an undamaged file")
@@ -203,18 +208,21 @@ def _restore(training: Training, values: Tensors, header: dict[str, Any]) -> Non
         states.setdefault(int(index), {})[field] = value
     groups = learner.optimizer.state_dict()["param_groups"]
     learner.optimizer.load_state_dict({"state": states, "param_groups": groups})
-    training.stepper.start_at(*header["stepper"])
-    training.early[...] = values["early"].numpy()
-    stored_state = part(values, "stepper")
-    for name, array in training.stepper.state._asdict().items():
-        array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
-    check_state(training.stepper.state, training.phase_space, training.stepper)
-    if header["replay"] is not None:
-        training.replay.count = header["replay"]
-        stored_replay = part(values, "replay")
-        for name, array in training.replay.arrays.items():
-            array[...] = stored_replay[name].numpy()
-        check_replay(training.replay.arrays, training.layout.grid)
+    counts = header["replay"] if len(training.seas) > 1 else [header["replay"]]
+    for number, sea in enumerate(training.seas):
+        place = _place(number)
+        sea.stepper.start_at(header["stepper"][0], header["stepper"][1 + number])
+        sea.early[...] = values["early" + place].numpy()
+        stored_state = part(values, "stepper" + place)
+        for name, array in sea.stepper.state._asdict().items():
+            array[...] = array_of(stored_state[name], array.dtype).reshape(array.shape)
+        check_state(sea.stepper.state, sea.space, sea.stepper)
+        if training.config.checkpoint_replay:
+            sea.replay.count = counts[number]
+            stored_replay = part(values, "replay" + place)
+            for name, array in sea.replay.arrays.items():
+                array[...] = stored_replay[name].numpy()
+            check_replay(sea.replay.arrays, max(sea.space.size))
     if "finished" in values:
         training.finished = [array_of(values["finished"], MISSION_RECORD)]
         check_finite(training.finished[0])
@@ -254,15 +262,28 @@ def _forms(training: Training, finished: int) -> Tensors:
 def _arrays(training: Training) -> Tensors:
     """The arrays that every checkpoint of a training has, by name."""
     arrays: Tensors = {"random.torch": torch.get_rng_state()}
-    arrays["early"] = torch.from_numpy(training.early)
     for name, network in _networks(training).items():
         arrays |= {f"{name}.{key}": value for key, value in network.items()}
-    for name, array in training.stepper.state._asdict().items():
-        arrays[f"stepper.{name}"] = bytes_of(array)
-    if training.config.checkpoint_replay:
-        for name, array in training.replay.arrays.items():
-            arrays[f"replay.{name}"] = torch.from_numpy(array)
+    for place, sea in ((_place(number), sea) for number, sea in enumerate(training.seas)):
+        arrays[f"early{place}"] = torch.from_numpy(sea.early)
+        for name, array in sea.stepper.state._asdict().items():
+            arrays[f"stepper{place}.{name}"] = bytes_of(array)
+        if training.config.checkpoint_replay:
+            for name, array in sea.replay.arrays.items():
+                arrays[f"replay{place}.{name}"] = torch.from_numpy(array)
     return arrays
+
+
+def _place(number: int) -> str:
+    """What the names of the arrays of a sea end with, but for the first."""
+    return f"-{number}" if number else ""
+
+
+def _counts(slots: list[int], config: TrainingConfig) -> list[int] | int | None:
+    """What a header says of the replay memories, to which so many slots were added."""
+    if not config.checkpoint_replay:
+        return None
+    return slots if len(slots) > 1 else slots[0]
 
 
 def _networks(training: Training) -> dict[str, Tensors]:

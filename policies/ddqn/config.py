@@ -6,6 +6,7 @@ config.num_envs, config.n_step, config.phases[0].ticks
 
 import hashlib
 import json
+import re
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,6 +25,7 @@ from pydantic import (
 from dess.errors import InputError, shown, validation_line
 from dess.files.shipped import Shipped
 from dess.scenario import ScenarioSpace, load_scenario
+from dess.sea.families import SETS, seas_of
 
 _CONFIGS = Shipped("config", "policies.ddqn", "configs")
 
@@ -35,6 +37,9 @@ MISSION_SEED = 500_000_000
 
 # An evaluation is a row of the curve, which a checkpoint holds as text.
 MOST_EVALUATIONS = 50_000
+
+# Settings that are newer than some policies, whose identifiers do not have them.
+_LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "imitates", "imitation_temperature"}
 
 Count = Annotated[int, Field(strict=True, ge=1)]
 Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
@@ -61,6 +66,7 @@ def _in_lists_of_lists(value: Any, levels: int = 3) -> Any:
     return value
 
 
+Place = Annotated[str, Field(min_length=1, max_length=4096)]  # a scenario, or a set of seas
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_in_one_line)]
 
 
@@ -88,6 +94,12 @@ class Phase(_Settings):
     learning_rate: tuple[Rate, Rate] = Field(
         (1e-3, 1e-4), description="of Adam at the beginning and the end"
     )
+    imitates: Literal["", "planner", "planner-long", "planner-short"] = Field(
+        "",
+        description="policy that decides and is imitated (planner-short searches a fifth as long "
+        "as planner); epsilon is then the share of "
+        "the decisions that the network makes all the same",
+    )
 
     @model_validator(mode="after")
     def _is_a_temperature(self) -> "Phase":
@@ -104,6 +116,12 @@ class TrainingConfig(_Settings):
     scenario: str = Field(
         "paper", max_length=4096, description="scenario that missions are drawn from"
     )
+    seas: tuple[Place, ...] = Field(
+        (),
+        max_length=2000,
+        description="scenarios in place of the one scenario; FAMILY:FIRST..LAST are generated "
+        "seas, and train, validation and test are sets of them",
+    )
     set: Annotated[dict[str, Any], AfterValidator(_in_lists_of_lists)] = Field(
         {}, description="fields of the scenario, in all missions"
     )
@@ -111,8 +129,10 @@ class TrainingConfig(_Settings):
         1, description="of the training: weights, exploration, missions"
     )
 
-    observation: Literal["vector", "nodes", "maps"] = Field(
-        "vector", description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a)"
+    observation: Literal["vector", "nodes", "maps", "sets"] = Field(
+        "vector",
+        description="vector: (b); nodes: (b) and a row per node; maps: the paper's (a); sets: for "
+        "any sea",
     )
     hidden: tuple[Width, ...] = Field(
         (512, 512),
@@ -123,6 +143,9 @@ class TrainingConfig(_Settings):
         "float32", description="of the hidden layers while training"
     )
 
+    imitation_temperature: Factor = Field(
+        0.1, description="by which scaled values are divided where a policy is imitated"
+    )
     guard: StrictBool = Field(True, description="whether the return guard masks actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
@@ -134,7 +157,12 @@ class TrainingConfig(_Settings):
     phases: tuple[Phase, ...] = Field(
         min_length=1, max_length=8, description="of Algorithm 1, in order"
     )
-    num_envs: Count = Field(64, le=100_000, description="missions that are simulated side by side")
+    num_envs: Count = Field(
+        64, le=100_000, description="missions that are simulated side by side, on each sea"
+    )
+    seas_per_tick: Count = Field(
+        1, le=100, description="seas whose missions fly in a tick, and that a minibatch is of"
+    )
     learning_starts: Count = Field(
         1000, le=10**6, description="slots of random actions per environment before learning starts"
     )
@@ -157,6 +185,9 @@ class TrainingConfig(_Settings):
 
     evaluate_every: Count = Field(2000, le=10**6, description="ticks between evaluations")
     evaluation_missions: Count = Field(300, le=10**6, description="missions of an evaluation")
+    evaluation_seas: tuple[Place, ...] = Field(
+        (), max_length=2000, description="as seas, for evaluations; by default the same"
+    )
     evaluation_seed: Annotated[int, Field(strict=True, ge=0, lt=2**64)] = Field(
         700_000_001, description="of the evaluations that select the weights"
     )
@@ -184,6 +215,12 @@ class TrainingConfig(_Settings):
                 f"evaluate_every: {self.evaluate_every} makes more than {MOST_EVALUATIONS:,} "
                 f"evaluations in {self.ticks:,} ticks; allowed: more ticks between evaluations"
             )
+        if self.seas and self.observation != "sets":
+            raise ValueError(
+                f"seas: {shown(list(self.seas))} need the observation sets; allowed: a scenario"
+            )
+        if self.observation == "sets" and len(self.hidden) != 3:
+            raise ValueError(f"hidden: {list(self.hidden)} are not three; allowed: three for sets")
         if self.evaluation_seed == MISSION_SEED + self.seed:
             raise ValueError(
                 f"evaluation_seed: {self.evaluation_seed} is that of the training; allowed: another"
@@ -206,6 +243,28 @@ class TrainingConfig(_Settings):
             InputError: If it does not exist or is not valid.
         """
         return load_scenario(self.scenario, **self.set)
+
+    def spaces(self, of_evaluations: bool = False) -> list[ScenarioSpace]:
+        """The scenarios that missions are drawn from: the seas or, without them, the one scenario.
+
+        Args:
+            of_evaluations: Whether those of the missions that select weights are asked for.
+
+        Raises:
+            InputError: If one of them does not exist or is not valid.
+        """
+        given = (of_evaluations and self.evaluation_seas) or self.seas or (self.scenario,)
+        return [load_scenario(name, **self.set) for part in given for name in _names_in(part)]
+
+
+def _names_in(part: str) -> list[str]:
+    """The names of scenarios that a part of ``seas`` stands for."""
+    if part in SETS:
+        return seas_of(part)
+    if several := re.fullmatch(r"(\w+):(\d{1,9})\.\.(\d{1,9})", part):
+        family, first, last = several.groups()
+        return [f"{family}:{seed}" for seed in range(int(first), int(last) + 1)]
+    return [part]
 
 
 def config_names() -> list[str]:
@@ -260,8 +319,11 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
 
 def learner_of(config: TrainingConfig) -> str:
     """An identifier that trainings share if they differ only in the seed: name and hash."""
-    unset = set() if config.set else {"set"}  # policies have been trained before it existed
-    settings = config.model_dump(mode="json", exclude={"seed", "description"} | unset)
+    settings = config.model_dump(mode="json", exclude={"seed", "description"})
+    for part, kind in ((settings, TrainingConfig), *((p, Phase) for p in settings["phases"])):
+        for name in _LATER & part.keys():  # policies have been trained before they existed
+            if part[name] in ([], {}, kind.model_fields[name].default):
+                del part[name]
     return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
 
 
@@ -280,6 +342,7 @@ def resume_command(config: TrainingConfig, name: str, out: Path, device: str = "
         original = config
     words = ["dess", "train", name, "--out", str(out)]
     words += ["--seed", str(config.seed)] if config.seed != original.seed else []
+    words += ["--scenario", config.scenario] if config.scenario != original.scenario else []
     for key, value in config.set.items():
         words += ["--set", f"{key}={json.dumps(value)}"] if original.set.get(key) != value else []
     words += [] if device == "auto" else ["--device", device]

@@ -51,7 +51,9 @@ class Description(Document):
     format: Literal[1] = Field(description="version of the file")
     name: Name = Field(description="name of the policy")
     observation_version: Number = Field(description="version of the encoding of observations")
-    layout: LayoutTable = Field(description="grid, zone and nodes of the training")
+    layout: LayoutTable | None = Field(
+        default=None, description="grid, zone and nodes of the training; none for any sea"
+    )
     training: TrainingConfig = Field(description="settings of the training")
     run: Run = Field(description="the training so far")
     model_sha256: list[Sha256] | None = Field(

@@ -1,6 +1,7 @@
 """The double DQN update (eq. 26-29): Q-target, loss, optimizer step, soft target update."""
 
 import copy
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,16 +86,22 @@ class Learner:
         self, network: nn.Module, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
     ) -> torch.Tensor:
         """The (R, 5) action values of UAV ``uavs[r]`` in state ``missions[r]``."""
-        return network(*self._observe(states, missions, uavs))
+        parts = self.observation.encode(states, missions, uavs)
+        return network(*self._together([parts]))
 
-    def update(self, batch: Batch, learning_rate: float) -> dict[str, torch.Tensor]:
+    def update(self, batch: Batch, learning_rate: float, *others: Batch) -> dict[str, torch.Tensor]:
         """Make one gradient step on a minibatch; return loss, mean Q-value and gradient norm.
+
+        Args:
+            batch: The minibatch.
+            learning_rate: Of the step.
+            *others: Parts of the minibatch on other seas.
 
         Raises:
             DivergenceError: If one of them is not finite; the weights are then as before.
         """
         settings = self.settings
-        loss, chosen = self.loss(batch)
+        loss, chosen = self.loss(batch, *others)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.online.parameters(), settings.gradient_norm)
@@ -113,28 +120,59 @@ class Learner:
             soft_update(self.average, self.online, settings.average_rate)
         return done
 
-    def loss(self, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
-        """The loss of the TD error on a minibatch, and the (B,) values of the actions in it."""
+    def loss(self, *batches: Batch) -> tuple[torch.Tensor, torch.Tensor]:
+        """The loss of the TD error on minibatches, and the (B,) values of the actions in them.
+
+        Where a policy is imitated, the loss is how unlikely its actions are if values are taken for
+        logits. The TD error of a quarter of the minibatches is added: so values have the right size
+        when the next phase begins.
+        """
         settings = self.settings
-        allowed = torch.from_numpy(masks(batch.state, batch.later, batch.uav)).to(self.device)
-        reward = torch.from_numpy(batch.reward).to(self.device) * settings.reward_scale
-        discount = torch.from_numpy(batch.discount).to(self.device)
-        action = torch.from_numpy(batch.action).to(self.device)
+        now = ((b.observation, b.state, b.rows, b.uav) for b in batches)
+        values = self.online(*self._observe(now))
+        imitation = torch.zeros((), device=self.device)
+        if batches[0].planned is not None:
+            allowed = self._joined([masks(b.state, b.rows, b.uav) for b in batches])
+            planned = self._joined([b.planned for b in batches]).long()
+            logits = (values / settings.imitation_temperature).masked_fill(~allowed, -1e9)
+            imitation = nn.functional.cross_entropy(logits, planned)
+            batches = batches[: max(len(batches) // 4, 1)]
+        allowed = self._joined([masks(b.state, b.later, b.uav) for b in batches])
+        reward = self._joined([b.reward for b in batches]) * settings.reward_scale
+        discount = self._joined([b.discount for b in batches])
+        action = self._joined([b.action for b in batches])
         with torch.no_grad():
-            later = self._observe(batch.state, batch.later, batch.uav)
+            later = self._observe((b.observation, b.state, b.later, b.uav) for b in batches)
             q_target = double_dqn_target(
                 reward, discount, self.online(*later), self.target(*later), allowed
             )
-        values = self.values(self.online, batch.state, batch.rows, batch.uav)
-        chosen = values.gather(1, action[:, None]).squeeze(1)
-        return _LOSSES[settings.loss](chosen, q_target), chosen
+        chosen = values[: len(action)].gather(1, action[:, None]).squeeze(1)
+        return _LOSSES[settings.loss](chosen, q_target) + imitation, chosen
 
     def _observe(
-        self, states: CompactStates, missions: np.ndarray, uavs: np.ndarray
+        self, rows: Iterable[tuple[Any, CompactStates, np.ndarray, np.ndarray]]
     ) -> list[torch.Tensor]:
-        """The observations of UAV ``uavs[r]`` in state ``missions[r]``, on the device."""
-        parts = self.observation.encode(states, missions, uavs)
-        return [torch.from_numpy(part).to(self.device) for part in parts]
+        """Observations on the device, of an encoder (None for that of the learner) and states."""
+        encoded = [(encoder or self.observation).encode(*states) for encoder, *states in rows]
+        return self._together(encoded)
+
+    def _together(self, encoded: Sequence[tuple[np.ndarray, ...]]) -> list[torch.Tensor]:
+        """Observations on several seas, one after the other; sets are filled up with zeros."""
+        return [self._joined(_filled(parts)) for parts in zip(*encoded, strict=True)]
+
+    def _joined(self, arrays: Sequence[np.ndarray]) -> torch.Tensor:
+        return torch.from_numpy(np.concatenate(arrays)).to(self.device)
+
+
+def _filled(arrays: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Arrays with zeros at the end of those axes, but for the first, that are longer in others."""
+    longest = np.max([array.shape for array in arrays], 0)[1:]
+    return [
+        np.pad(array, [(0, 0), *((0, n) for n in longest - array.shape[1:])])
+        if (longest > array.shape[1:]).any()
+        else array
+        for array in arrays
+    ]
 
 
 _LOSSES = {"huber": nn.functional.smooth_l1_loss, "mse": nn.functional.mse_loss}

@@ -20,6 +20,8 @@ ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5
 NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # smallest width of a map: two convolutions leave one cell
 DENSE = (256, 256, 256)
+HEADS = 8  # of the attention to nodes, teammates and zones
+ABSENT = -1e9  # added to the weight of a row that stands for nothing
 
 
 class PaperNetwork(nn.Module):
@@ -144,6 +146,83 @@ class NodeNetwork(_Dueling):
             pooled = [self.own(vector), per_node.amax(1), per_node.mean(1)]
             hidden = self.hidden(torch.cat([part.to(pooled[0].dtype) for part in pooled], 1))
         return self._values(hidden)
+
+
+class SetNetwork(nn.Module):
+    """A dueling network for the sets of any sea: what is in them is pooled by attention.
+
+    Every node gives rise to ``HEADS`` weights and values. The state pools all of them. A move pools
+    those to which it makes the way shorter, and each with the share of the straight line there that
+    it is along. Teammates and zones likewise. All actions share the layers that follow, so a
+    mirrored sea has mirrored values, and the number and order of nodes does not matter.
+    """
+
+    def __init__(
+        self,
+        shapes: Sequence[Sequence[int]],
+        hidden: Sequence[int],
+        precision: torch.dtype = torch.float32,
+    ) -> None:
+        """Make the layers.
+
+        Args:
+            shapes: Shapes of one row of the own state, the actions and the sets (``Sets.shapes``).
+            hidden: Widths of the layers on a node, on a teammate or a zone, and of the joint ones.
+            precision: Of the hidden layers, float32 or bfloat16.
+        """
+        super().__init__()
+        (own,), (_, action), *sets = shapes
+        nodes, others, joint = hidden
+        self.precision = precision
+        widths = (nodes, others, others)
+        columns = [shape[-1] for shape in sets[::2]]
+        self.sets = nn.ModuleList(
+            _Pool(own, of_row, width, joint) for of_row, width in zip(columns, widths, strict=True)
+        )
+        self.own, self.action = nn.Linear(own, joint), nn.Linear(action, joint, bias=False)
+        self.state = nn.Linear(joint, joint)
+        self.hidden = nn.Linear(joint, joint // 2)
+        self.value, self.advantage = nn.Linear(joint, 1), nn.Linear(joint // 2, 1)
+
+    def forward(self, own: Tensor, actions: Tensor, *sets: Tensor) -> Tensor:
+        """The values (R, 5) of the actions, from the arrays of ``Sets.encode``."""
+        with _hidden_precision(self, self.precision, own):
+            state, each = self.own(own), self.action(actions)
+            for number, pool in enumerate(self.sets):
+                of_all, of_moves = pool(own, *sets[2 * number : 2 * number + 2])
+                state += of_all
+                each[:, :4] += of_moves
+            state = torch.relu_(state)
+            each = torch.relu_(each.add_(self.state(state)[:, None]))
+            each = torch.relu_(self.hidden(each))
+        advantage = self.advantage(each.to(self.value.weight.dtype)).squeeze(2)
+        value = self.value(state.to(self.value.weight.dtype))
+        return value + advantage - advantage.mean(1, keepdim=True)
+
+
+class _Pool(nn.Module):
+    """The pooled values of a set: of the whole, and of what each move comes nearer to."""
+
+    def __init__(self, own: int, columns: int, width: int, joint: int) -> None:
+        super().__init__()
+        self.context = nn.Linear(own, width)
+        self.inputs = nn.Linear(columns, width, bias=False)
+        self.layer = nn.Linear(width, width)
+        self.weights, self.values = nn.Linear(width, HEADS), nn.Linear(width, 2 * width)
+        self.of_all, self.nearer, self.along = (
+            nn.Linear(2 * width, joint, bias=False) for _ in range(3)
+        )
+
+    def forward(self, own: Tensor, rows: Tensor, moves: Tensor) -> tuple[Tensor, Tensor]:
+        """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
+        each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
+        each = torch.relu_(self.layer(each))
+        present = moves[:, -1, :, None]
+        weights = torch.softmax(self.weights(each) + ABSENT * (1 - present), 1) * present
+        values = self.values(each).unflatten(2, (HEADS, -1)) * weights[..., None].to(each.dtype)
+        pooled = moves.to(each.dtype) @ values.flatten(2)
+        nearer, along = self.nearer(pooled[:, :4]), self.along(pooled[:, 4:8])
+        return self.of_all(pooled[:, 8]), nearer.add_(along)
 
 
 def units_of(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:

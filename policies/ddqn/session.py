@@ -24,6 +24,7 @@ from dess.files.locks import locked
 from dess.files.reading import paths_in
 from dess.files.tables import write_table
 from dess.files.writing import check_folder, writable
+from dess.observations.observer import encoder_of
 from dess.observations.states import layout_of
 from dess.record import MISSION_RECORD
 from dess.state import MISSION, UAV
@@ -32,7 +33,7 @@ from policies.ddqn.config import CHECKPOINT, TrainingConfig
 from policies.ddqn.description import MODEL
 from policies.ddqn.network import units_of
 from policies.ddqn.replay import ReplayMemory
-from policies.ddqn.trained import save_policy
+from policies.ddqn.trained import load_policy, save_policy
 from policies.ddqn.training import Training, build
 
 CURVE, EVENTS, LOCK = "training.parquet", "tensorboard", ".lock"
@@ -66,8 +67,10 @@ def device_of(name: str) -> torch.device:
 
 def memory_of(config: TrainingConfig) -> int:
     """The size of the replay memory for a config [bytes]."""
-    space = config.space
-    return ReplayMemory.bytes_for(config.replay, config.num_envs, space.uavs[1], len(space.nodes))
+    sizes = [(space.uavs[1], len(space.nodes)) for space in config.spaces()]
+    imitates = any(phase.imitates for phase in config.phases)
+    slots = config.replay, config.num_envs
+    return sum(ReplayMemory.bytes_for(*slots, *size, imitates) for size in sizes)
 
 
 def size_of(config: TrainingConfig) -> int:
@@ -75,17 +78,22 @@ def size_of(config: TrainingConfig) -> int:
 
     A checkpoint is written from a copy, so what it holds counts twice.
     """
-    space = config.space
-    fleet, nodes = space.uavs[1], len(space.nodes)
+    spaces = config.spaces()
+    fleet, nodes = (max(n) for n in zip(*((s.uavs[1], len(s.nodes)) for s in spaces), strict=True))
+    layout = None if config.observation == "sets" else layout_of(spaces[0])
     with torch.device("meta"):  # the sizes of the network, without its memory
-        observation, network = build(config, layout_of(space))
+        observation, network = build(config, layout)
+    shapes = observation.shapes
+    if layout is None:
+        largest = max(spaces, key=lambda space: len(space.nodes))
+        shapes = encoder_of("sets", largest).shapes
     weights = sum(weight.numel() for weight in network.parameters())
     rows = max(2 * config.batch, config.num_envs * fleet, BATCH_SIZE * fleet)
-    row = 3 * units_of(network, observation.shapes)  # outputs, their gradients, the later state
+    row = 3 * units_of(network, shapes)  # outputs, their gradients, the later state
     state = MISSION.itemsize + fleet * UAV.itemsize + 8 * nodes
     evaluation = config.evaluation_missions * (MISSION_RECORD.itemsize + fleet * 8 * 8)
     losses = _LOSS * config.updates * min(config.evaluate_every, config.ticks)
-    held = 6 * 4 * weights + config.num_envs * state
+    held = 6 * 4 * weights + len(spaces) * config.num_envs * state
     held += memory_of(config) if config.checkpoint_replay else 0
     others = 0 if config.checkpoint_replay else memory_of(config)
     return 2 * held + others + 4 * weights + 4 * rows * row + evaluation + losses
@@ -98,6 +106,7 @@ def train(
     resume: bool = False,
     device: str = "auto",
     accept_size: bool = False,
+    start: str = "",
     announce: Callable[[int], None] | None = None,
     progress: Callable[[Training, int], None] | None = None,
 ) -> Training:
@@ -113,6 +122,7 @@ def train(
         resume: Whether to resume the training in the folder.
         device: ``auto``, ``cpu`` or ``cuda``.
         accept_size: Whether to train even if that takes more memory than is available.
+        start: The folder of a trained policy whose weights a new training begins with.
         announce: Called before any large allocation with the size of the replay memory [bytes].
         progress: Called after each tick with the training and the ticks since the last call.
 
@@ -139,6 +149,8 @@ def train(
                 training = load_training(path, config, place, size_of(config))
             else:
                 training = Training(config, place)
+                if start:
+                    training.begin_with(load_policy(Path(start)).network.state_dict())
                 save_training(path, training)
         except (MemoryError, RuntimeError) as error:
             if isinstance(error, RuntimeError) and "alloc" not in str(error):

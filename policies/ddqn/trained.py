@@ -63,14 +63,13 @@ def save_policy(
     Raises:
         InputError: If a file cannot be written.
     """
-    layout = layout_of(space)
+    layout = None if config.observation == "sets" else layout_of(space)
     description = Description(
         format=FORMAT,
         name=config.name,
         observation_version=ENCODERS[config.observation].version,
-        layout=LayoutTable(
-            grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()
-        ),
+        layout=layout
+        and LayoutTable(grid=layout.grid, zone=layout.zone.tolist(), nodes=layout.nodes.tolist()),
         training=config,
         run=Run(**(run or {})),
     )
@@ -106,9 +105,11 @@ def load_policy(folder: Path) -> DDQN:
             f"{path}: damaged: it has not the checksum in {CONFIG}; allowed: the file it was made "
             "with"
         )
-    values = description.layout.model_dump()
+    values = description.layout and description.layout.model_dump()
     try:
-        layout = layout_of(ScenarioSpace.of(uavs=1, **values))
+        layout = None
+        if config.observation != "sets":
+            layout = layout_of(ScenarioSpace.of(uavs=1, **(values or {})))
         with torch.device("meta"):  # the forms of the weights, without their memory
             observation, network = build(config, layout)
     except InputError as error:

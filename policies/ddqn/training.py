@@ -6,6 +6,7 @@ config's ``evaluation_seed``, and missions for evaluations should have any other
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,19 +19,28 @@ from dess.env.stepper import MissionStepper
 from dess.errors import InputError
 from dess.observations import states as column
 from dess.observations.maps import POOL
-from dess.observations.observer import ENCODERS
+from dess.observations.observer import ENCODERS, encoder_of
+from dess.observations.sets import Sets
 from dess.observations.states import CompactStates, Layout, compact_states, layout_of, masks
 from dess.scenario import ScenarioSpace
+from dess.sea.chart import FAR, spread
 from dess.state import HOVER, STEP_X, STEP_Y
+from dess.view import View
 from policies.ddqn.config import MISSION_SEED, Phase, TrainingConfig
 from policies.ddqn.learner import Learner
-from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork
+from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperNetwork, SetNetwork
 from policies.ddqn.policy import DDQN
-from policies.ddqn.replay import ReplayMemory
+from policies.ddqn.replay import Batch, ReplayMemory
+from policies.ddqn.tensors import require_forms
+from policies.planner import Budget, LongPlanner, Planner
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
 SELECT_BY = "collection_ratio_and_communication"
+# The data of the paper's nodes at the start [data units], as much as all data of a sea count where
+# there are several seas.
+DATA = 312.5
+STRETCH = 64  # ticks for which the missions of some seas fly, before those of the next seas do
 EARLY = 4  # the first evaluation comes after this part of the ticks between evaluations
 # The attributes of a training that are plain values, not arrays.
 _PROGRESS = (
@@ -39,9 +49,11 @@ _PROGRESS = (
 )
 
 
-def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
-    """The observation and a new network of a config, for missions with a layout."""
+def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module]:
+    """The observation and a new network of a config, for missions with a layout, or on any sea."""
     precision = getattr(torch, config.precision)
+    if layout is None:
+        return Sets, SetNetwork(Sets.shapes, config.hidden, precision)
     if config.observation == "maps" and (2 * layout.grid - 1) // POOL < NARROWEST:
         raise InputError(
             f"observation: a grid of {layout.grid} is too small for maps; allowed: vector, nodes"
@@ -54,12 +66,57 @@ def build(config: TrainingConfig, layout: Layout) -> tuple[Any, nn.Module]:
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
 
 
+class ShortPlanner(Planner):
+    """``planner`` with a fraction of its search: more of its decisions can be imitated in a time."""
+
+    name = "planner-short"
+    budget = Budget(8_000, 1_000, 60)
+
+
+TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner, ShortPlanner)}
+
+
+class Waters:
+    """The missions of a training on one sea.
+
+    Attributes:
+        space: The scenario that they are drawn from, in the present phase.
+        observation: The encoder of their states.
+        stepper: The missions in progress.
+        early: (N, I) which UAVs return early.
+        replay: What has happened in them.
+        home: (H + 2, W + 2) cells to the nearest zone, with a border around the grid.
+    """
+
+    def __init__(self, training: "Training", space: ScenarioSpace, observation: Any):
+        config, phase = training.config, training.phase
+        fleet, nodes = space.uavs[1], len(space.nodes)
+        rewards = {}
+        if config.observation == "sets":  # what is collected counts as a share of all data
+            full = max(nodes * sum(space.initial_data) / 2, 1.0)
+            rewards = {"reward_data": space.reward_data * DATA / full}
+        cost = 1 if phase.battery else 0
+        self.space = ScenarioSpace.of(space, flight_cost=cost, **rewards)
+        self.observation = observation
+        self.stepper = MissionStepper(self.space, config.num_envs, MISSION_SEED + config.seed)
+        self.stepper.start_at(self.stepper.seed, training.phase_index * MISSIONS_PER_PHASE)
+        self.early = np.zeros((config.num_envs, fleet), bool)
+        self.replay = ReplayMemory(
+            config.replay, config.num_envs, fleet, nodes, imitates=bool(phase.imitates)
+        )
+        zones = space.chart.zones
+        home = spread(zones, space.chart.parking)[0].reshape(zones.shape)
+        self.home = np.pad(home, 1, constant_values=FAR)
+
+
 class Training:
     """A training in progress, from its first tick to its last.
 
     Attributes:
         config: The settings of the training.
         learner: The networks and the optimizer.
+        seas: The missions on each sea.
+        sea: Those that are flown at present.
         tick: Number of ticks done, over all phases.
         curve: One row per evaluation: progress, metrics and losses.
     """
@@ -68,8 +125,9 @@ class Training:
         self.config, self.device = config, device
         self.generator = np.random.default_rng(config.seed)
         torch.manual_seed(config.seed)
-        self.space = config.space
-        self.layout = layout_of(self.space)
+        self.spaces = config.spaces()
+        self.space = self.spaces[0]
+        self.layout = None if config.observation == "sets" else layout_of(self.space)
         self.observation, network = build(config, self.layout)
         self.learner = Learner(network, self.observation, config, device)
         self.tick = self.updates = self.uav_slots = 0
@@ -84,6 +142,26 @@ class Training:
     def phase(self) -> Phase:
         """The phase to which the next tick belongs."""
         return self.config.phases[self.phase_index]
+
+    @property
+    def phase_space(self) -> ScenarioSpace:
+        """The scenario of the present missions."""
+        return self.sea.space
+
+    @property
+    def stepper(self) -> MissionStepper:
+        """The present missions."""
+        return self.sea.stepper
+
+    @property
+    def replay(self) -> ReplayMemory:
+        """The replay memory of the present missions."""
+        return self.sea.replay
+
+    @property
+    def early(self) -> np.ndarray:
+        """(N, I) which UAVs of the present missions return early."""
+        return self.sea.early
 
     @property
     def done(self) -> bool:
@@ -101,16 +179,16 @@ class Training:
         """Run one tick: a slot of all environments, the updates and, if due, an evaluation."""
         share = (self.tick - self.phase_start) / self.phase.ticks
         epsilon = _between(self.phase.epsilon, share / self.phase.epsilon_decay)
-        if self.replay.count == 0:
+        begins_random = self.tick == 0 and self.config.observation != "sets"
+        for self.sea in [sea for sea in self.seas if sea.replay.count == 0]:  # noqa: B020
             for _ in range(self.config.learning_starts):
-                self._collect(1.0 if self.tick == 0 else epsilon)
-        self._collect(epsilon)
+                self._collect(1.0 if begins_random else epsilon)
+        for self.sea in self._due(self.tick - self.phase_start):  # noqa: B020
+            self._collect(epsilon)
         for _ in range(self.config.updates):
-            batch = self.replay.sample(
-                self.config.batch, self.config.n_step, self.config.discount, self.generator
-            )
             rate = _between(self.phase.learning_rate, share)
-            self.losses.append(self.learner.update(batch, rate))
+            first, *others = self._samples()
+            self.losses.append(self.learner.update(first, rate, *others))
             self.updates += 1
         self.tick += 1
         over = self.tick - self.phase_start == self.phase.ticks
@@ -124,6 +202,32 @@ class Training:
                     network.load_state_dict(self.best)
             self._enter_phase(self.phase_index + 1)
 
+    def _due(self, tick: int) -> list[Waters]:
+        """The seas whose missions fly in a tick of the phase: some for a while, then the next."""
+        first = tick // STRETCH * self.config.seas_per_tick
+        order = range(first, first + self.config.seas_per_tick)
+        return [self.seas[number % len(self.seas)] for number in order]
+
+    def flown(self, ticks: int) -> list[int]:
+        """How often the missions of each sea have flown a slot in the first ticks of a phase."""
+        seas, each = len(self.seas), self.config.seas_per_tick
+        turns, last = divmod(ticks, STRETCH)
+        counts = [STRETCH * ((turns * each - number + seas - 1) // seas) for number in range(seas)]
+        for number in range(turns * each, (turns + 1) * each):
+            counts[number % seas] += last
+        return counts
+
+    def _samples(self) -> list[Batch]:
+        """The parts of a minibatch, each of one sea."""
+        config = self.config
+        chosen = self.seas
+        if len(chosen) > 1:
+            picks = self.generator.integers(0, len(chosen), config.seas_per_tick)
+            chosen = [self.seas[pick] for pick in picks]
+        each = config.batch // len(chosen)
+        draw = each, config.n_step, config.discount, self.generator
+        return [sea.replay.sample(*draw)._replace(observation=sea.observation) for sea in chosen]
+
     def policy(self, weights: dict[str, torch.Tensor]) -> DDQN:
         """A policy with these weights."""
         _, network = build(self.config, self.layout)
@@ -133,6 +237,19 @@ class Training:
     def _as_policy(self, network: nn.Module) -> DDQN:
         config = self.config
         return DDQN(config.name, self.observation, network, config.guard, self.layout)
+
+    def begin_with(self, weights: Mapping[str, torch.Tensor]) -> None:
+        """Begin with the weights of another training.
+
+        Raises:
+            InputError: If they are not those of such a network.
+        """
+        learner = self.learner
+        require_forms(weights, learner.online.state_dict(), "from")
+        for network in (learner.online, learner.target, learner.average):
+            if network is not None:
+                network.load_state_dict(weights)
+        self.best = _weights(learner.evaluated)
 
     @property
     def kept(self) -> dict[str, torch.Tensor]:
@@ -152,15 +269,13 @@ class Training:
     def _enter_phase(self, index: int) -> None:
         """Begin a phase with new missions, an empty replay memory and a new optimizer."""
         self.phase_index, self.phase_start = index, self.tick
-        config = self.config
-        cost = 1 if self.phase.battery else 0
-        self.phase_space = ScenarioSpace.of(self.space, flight_cost=cost)
-        fleet, nodes = self.space.uavs[1], len(self.space.nodes)
-        self.stepper = MissionStepper(self.phase_space, config.num_envs, MISSION_SEED + config.seed)
-        self.stepper.start_at(self.stepper.seed, index * MISSIONS_PER_PHASE)
-        self.early = np.zeros((config.num_envs, fleet), bool)
-        self._launch(self.stepper.indices)
-        self.replay = ReplayMemory(config.replay, config.num_envs, fleet, nodes)
+        self.teacher = TEACHERS[self.phase.imitates]() if self.phase.imitates else None
+        self.seas: list[Waters] = []
+        for space in self.spaces:
+            encoder = self.observation if self.layout else encoder_of("sets", space)
+            self.sea = Waters(self, space, encoder)
+            self.seas.append(self.sea)
+            self._launch(self.stepper.indices)
         self.learner.restart()
         self.scores: list[float] = []
         self.best_score: float | None = None
@@ -174,7 +289,7 @@ class Training:
             low = environments[
                 self.generator.random(len(environments)) < self.config.low_battery_starts
             ]
-            draws = self.generator.random((len(low), 2 + len(self.space.nodes)))
+            draws = self.generator.random((len(low), 2 + len(self.sea.space.nodes)))
             state = self.stepper.state
             _lower_batteries(state.missions, state.uavs, state.residual, low, draws)
 
@@ -187,12 +302,20 @@ class Training:
             states.uavs[..., column.ACTIVE] > states.uavs[..., column.CHARGING]
         )
         actions = np.full(state.uavs.shape, HOVER)
-        if len(missions):
+        planned = [actions.copy()] if self.teacher else []
+        if len(missions) and self.teacher:
+            view = View(state, self.stepper.world, missions, uavs)
+            planned[0][missions, uavs] = shown = self.teacher.act(view)
+            own = self._explore(states, missions, uavs, 0.0)
+            is_own = self.generator.random(len(own)) < epsilon
+            actions[missions, uavs] = np.where(is_own, own, shown)
+        elif len(missions):
             actions[missions, uavs] = self._explore(states, missions, uavs, epsilon)
         outcome = self.stepper.step(actions)
         self.replay.add(
-            states, actions, *(outcome[n] for n in ("reward", "acted", "terminated", "truncated"))
-        )
+            states, actions, outcome["reward"], *planned,
+            *(outcome[n] for n in ("acted", "terminated", "truncated")),
+        )  # fmt: skip
         self.uav_slots += int(outcome["acted"].sum())
         ended = np.nonzero((state.missions["active"] == 0) & outcome["acted"].any(1))[0]
         if len(ended):
@@ -210,6 +333,7 @@ class Training:
             return random
         with torch.no_grad():
             learner = self.learner
+            learner.observation = self.sea.observation
             values = learner.values(learner.online, states, missions, uavs).cpu().numpy()
         if self.phase.temperature > 0.0:  # Gumbel noise samples from the softmax
             values = values / self.phase.temperature - np.log(-np.log(noise))
@@ -226,13 +350,13 @@ class Training:
 
         The actions lead nearer to the zone; in the zone, a latched UAV hovers.
         """
-        rows, layout = states.uavs[missions, uavs], self.layout
-        cells = rows[:, [column.X, column.Y]].astype(np.int64)
-        home = layout.zone_slots(cells)
+        rows = states.uavs[missions, uavs]
+        x, y = rows[:, column.X] + 1, rows[:, column.Y] + 1  # the table has a border
+        home = self.sea.home[y, x]
         reserve = rows[:, column.BATTERY] - states.missions[missions, column.CHARGE_START]
         due = self.early[missions, uavs] & (rows[:, column.MUST_CHARGE] > 0) & (reserve <= home)
-        steps = np.stack([STEP_X, STEP_Y], 1)
-        nearer = np.stack([layout.zone_slots(cells + step) < home for step in steps], 1)
+        steps = zip(STEP_X, STEP_Y, strict=True)
+        nearer = np.stack([self.sea.home[y + south, x + east] < home for east, south in steps], 1)
         nearer[:, HOVER] = (home == 0) & (rows[:, column.LATCH] > 0)
         return nearer & due[:, None]
 
@@ -262,11 +386,15 @@ class Training:
     def _selection_missions(self) -> np.ndarray:
         """The records of the selection missions under the present policy."""
         network = self.learner.evaluated
+        missions, cost = range(self.config.evaluation_missions), self.phase_space.flight_cost
+        spaces = [ScenarioSpace.of(s, flight_cost=cost) for s in self.config.spaces(True)]
         records = simulate_batch(
-            self.phase_space,
+            [spaces[mission % len(spaces)] for mission in missions]
+            if len(spaces) > 1
+            else spaces[0],
             self._as_policy(network),
             self.config.evaluation_seed,
-            self.config.evaluation_missions,
+            missions,
         ).missions
         network.train()
         return records

@@ -4,11 +4,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from dess.code.libraries import missing, needs
+from dess.errors import InputError, shown
 from reports.cli import completion, console
 from reports.cli.settings import SetOption, command, setting
 
@@ -26,6 +27,10 @@ def train(
     device: Literal["auto", "cpu", "cuda"] = "auto",
     seed: int | None = None,
     settings: SetOption = None,
+    scenario: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", autocompletion=completion.scenarios)
+    ] = None,
+    start: Annotated[str | None, typer.Option("--from", metavar="POLICY|DIR")] = None,
     yes: Annotated[bool, typer.Option("--yes")] = False,
 ) -> None:
     """Train a policy into a folder; Ctrl-C saves it, --resume continues exactly.
@@ -36,12 +41,24 @@ def train(
         resume: Continue the training in the folder.
         device: auto uses CUDA if a device is available.
         seed: Seed in place of the seed of the config.
+        scenario: Scenario in place of that, or of the seas, of the config.
+        start: Trained policy whose weights the training begins with.
         yes: Train even if it takes more memory than is available.
     """
     from policies.ddqn.config import CHECKPOINT, load_config, resume_command
+    from policies.registry import folder_of
 
     fields = dict(setting(text) for text in settings or [])
-    config = load_config(name, fields, **({} if seed is None else {"seed": seed}))
+    changes: dict[str, Any] = {} if seed is None else {"seed": seed}
+    if scenario is not None:
+        changes |= {"scenario": scenario, "seas": (), "evaluation_seas": ()}
+    config = load_config(name, fields, **changes)
+    if start and resume:
+        raise InputError("--from: the training has begun; allowed: --resume without it")
+    if start and not folder_of(start):
+        raise InputError(
+            f"--from: {shown(start)} is no trained policy; allowed: one, or its folder"
+        )
     needs("learning", "dess train")
     from policies.ddqn.learner import DivergenceError
     from policies.ddqn.session import EVENTS, train
@@ -61,6 +78,7 @@ def train(
                 resume=resume,
                 device=device,
                 accept_size=yes,
+                start=str(folder_of(start)) if start else "",
                 announce=announce,
                 progress=progress,
             )

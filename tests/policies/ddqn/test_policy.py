@@ -3,20 +3,25 @@
 import copy
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
-from hypothesis import event, given
+from hypothesis import event, given, settings
 from hypothesis import strategies as st
 from torch import Tensor, nn
 
 from dess import InputError
 from dess.batch import simulate_batch
+from dess.channel import world_of
+from dess.env.stepper import MissionStepper
 from dess.mission import simulate
 from dess.observations.guard import guard
-from dess.observations.states import Layout, layout_of
+from dess.observations.sets import Sets, sea_of
+from dess.observations.states import ACTIVE, Layout, compact_states, layout_of
 from dess.observations.vector import Vector
 from dess.scenario import ScenarioSpace, load_scenario
-from policies.ddqn.network import DuelingNetwork
+from dess.state import constants_of
+from policies.ddqn.network import DuelingNetwork, SetNetwork
 from policies.ddqn.policy import DDQN
 from tests.drawn import PLAIN_SEA, Checked, Recorder, Wanderer, replications, seeds, spaces
 
@@ -129,3 +134,55 @@ def test_away_from_home_it_refuses(changes: dict[str, Any], problem: str) -> Non
         assert line.startswith(f"policy random weights: has learned {problem}")
         assert "; allowed: " in line
         assert "\n" not in line
+
+
+# --- on any sea ---
+
+
+def _any(seed: int = 1) -> DDQN:
+    """A policy of random weights that decides on any sea."""
+    torch.manual_seed(seed)
+    return _exact(DDQN("any", Sets, SetNetwork(Sets.shapes, [16, 8, 16]), True, None))
+
+
+@settings(max_examples=20)
+@given(spaces(), seeds, st.integers(1, 5))
+def test_on_any_sea_a_mission_does_not_depend_on_those_beside_it(
+    space: ScenarioSpace, seed: int, batch_size: int
+) -> None:
+    policy, missions = _any(), 5
+    records = simulate_batch(space, policy, seed, missions, batch_size=batch_size)
+    for number in range(missions):
+        single = simulate(space, policy, seed, number)
+        assert single.metrics.tobytes() == records.missions[number].tobytes()
+        assert single.uavs.tobytes() == records.uavs[number, : len(single.uavs)].tobytes()
+
+
+def test_missions_with_other_fleets_pads_and_data_beside_it_change_nothing() -> None:
+    """A smaller fleet has fewer rows of teammates; pads and data are part of what is observed."""
+    kinds = [
+        load_scenario("paper", **fields)
+        for fields in ({"uavs": 1}, {"uavs": 3, "pads": 1}, {"uavs": 6, "initial_data": 2.0})
+    ]
+    scenarios, policy = kinds * 3, _any()
+    records = simulate_batch(scenarios, policy, 7, len(scenarios))
+    for number, scenario in enumerate(scenarios):
+        alone = simulate_batch(scenario, policy, 7, [number])
+        assert alone.missions[0].tobytes() == records.missions[number].tobytes()
+
+
+@settings(max_examples=20)
+@given(spaces(), st.integers(0, 3))
+def test_on_any_sea_values_turn_with_it(space: ScenarioSpace, seed: int) -> None:
+    """The value of a move is that of the mirrored move on the mirrored sea."""
+    policy, sets = _any(seed), Sets(sea_of(constants_of(space)[0], world_of(space)))
+    stepper = MissionStepper(space, 3, seed)
+    stepper.launch(stepper.indices)
+    states = compact_states(stepper.state, space.chart, True)
+    missions, uavs = np.nonzero(states.uavs[..., ACTIVE])
+    own, actions, *parts = (torch.from_numpy(a) for a in sets.encode(states, missions, uavs))
+    turned = [own, actions[:, [0, 3, 2, 1, 4]], *parts]
+    for number in (3, 5, 7):
+        turned[number] = parts[number - 2][:, [0, 3, 2, 1, 4, 7, 6, 5, 8]]
+    values = policy.network(own, actions, *parts)
+    torch.testing.assert_close(policy.network(*turned), values[:, [0, 3, 2, 1, 4]])

@@ -23,7 +23,7 @@ class Quick(Planner):
     """The planner with a search that is short enough for tests."""
 
     name = "quick"
-    budget = Budget(60, 20, 3)
+    budget = Budget(60, 20)
 
 
 QUICK = Quick()
@@ -115,7 +115,7 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
     paper, products = load_scenario("paper"), {}
 
     class Better(Planner):
-        budget = Budget(3_000, 200, 20)
+        budget = Budget(6_000, 600)
 
     for name, policy in (
         ("quick", QUICK),

@@ -1,0 +1,216 @@
+"""Sets: values by hand, and what a mirrored, rotated or renamed sea changes in them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dess.channel import world_of
+from dess.observations import states as column
+from dess.observations.sets import ACTION, MATE, MOVES, NODE, OWN, ZONE, Sets, sea_kinds, sea_of
+from dess.observations.states import CompactStates, empty_states
+from dess.scenario import ScenarioSpace
+from dess.state import constants_of, starts_of, state_of
+from tests.drawn import PLAIN_SEA, seas, spaces
+
+OWN_PART, ACTIONS, NODES, NODE_MOVES, MATES, MATE_MOVES, ZONES, ZONE_MOVES = range(8)
+NORTH, EAST, SOUTH, WEST, HOVER = range(5)
+# What becomes of the four moves on a sea that is mirrored along x, and on one that is transposed.
+MIRRORED, TRANSPOSED = [NORTH, WEST, SOUTH, EAST], [WEST, SOUTH, EAST, NORTH]
+
+
+def _sets(space: ScenarioSpace) -> Sets:
+    return Sets(sea_of(constants_of(space)[0], world_of(space)), space.uavs[1])
+
+
+def _encode(space: ScenarioSpace, states: CompactStates, uav: int) -> tuple[np.ndarray, ...]:
+    return tuple(a[0] for a in _sets(space).encode(states, np.array([0]), np.array([uav])))
+
+
+@st.composite
+def _cases(draw: st.DrawFn, **fixed: Any) -> tuple[dict[str, Any], CompactStates, int]:
+    """The geometry of a sea, a team in any state on it, and a UAV that is active."""
+    sea = draw(seas(**fixed))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    uavs, size = draw(st.integers(1, 6)), (sea["grid"], sea["rows"] or sea["grid"])
+    open_cells = [c for c in np.ndindex(size) if c not in sea.get("no_fly", ())]
+    states = empty_states(1, uavs, len(sea["nodes"]))
+    states.missions[0] = rng.integers((10, 60), (51, 101))
+    team = states.uavs[0]
+    team[:, [column.X, column.Y]] = rng.choice(open_cells, uavs)
+    team[:, column.BATTERY] = rng.integers(0, 101, uavs)
+    team[:, column.NEEDED] = rng.integers(0, 111, uavs)
+    flags = [column.ACTIVE, column.LATCH, column.CHARGING, column.MUST_CHARGE]
+    team[:, flags] = rng.integers(0, 2, (uavs, 4))
+    team[:, column.HOME] = rng.integers(0, 20, uavs)
+    team[:, column.MASK] = rng.integers(1, 32, uavs)
+    states.residual[0] = rng.choice([0.0, 1.0], len(sea["nodes"])) * rng.uniform(
+        0, 20, len(sea["nodes"])
+    )
+    uav = draw(st.integers(0, uavs - 1))
+    team[uav, column.ACTIVE] = 1
+    return sea, states, uav
+
+
+def _space(sea: dict[str, Any]) -> ScenarioSpace:
+    return ScenarioSpace.of(uavs=1, edge_snr=-14.0, **sea)
+
+
+def _turned(sea: dict[str, Any], transposes: bool) -> dict[str, Any]:
+    """A sea that is transposed, or mirrored along x."""
+    grid, rows = sea["grid"], sea["rows"] or sea["grid"]
+
+    def cells(x: int, y: int, width: int = 1, height: int = 1) -> tuple[int, ...]:
+        return (y, x, height, width) if transposes else (grid - x - width, y, width, height)
+
+    return {
+        "grid": rows if transposes else grid,
+        "rows": grid if transposes else rows,
+        "zone": cells(*sea["zone"]),
+        "nodes": [cells(*cell)[:2] for cell in sea["nodes"]],
+        "zones": [zone | {"cells": cells(*zone["cells"])} for zone in sea.get("zones", ())],
+        "no_fly": [cells(*cell)[:2] for cell in sea.get("no_fly", ())],
+    }
+
+
+def _turned_states(states: CompactStates, grid: int, transposes: bool) -> CompactStates:
+    """The states on such a sea."""
+    moves, team = (TRANSPOSED if transposes else MIRRORED), states.uavs.copy()
+    x, y = states.uavs[..., column.X], states.uavs[..., column.Y]
+    team[..., column.X], team[..., column.Y] = (y, x) if transposes else (grid - 1 - x, y)
+    bits = states.uavs[..., column.MASK, None] >> np.array([*moves, HOVER]) & 1
+    team[..., column.MASK] = (bits << np.arange(5)).sum(-1)
+    return states._replace(uavs=team)
+
+
+@given(_cases(), st.booleans())
+def test_a_mirrored_or_rotated_sea_has_its_moves_in_another_order(
+    case: tuple[dict[str, Any], CompactStates, int], transposes: bool
+) -> None:
+    sea, states, uav = case
+    plain = _encode(_space(sea), states, uav)
+    turned_states = _turned_states(states, sea["grid"], transposes)
+    turned = _encode(_space(_turned(sea, transposes)), turned_states, uav)
+    moves = TRANSPOSED if transposes else MIRRORED
+    for part in (OWN_PART, NODES, MATES, ZONES):
+        np.testing.assert_allclose(turned[part], plain[part], atol=1e-6)
+    np.testing.assert_allclose(turned[ACTIONS], plain[ACTIONS][[*moves, HOVER]], atol=1e-6)
+    order = [*moves, *(4 + move for move in moves), 8]
+    for part in (NODE_MOVES, MATE_MOVES, ZONE_MOVES):
+        np.testing.assert_allclose(turned[part], plain[part][order], atol=1e-6)
+
+
+@given(_cases(), st.randoms(use_true_random=False))
+def test_renamed_nodes_and_uavs_are_the_same_sets(
+    case: tuple[dict[str, Any], CompactStates, int], random: Any
+) -> None:
+    sea, states, uav = case
+    nodes, team = [*range(len(sea["nodes"]))], [*range(states.uavs.shape[1])]
+    random.shuffle(nodes)
+    random.shuffle(team)
+    renamed = states._replace(
+        uavs=states.uavs[:, team], residual=np.ascontiguousarray(states.residual[:, nodes])
+    )
+    plain = _encode(_space(sea), states, uav)
+    others = sea | {"nodes": [sea["nodes"][k] for k in nodes]}
+    other = _encode(_space(others), renamed, team.index(uav))
+    mates = [j - (j > uav) for j in team if j != uav]
+    expected = [
+        *(plain[OWN_PART], plain[ACTIONS], plain[NODES][nodes], plain[NODE_MOVES][:, nodes]),
+        *(plain[MATES][mates], plain[MATE_MOVES][:, mates], plain[ZONES], plain[ZONE_MOVES]),
+    ]
+    for part, values in zip(other, expected, strict=True):
+        np.testing.assert_allclose(part, values, atol=1e-5)
+
+
+def test_a_small_sea_by_hand() -> None:
+    """Two nodes, a teammate and two zones, with an island between the UAV and a node.
+
+    . . . . . . .    Z zones, U the UAV, T the teammate
+    Z . U # n . Z    n a node with data, and one without at (2, 4)
+    . . . # . . .
+    . T . . . . .
+    . . n . . . .
+    """
+    space = ScenarioSpace.of(
+        grid=7, rows=5, zone=(0, 1, 1, 1), zones=[{"cells": (6, 1, 1, 1)}], uavs=1,
+        nodes=[(4, 1), (2, 4)], no_fly=[(3, 1), (3, 2)], initial_data=(8.0, 8.0),
+    )  # fmt: skip
+    states = empty_states(1, 2, 2)
+    states.missions[0] = 30, 80
+    states.uavs[0, :, : column.UAV_COLUMNS] = [
+        # x, y, battery, needed, active, latch, charging, must charge, home, mask
+        [2, 1, 40, 50, 1, 0, 0, 1, 2, 0b11101],
+        [1, 3, 60, 50, 1, 0, 0, 0, 3, 0b11111],
+    ]
+    states.residual[0] = 4.0, 0.0
+    own, actions, nodes, node_moves, mates, mate_moves, zones, zone_moves = _encode(
+        space, states, 0
+    )
+    assert own[:5] == pytest.approx([0.4, 0.5, 0, 1, 0.3])
+    assert own[7:9] == pytest.approx([37 / 50, 1])  # 40 - 1 slot to charge - 2 home
+    # The unit is 8; the way around the island is 4 cells to the north.
+    assert nodes[:, 1] == pytest.approx([0.5, 0.0])
+    assert nodes[:, 4] == pytest.approx([4 / 30, 3 / 30])
+    assert nodes[:, 8] == pytest.approx([(5 - 4) / 10, (2 - 3) / 10])
+    assert nodes[:, 12] == pytest.approx([1, 1])  # more than 20 slots to spare
+    assert node_moves.T[0] == pytest.approx([1, 0, 0, 0, 0, 1, 0, -1, 1])
+    assert node_moves.T[1] == pytest.approx([0, 0, 1, 0, -1, 0, 1, 0, 1])
+    assert mates[0, [0, 1, 6, 9]] == pytest.approx([1, 3 / 30, 0.6, 0])
+    assert mate_moves[:, 0] == pytest.approx([0, 0, 1, 1, -2 / 3, -1 / 3, 2 / 3, 1 / 3, 1])
+    assert zones[:, 1] == pytest.approx([2 / 30, 6 / 30])
+    assert zones[:, 4].tolist() == [1, 0]
+    assert zone_moves[:4].T.tolist() == [[0, 0, 0, 1], [1, 0, 0, 0]]
+    assert actions[:, 0].tolist() == [0, 0, 0, 0, 1]
+    assert actions[:, 1].tolist() == [1, 0, 1, 1, 1]
+    assert actions[:, 2].tolist() == [1, 0, 1, 1, 1]  # the island is to the east
+    near = 0.5 * np.exp(-np.array([3, 4, 5, 5, 4]) / 4.0) / 2.5
+    assert actions[:, 6] == pytest.approx(near, rel=1e-5)
+
+
+def test_rows_without_a_uav_are_zeros() -> None:
+    space = ScenarioSpace.of(uavs=2)
+    states = empty_states(1, 2, len(space.nodes))
+    states.uavs[0, :, column.ACTIVE] = 1
+    for part in _sets(space).encode(states, np.array([0]), np.array([-1])):
+        assert not part.any()
+
+
+@given(_cases(), st.integers(1, 3))
+def test_uavs_that_are_not_there_are_zeros_behind_the_others(
+    case: tuple[dict[str, Any], CompactStates, int], more: int
+) -> None:
+    sea, states, uav = case
+    longer = states._replace(uavs=np.pad(states.uavs, ((0, 0), (0, more), (0, 0))))
+    plain, padded = (_encode(_space(sea), each, uav) for each in (states, longer))
+    mates = states.uavs.shape[1] - 1
+    for part, (short, long) in enumerate(zip(plain, padded, strict=True)):
+        if part == MATES:
+            assert not long[mates:].any()
+            long = long[:mates]
+        elif part == MATE_MOVES:
+            assert not long[:, mates:].any()
+            long = long[:, :mates]
+        np.testing.assert_array_equal(short, long)
+
+
+@given(spaces(**PLAIN_SEA))
+def test_its_shapes_are_those_of_what_it_encodes(space: ScenarioSpace) -> None:
+    states = empty_states(1, space.uavs[1], len(space.nodes))
+    sets = _sets(space)
+    parts = sets.encode(states, np.array([0]), np.array([0]))
+    assert tuple(part.shape[1:] for part in parts) == sets.shapes
+    empty = ((OWN,), (5, ACTION), (0, NODE), (MOVES, 0), (0, MATE), (MOVES, 0), (0, ZONE))
+    assert Sets.shapes == (*empty, (MOVES, 0))
+
+
+def test_missions_of_a_batch_may_have_different_seas() -> None:
+    """The pads and the data may differ from mission to mission, the geometry may not."""
+    same = [ScenarioSpace.of(uavs=1, charge_start=n) for n in (20, 30)]
+    other = [ScenarioSpace.of(uavs=1, **field) for field in ({"pads": 3}, {"arrival_rate": 0.1})]
+    for kinds, expected in ((same, 1), (same + other, 3)):
+        state = state_of(kinds, len(kinds))
+        state.missions[:] = starts_of(kinds).constants
+        assert len(np.unique(sea_kinds(state.missions))) == expected
