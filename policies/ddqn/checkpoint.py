@@ -292,4 +292,6 @@ def _networks(training: Training) -> dict[str, Tensors]:
     networks = {"online": learner.online.state_dict(), "target": learner.target.state_dict()}
     if learner.average is not None:
         networks["average"] = learner.average.state_dict()
+    if learner.anchor is not None:
+        networks["anchor"] = learner.anchor.state_dict()
     return networks | {"best": training.best}

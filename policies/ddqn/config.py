@@ -39,7 +39,10 @@ MISSION_SEED = 500_000_000
 MOST_EVALUATIONS = 50_000
 
 # Settings that are newer than some policies, whose identifiers do not have them.
-_LATER = {"set", "seas", "seas_per_tick", "evaluation_seas", "imitates", "imitation_temperature"}
+_LATER = {
+    *("set", "seas", "seas_per_tick", "evaluation_seas", "imitates", "imitation_temperature"),
+    "anchor",
+}
 
 Count = Annotated[int, Field(strict=True, ge=1)]
 Width = Annotated[int, Field(strict=True, ge=1, le=4096)]
@@ -149,6 +152,11 @@ class TrainingConfig(_Settings):
     guard: StrictBool = Field(True, description="whether the return guard masks actions")
     low_battery_starts: Share = Field(
         0.0, description="share of training missions that start in the zone on a low battery"
+    )
+    anchor: tuple[Share, Share] = Field(
+        (0.0, 0.0),
+        description="weight of the loss that keeps the decisions that a phase begins with, at its "
+        "beginning and its end; in phases that imitate nothing",
     )
     early_returns: Share = Field(
         0.0,
@@ -322,7 +330,7 @@ def learner_of(config: TrainingConfig) -> str:
     settings = config.model_dump(mode="json", exclude={"seed", "description"})
     for part, kind in ((settings, TrainingConfig), *((p, Phase) for p in settings["phases"])):
         for name in _LATER & part.keys():  # policies have been trained before they existed
-            if part[name] in ([], {}, kind.model_fields[name].default):
+            if part[name] in ([], {}, [0.0, 0.0], kind.model_fields[name].default):
                 del part[name]
     return f"{config.name} {hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:8]}"
 

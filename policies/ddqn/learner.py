@@ -60,6 +60,7 @@ class Learner:
         target: The target network, whose weights follow those of ``online`` slowly.
         average: A copy that follows still more slowly, and that is evaluated and saved; None if
             ``average_rate`` is 1.
+        anchor: The network whose decisions are to be kept, with the weight of that loss; or None.
         optimizer: The optimizer Adam.
         device: The device on which all of them are.
     """
@@ -71,6 +72,8 @@ class Learner:
         self.target = copy.deepcopy(self.online).requires_grad_(False)
         self.average = copy.deepcopy(self.target) if settings.average_rate < 1.0 else None
         self.observation, self.settings, self.device = observation, settings, device
+        self.anchor: nn.Module | None = None
+        self.anchor_weight = 0.0
         self.restart()
 
     def restart(self) -> None:
@@ -125,18 +128,21 @@ class Learner:
 
         Where a policy is imitated, the loss is how unlikely its actions are if values are taken for
         logits. The TD error of a quarter of the minibatches is added: so values have the right size
-        when the next phase begins.
+        when the next phase begins. An anchor is imitated likewise, with its weight.
         """
         settings = self.settings
-        now = ((b.observation, b.state, b.rows, b.uav) for b in batches)
-        values = self.online(*self._observe(now))
+        now = self._observe((b.observation, b.state, b.rows, b.uav) for b in batches)
+        values = self.online(*now)
         imitation = torch.zeros((), device=self.device)
         if batches[0].planned is not None:
-            allowed = self._joined([masks(b.state, b.rows, b.uav) for b in batches])
             planned = self._joined([b.planned for b in batches]).long()
-            logits = (values / settings.imitation_temperature).masked_fill(~allowed, -1e9)
-            imitation = nn.functional.cross_entropy(logits, planned)
+            imitation = nn.functional.cross_entropy(self._logits(values, batches), planned)
             batches = batches[: max(len(batches) // 4, 1)]
+        elif self.anchor is not None:
+            with torch.no_grad():
+                wanted = torch.softmax(self._logits(self.anchor(*now), batches), 1)
+            imitation = nn.functional.cross_entropy(self._logits(values, batches), wanted)
+            imitation = imitation * self.anchor_weight
         allowed = self._joined([masks(b.state, b.later, b.uav) for b in batches])
         reward = self._joined([b.reward for b in batches]) * settings.reward_scale
         discount = self._joined([b.discount for b in batches])
@@ -148,6 +154,11 @@ class Learner:
             )
         chosen = values[: len(action)].gather(1, action[:, None]).squeeze(1)
         return _LOSSES[settings.loss](chosen, q_target) + imitation, chosen
+
+    def _logits(self, values: torch.Tensor, batches: Sequence[Batch]) -> torch.Tensor:
+        """Values as logits of the allowed actions."""
+        allowed = self._joined([masks(b.state, b.rows, b.uav) for b in batches])
+        return (values / self.settings.imitation_temperature).masked_fill(~allowed, -1e9)
 
     def _observe(
         self, rows: Iterable[tuple[Any, CompactStates, np.ndarray, np.ndarray]]

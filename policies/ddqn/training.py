@@ -5,6 +5,7 @@ have the seed ``MISSION_SEED`` + the seed of the training, missions for selectin
 config's ``evaluation_seed``, and missions for evaluations should have any other seed.
 """
 
+import copy
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -67,7 +68,7 @@ def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module
 
 
 class ShortPlanner(Planner):
-    """``planner`` with a fraction of its search: more of its decisions can be imitated in a time."""
+    """``planner`` with a fifth of its search, so that more of its decisions can be imitated."""
 
     name = "planner-short"
     budget = Budget(8_000, 1_000, 60)
@@ -187,6 +188,7 @@ class Training:
             self._collect(epsilon)
         for _ in range(self.config.updates):
             rate = _between(self.phase.learning_rate, share)
+            self.learner.anchor_weight = _between(self.config.anchor, share)
             first, *others = self._samples()
             self.losses.append(self.learner.update(first, rate, *others))
             self.updates += 1
@@ -246,7 +248,7 @@ class Training:
         """
         learner = self.learner
         require_forms(weights, learner.online.state_dict(), "from")
-        for network in (learner.online, learner.target, learner.average):
+        for network in (learner.online, learner.target, learner.average, learner.anchor):
             if network is not None:
                 network.load_state_dict(weights)
         self.best = _weights(learner.evaluated)
@@ -277,6 +279,10 @@ class Training:
             self.seas.append(self.sea)
             self._launch(self.stepper.indices)
         self.learner.restart()
+        self.learner.anchor = None
+        if max(self.config.anchor) > 0.0 and not self.teacher:
+            self.learner.anchor = copy.deepcopy(self.learner.target)
+            self.learner.anchor.load_state_dict(self.learner.online.state_dict())
         self.scores: list[float] = []
         self.best_score: float | None = None
 
