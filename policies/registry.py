@@ -37,7 +37,7 @@ HEURISTICS = {
     "age": ("policies.heuristics:Age", "the stalest data for the distance"),
 }
 PLANNERS = {
-    "planner": ("policies.planner:Planner", "a plan for the whole team, improved in every slot"),
+    "planner": ("policies.planner:Planner", "a plan for the whole team, kept up to date"),
     "planner-long": ("policies.planner:LongPlanner", "the same with a longer search"),
 }
 SHIPPED = HEURISTICS | PLANNERS

@@ -15,7 +15,7 @@ import numpy as np
 from dess.code.kernels import inlined, kernel
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
-from dess.sea.chart import distance, distance_home, in_zone, is_open
+from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
 from dess.sections.failures import working_pads
 from dess.sections.section import extension
 from dess.sections.wind import move_surcharge
@@ -82,10 +82,12 @@ def is_parked(u):
 def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
     """Cells that UAV ``i`` flies from one to another, with a detour around a parked teammate.
 
-    A way that neither follows a line nor leads around a no-fly cell has others of the same length.
+    Without no-fly cells, a way that does not follow a line has others of the same length.
     """
+    if chart.ways.size > 0:
+        return _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y)
     length = distance(chart, x, y, to_x, to_y)
-    if x == to_x or y == to_y or length > abs(x - to_x) + abs(y - to_y):
+    if x == to_x or y == to_y:
         for j in range(mission.uavs):
             o = uavs[j]
             if j != i and is_parked(o):
@@ -93,6 +95,28 @@ def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
                 if before + distance(chart, o.x, o.y, to_x, to_y) == length:
                     return length + 2
     return length
+
+
+@kernel
+def _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y):
+    """``path_length`` where there are no-fly cells: the way around all parked teammates.
+
+    Or, if that is shorter, the way through and the time that a teammate charges in it.
+    """
+    length, width = distance(chart, x, y, to_x, to_y), chart.zones.shape[1]
+    closed, count, is_met = np.empty(mission.uavs, np.int64), 0, False
+    for j in range(mission.uavs):
+        o = uavs[j]
+        if j != i and is_parked(o) and not (o.x == to_x and o.y == to_y):
+            closed[count] = o.y * width + o.x
+            count += 1
+            before = distance(chart, x, y, o.x, o.y)
+            is_met |= before + distance(chart, o.x, o.y, to_x, to_y) == length
+    if not is_met:
+        return length
+    around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
+    lacking = mission.charge_complete - mission.charge_start
+    return min(around, length + (lacking + mission.charge_rate - 1) // mission.charge_rate)
 
 
 @kernel
@@ -238,7 +262,7 @@ def battery_home(mission, u, chart, home_x, home_y, slots, reach):
         mission: ``MISSION`` record.
         u: ``UAV`` record.
         chart: ``Chart``.
-        home_x, home_y, slots: Its parking cell and the slots to it, as of ``parking_cell``.
+        home_x, home_y, slots: Its parking cell and the slots to it: the result of ``parking_cell``.
         reach: The table of ``reach_of``. If it is used, the way to the nearest cell of the zone is
             in it; if the parking cell is farther, each further cell may cost the most.
     """

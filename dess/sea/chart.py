@@ -130,6 +130,35 @@ def _spread(zones, sources, lengths, nearest):
                 last += 1
 
 
+@kernel
+def length_around(zones, closed, x, y, to_x, to_y):
+    """The cells on the shortest way between two cells that avoids closed cells, or ``FAR``.
+
+    Args:
+        zones: (H, W) as in ``Chart``.
+        closed: (N,) the numbers of cells that the way must not enter, counted row by row.
+        x, y: Where the way begins.
+        to_x, to_y: Where it ends.
+    """
+    height, width = zones.shape
+    queue, lengths = np.empty(zones.size, np.int64), np.full(zones.size, FAR, np.int16)
+    lengths[closed] = -1
+    start, end = y * width + x, to_y * width + to_x
+    queue[0], lengths[start] = start, 0
+    first, last = 0, 1
+    while first < last and lengths[end] == FAR:
+        cell = queue[first]
+        first += 1
+        for step_x, step_y in ((0, -1), (1, 0), (0, 1), (-1, 0)):
+            x, y = cell % width + step_x, cell // width + step_y
+            if 0 <= x < width and 0 <= y < height and zones[y, x] != NO_FLY:
+                to = y * width + x
+                if lengths[to] == FAR:
+                    queue[last], lengths[to] = to, lengths[cell] + 1
+                    last += 1
+    return np.int64(lengths[end])
+
+
 @inlined
 def is_open(chart, x, y):
     """Whether cell ``x, y`` is on the grid, and no no-fly cell."""

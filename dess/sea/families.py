@@ -5,7 +5,7 @@ names = seas_of("test")                # 20 seas of each family
 
 Each sea has the ranges of the paper's Table II and its channel: a node some cells away is received
 as well as there. Sizes, numbers of nodes, charging zones, pads and UAVs differ. Seeds one after the
-other have 1 or 2, 3 or 4, and 5 or 6 UAVs, so that a set of seas has all of these numbers alike. A
+other have 1 or 2, 3 or 4, and 5 or 6 UAVs, so that a set of seas has each number equally often. A
 charged battery lasts for the way from a charging zone to any node and back, with a fifth to spare.
 """
 
@@ -60,8 +60,8 @@ class Family(NamedTuple):
 
 
 def is_generated(name: str) -> bool:
-    """Whether a name is that of a generated sea, be its seed right or wrong."""
-    return name.partition(":")[0] in FAMILIES
+    """Whether a name is that of a generated sea, be its family and seed right or wrong."""
+    return name.partition(":")[0] in FAMILIES or bool(re.fullmatch("[a-z]{2,}:[0-9]+", name))
 
 
 def sea_of(name: str) -> dict[str, Any]:

@@ -135,7 +135,7 @@ class Learner:
         values = self.online(*now)
         imitation = torch.zeros((), device=self.device)
         if batches[0].planned is not None:
-            planned = self._joined([b.planned for b in batches]).long()
+            planned = self._joined([b.planned for b in batches if b.planned is not None]).long()
             imitation = nn.functional.cross_entropy(self._logits(values, batches), planned)
             batches = batches[: max(len(batches) // 4, 1)]
         elif self.anchor is not None:

@@ -71,7 +71,7 @@ class ShortPlanner(Planner):
     """``planner`` with a fifth of its search, so that more of its decisions can be imitated."""
 
     name = "planner-short"
-    budget = Budget(8_000, 1_000, 60)
+    budget = Budget(8_000, 800)
 
 
 TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner, ShortPlanner)}

@@ -97,7 +97,7 @@ def _courses(view: View, planner: Planner) -> list[Course]:
     memory = memory_of(state, planner.budget)
     plan = Plan(memory.waypoints[0].copy(), memory.lengths[0].copy())
     flight = empty_flight(MOST_SLOTS, len(uavs), len(residual))
-    begin(mission, uavs, residual, rates, flight)
+    begin(mission, uavs, residual, flight)
     crafts, slots = [flight.team[0].copy()], min(mission["max_slots"] - mission["slot"], MOST_SLOTS)
     for slot in range(1, int(slots) + 1):
         fly(mission, rates, plan, flight, 0, flight, slot)

@@ -1,13 +1,14 @@
 """The fluid model: what a plan collects if every rate is its mean and data arrive evenly.
 
-    begin(mission, uavs, residual, rates, flight)
+    begin(mission, uavs, residual, flight)
     value = fly(mission, rates, plan, flight, 0, flight, 500)   # the whole plan
     value = fly(mission, rates, other, flight, 5, ahead, 500)   # again, from the sixth snapshot on
 
 The model has the rules of ``dess.rules`` as far as they matter for a plan: a cell per move,
-batteries, the charging latch, pads, quotas, and communication slots in which each UAV serves the
-node with the highest mean SNR among those with data. Flights are resumed from snapshots, so a plan
-that differs in its last waypoints from one that was simulated is simulated from there on.
+batteries, the charging latch, pads and quotas. In each slot a UAV serves the node with the highest
+mean rate among those with data, and once it is empty, the next one. Flights are resumed from
+snapshots, so a plan that differs in its last waypoints from one that was simulated is simulated
+from there on.
 """
 
 import math
@@ -19,6 +20,7 @@ from dess.code.kernels import inlined, kernel
 from dess.observations.guard import MARGIN_PER_TEAMMATE, SCARCE_SLOTS
 from dess.sea.chart import distance, in_zone, is_open
 from dess.sections.failures import working_pads
+from dess.sections.fleet import leg
 from dess.state import HOVER, STEP_X, STEP_Y, fields
 from policies.planner.plan import CHARGE, NEVER
 
@@ -28,14 +30,14 @@ from policies.planner.plan import CHARGE, NEVER
 CRAFT = np.dtype(
     [
         # Its state: ``counted`` are the communication slots counted toward the quota, ``next`` is
-        # its waypoint, ``stayed`` the slots that it has hovered there, ``left`` those of its move.
-        *fields(np.int64, "x y battery counted active latch charging next stayed action left"),
-        # Of the slot: its place, and the places per communication slot.
-        *fields(np.int64, "place pace"),
+        # its waypoint, ``stayed`` the slots that it has hovered there.
+        *fields(
+            np.int64, "x y battery counted active latch charging next stayed action slots_left"
+        ),
         # Of the plan: its waypoints, and the last one to charge at, -1 without one.
         *fields(np.int64, "waypoints last_charge"),
-        # Constants: ``part`` are the places that it flies per communication slot.
-        *fields(np.int64, "quota slots_per_cell part"),
+        # Constants.
+        *fields(np.int64, "quota slots_per_cell"),
         ("rate", np.float64),
     ]
 )
@@ -87,15 +89,14 @@ def empty_flight(slots: int, uavs: int, nodes: int) -> Flight:
 
 
 @kernel
-def begin(mission, uavs, residual, rates, flight):
+def begin(mission, uavs, residual, flight):
     """Make the present state the first snapshot of a flight."""
     for i in range(mission.uavs):
         u, v = uavs[i], flight.team[0, i]
         v.x, v.y, v.battery, v.counted = u.x, u.y, u.battery, u.communications
         v.charging, v.latch, v.active = u.charging, u.latch, u.active and not u.grounded
-        v.next, v.stayed, v.left, v.action = 0, 0, u.slots_left, u.executed
+        v.next, v.stayed, v.slots_left, v.action = 0, 0, u.slots_left, u.executed
         v.quota, v.slots_per_cell, v.rate = u.quota, u.slots_per_cell, u.rate
-        v.part = rates.parts // (mission.communication_slots * u.slots_per_cell)
     wait = _revival(mission)
     for k in range(mission.nodes):
         node = flight.sea[0, k]
@@ -120,7 +121,7 @@ def copy_snapshot(mission, source, first, target, second):
 
 
 @kernel
-def fly(mission, rates, plan, source, first, flight, slots):
+def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
     """Fly a plan from a snapshot on, and return its value.
 
     Args:
@@ -132,44 +133,36 @@ def fly(mission, rates, plan, source, first, flight, slots):
         first: The number of the snapshot.
         flight: The flight that is written, from that snapshot on; it may be ``source``.
         slots: The most slots to fly, counted from the present one.
+        lag: The flight is given up once it is that far behind ``source`` [data units].
 
     Returns:
         The data collected in the whole mission if its arrivals were those until now, less penalties
-        [data units]. Data that arrive because the mission lasts longer lower it.
+        [data units]. Data that arrive because the mission lasts longer lower it. It is minus
+        infinity if the flight was given up.
     """
-    extra, candidates, parts = rates.extra, rates.candidates, rates.parts
     waypoints, team, sea = plan.waypoints, flight.team[-1], flight.sea[-1]
-    fleet, m = mission.uavs, mission.communication_slots
-    cost, chart = mission.flight_cost, rates.chart
     copy_snapshot(mission, source, first, flight, -1)
     collected, penalty = source.sums[first, 0], source.sums[first, 1]
-    for i in range(fleet):
-        v = team[i]
-        v.waypoints, v.last_charge = plan.lengths[i], -1
-        for number in range(v.waypoints + 1):
-            w = waypoints[i, number]
-            if number > v.next:
-                w.begun = NEVER
-            elif first == 0:
-                w.begun = 0
-            if number < v.waypoints and w.stay == CHARGE:
-                v.last_charge = number
-    total = mission.initial + mission.arrived
-    present = total - mission.collected - mission.lost
-    wait, rate = _revival(mission), mission.arrival_rate
-    t = first * STRIDE
+    active = 0
+    for i in range(mission.uavs):
+        _take(plan, i, team[i], first)
+        active += team[i].active
+    total, rate = mission.initial + mission.arrived, mission.arrival_rate
+    present, arriving = total - mission.collected - mission.lost, rate * mission.nodes
+    wait, t = _revival(mission), first * STRIDE
     while t < slots:
         if t % STRIDE == 0:
             s = t // STRIDE
+            if first < s <= source.last[0]:
+                behind = source.sums[s, 0] - source.sums[s, 1] - collected + penalty
+                if behind > lag:
+                    return -math.inf
             copy_snapshot(mission, flight, -1, flight, s)
             flight.sums[s, 0], flight.sums[s, 1] = collected, penalty
-        active = 0
-        for i in range(fleet):
-            active += team[i].active
         if active == 0:
             break
-        data_left = present + rate * mission.nodes * t - collected
-        for i in range(fleet):
+        data_left = present + arriving * t - collected
+        for i in range(mission.uavs):
             v = team[i]
             if v.active == 0:
                 continue
@@ -178,87 +171,118 @@ def fly(mission, rates, plan, source, first, flight, slots):
                 continue
             if v.next > v.last_charge:
                 penalty += _unplanned(mission, v, active, data_left)
-            v.battery -= cost
-            if v.left > 0:
-                v.left -= 1
-            else:
-                v.action = HOVER
-                flies_on = False
-                while v.next < v.waypoints:
-                    w = waypoints[i, v.next]
-                    if v.x != w.x or v.y != w.y:
-                        flies_on = True
-                        break
-                    if w.stay == CHARGE:
-                        break
-                    v.stayed += 1
-                    if v.stayed <= w.stay:
-                        break
-                    v.next += 1
-                    v.stayed = 0
-                    waypoints[i, v.next].begun = t
-                # a teammate in the way costs something, and the UAV tries the other direction
-                is_blocked = False
-                for attempt in range(2):
-                    if flies_on:
-                        v.action = _towards(chart, v, w, w.turned != attempt)
-                    is_blocked = False
-                    for j in range(fleet):
-                        is_blocked = is_blocked or (j != i and _blocks(chart, v, team[j], j < i))
-                    if not is_blocked:
-                        break
-                    penalty += _BLOCKED
-                if is_blocked:
-                    v.action = HOVER
-                if v.action != HOVER:
-                    v.x += STEP_X[v.action]
-                    v.y += STEP_Y[v.action]
-                    v.left = v.slots_per_cell - 1
-                    if extra.size > 0:
-                        v.battery -= cost * extra[v.action, v.y, v.x]
-                elif (
-                    v.latch != 0 and in_zone(chart, v.x, v.y) and _has_pad(mission, chart, team, v)
-                ):
-                    penalty += _begin_to_charge(mission, v, active)
-            _open_slot(mission, chart, v, parts)
-        for _ in range(m):
-            for i in range(fleet):
-                v = team[i]
-                v.place += v.pace
-                if v.active == 0 or v.charging != 0:
-                    continue
-                rank, found = 0, False
-                while rank < candidates.shape[1] and not found:
-                    c = candidates[v.place, rank]
-                    node = sea[c.node]
-                    found = t >= node.since
-                    rank += 1
-                if not found:
-                    v.counted += rate * mission.nodes >= _SOME_ARRIVE
-                    continue
-                held, amount = node.base + rate * t, c.rate * v.rate
-                if amount < held:
-                    node.base -= amount
-                else:
-                    amount, node.base, node.since = held, -rate * t, t + wait
-                collected += amount
-                v.counted += 1
-        for i in range(fleet):
+            penalty += _act(mission, rates, waypoints, team, i, t)
+            if _may_charge(rates.chart, v) and _has_pad(mission, rates.chart, team, v):
+                penalty += _begin_to_charge(mission, v, active)
+        active = 0
+        for i in range(mission.uavs):
             v = team[i]
-            if v.active != 0:
-                penalty += _settle(mission, v)
-                if v.charging != 0 and v.latch == 0:
-                    v.charging = 0
-                    if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
-                        v.next += 1
-                        v.stayed = 0
-                        waypoints[i, v.next].begun = t + 1
+            if v.active == 0:
+                continue
+            if v.charging == 0:
+                collected += _collect(mission, rates, sea, v, t, wait)
+            penalty += _settle(mission, v)
+            if v.charging != 0 and v.latch == 0:
+                v.charging = 0
+                if v.next < v.waypoints and waypoints[i, v.next].stay == CHARGE:
+                    _go_on(waypoints, i, v, t + 1)
+            active += v.active
         t += 1
     s = (t + STRIDE - 1) // STRIDE
     copy_snapshot(mission, flight, -1, flight, s)
     flight.last[0], flight.last[1] = s, t
-    share = (mission.collected + collected) / max(total + rate * mission.nodes * t, 1e-9)
+    share = (mission.collected + collected) / max(total + arriving * t, 1e-9)
     return share * total - penalty
+
+
+@inlined
+def _take(plan, i, v, first):
+    """Let a UAV follow a plan from a snapshot on."""
+    v.waypoints, v.last_charge = plan.lengths[i], -1
+    for number in range(v.waypoints + 1):
+        w = plan.waypoints[i, number]
+        if number > v.next:
+            w.begun = NEVER
+        elif first == 0:
+            w.begun = 0
+        if number < v.waypoints and w.stay == CHARGE:
+            v.last_charge = number
+
+
+@inlined
+def _go_on(waypoints, i, v, t):
+    """Let a UAV begin the leg to its next waypoint."""
+    v.next += 1
+    v.stayed = 0
+    waypoints[i, v.next].begun = t
+
+
+@inlined
+def _act(mission, rates, waypoints, team, i, t):
+    """Let UAV ``i`` fly or hover for a slot, and return the penalty for teammates in its way."""
+    v = team[i]
+    v.battery -= mission.flight_cost
+    if v.slots_left > 0:
+        v.slots_left -= 1
+        return 0.0
+    v.action, flies_on, penalty = HOVER, False, 0.0
+    while v.next < v.waypoints:
+        w = waypoints[i, v.next]
+        flies_on = v.x != w.x or v.y != w.y
+        if flies_on or w.stay == CHARGE:
+            break
+        v.stayed += 1
+        if v.stayed <= w.stay:
+            break
+        _go_on(waypoints, i, v, t)
+    # a teammate in the way costs something, and the UAV tries the other direction
+    is_blocked = False
+    for attempt in range(2):
+        if flies_on:
+            w = waypoints[i, v.next]
+            v.action = _towards(rates.chart, v, w, w.turned != attempt)
+        is_blocked = False
+        for j in range(mission.uavs):
+            is_blocked = is_blocked or (j != i and _blocks(rates.chart, v, team[j], j < i))
+        if not is_blocked:
+            break
+        penalty += _BLOCKED
+    if is_blocked:
+        v.action = HOVER
+    if v.action != HOVER:
+        v.x += STEP_X[v.action]
+        v.y += STEP_Y[v.action]
+        v.slots_left = v.slots_per_cell - 1
+        if rates.extra.size > 0:
+            v.battery -= mission.flight_cost * rates.extra[v.action, v.y, v.x]
+    return penalty
+
+
+@inlined
+def _collect(mission, rates, sea, v, t, wait):
+    """Let a UAV serve one node after another for a slot, and return what it collects."""
+    candidates, (rows, columns) = rates.candidates, rates.chart.zones.shape
+    row = ((leg(v) * 5 + v.action) * rows + v.y) * columns + v.x
+    rate, left, collected, rank = mission.arrival_rate, mission.communication_slots, 0.0, 0
+    v.counted += left
+    while left > 0 and rank < candidates.shape[1]:
+        c = candidates[row, rank]
+        node = sea[c.node]
+        rank += 1
+        if t < node.since:
+            continue
+        held, amount = node.base + rate * t, c.rate * v.rate
+        if left * amount < held:
+            node.base -= left * amount
+            collected += left * amount
+            return collected
+        # the communication slot in which a node is emptied has no time for another one
+        left -= int(math.ceil(held / amount))
+        collected += held
+        node.base, node.since = -rate * t, t + wait
+    if rate * mission.nodes < _SOME_ARRIVE:
+        v.counted -= left
+    return collected
 
 
 @inlined
@@ -296,21 +320,26 @@ def _is_nearer(chart, v, w, action):
 
 
 @inlined
-def _has_pad(mission, chart, team, v):
-    """Whether the zone in which a UAV is has a free pad."""
-    zone, free = chart.zones[v.y, v.x], 0
-    for i in range(mission.uavs):
-        free -= team[i].charging != 0 and chart.zones[team[i].y, team[i].x] == zone
-    return free + working_pads(mission, zone) > 0
-
-
-@inlined
 def _blocks(chart, v, other, has_moved):
     """Whether a teammate, which will move away unless it charges, is where an action leads."""
     x, y = v.x + STEP_X[v.action], v.y + STEP_Y[v.action]
     if other.x != x or other.y != y or other.active == 0:
         return False
     return has_moved or other.charging != 0 or (other.latch != 0 and in_zone(chart, x, y))
+
+
+@inlined
+def _may_charge(chart, v):
+    return v.latch != 0 and v.action == HOVER and in_zone(chart, v.x, v.y)
+
+
+@inlined
+def _has_pad(mission, chart, team, v):
+    """Whether the zone in which a UAV is has a free pad."""
+    zone, taken = chart.zones[v.y, v.x], 0
+    for i in range(mission.uavs):
+        taken += team[i].charging != 0 and chart.zones[team[i].y, team[i].x] == zone
+    return taken < working_pads(mission, zone)
 
 
 @inlined
@@ -321,19 +350,6 @@ def _begin_to_charge(mission, v, active):
     v.battery = min(before + mission.charge_rate, mission.charge_complete)
     reserve = (active - 1) * (MARGIN_PER_TEAMMATE * v.slots_per_cell + mission.wind_most)
     return _LATE * max(1 + reserve - before, 0)
-
-
-@inlined
-def _open_slot(mission, chart, v, parts):
-    """Set the place of a UAV at the start of a slot, and how far it flies per part of it."""
-    rows, columns = chart.zones.shape
-    row, column = parts * (columns - 1) + 1, parts * (rows - 1) + 1  # their places
-    v.place, v.pace = v.y * row + v.x * parts, 0
-    if v.action != HOVER:
-        if STEP_Y[v.action] != 0:
-            v.place = rows * row + v.x * column + v.y * parts
-        v.pace = v.part * (STEP_X[v.action] + STEP_Y[v.action])
-        v.place -= v.pace * (v.left + 1) * mission.communication_slots
 
 
 @inlined

@@ -1,7 +1,8 @@
 """The planner as a policy: it plans for the whole team, and each UAV takes its first action.
 
-In slot 0 a plan is searched for from scratch. In each later slot the plan of the slot before is
-kept and improved from what has really happened. The return guard has the last word on every action.
+In slot 0 a plan is searched for from scratch. It is followed until the mission departs from it;
+then it is improved from what has really happened. The return guard has the last word on every
+action.
 
 A plan must depend on nothing but its mission, so the policy itself keeps nothing. Plans belong to
 the arrays in which an engine or an environment holds its missions: row b of a memory to mission b.
@@ -19,32 +20,33 @@ from dess.observations.guard import guard, must_charge
 from dess.state import HOVER, STEP_X, State
 from dess.view import View
 from policies.heuristics import step_towards
-from policies.planner.fluid import CRAFT, MOST_SLOTS, fly
+from policies.planner.fluid import CRAFT, MOST_SLOTS, begin, fly
 from policies.planner.plan import CHARGE, MOST_WAYPOINTS, WAYPOINT, Plan, insert, remove
 from policies.planner.rates import rates_of
 from policies.planner.search import TRIED, empty_workspace, improve
 
-# The temperature of the first step of a search [data units]: for a new plan, for a thorough search,
-# and for a short one. Every so many slots, a search is thorough.
-_NEW, _THOROUGH, _SHORT = 2.0, 1.0, 0.3
-_ROUND = 8
+# The temperature of the first step of a search [data units]: for a new plan, and for one that is
+# improved.
+_NEW, _AGAIN = 2.0, 1.0
+# The mission departs from a plan if a node has so many data units more or less than expected.
+_TOLERANCE = 1.5
 # The most work of a call of compiled code, as UAVs times their teammates and communication slots in
 # all slots that are planned. Ctrl-C waits until it is done.
 _WORK = 2**25
 
 
 class Budget(NamedTuple):
-    """How many edits of a plan a search tries.
+    """How many edits of a plan a search tries for a lone UAV.
+
+    A team of n UAVs gets the n-th part, since each of its edits takes n times as long.
 
     Attributes:
         new: For a new plan.
-        thorough: For a plan that is kept, in every eighth slot.
-        short: In each other slot.
+        again: Each time that the mission departs from the plan.
     """
 
     new: int
-    thorough: int
-    short: int
+    again: int
 
 
 class Memory(NamedTuple):
@@ -54,12 +56,18 @@ class Memory(NamedTuple):
         made: (B, 3) the seed, replication and slot + 1 that each plan was made for; 0 for none.
         waypoints, lengths: (B, ...) as in ``Plan``.
         first: (B, I) ``CRAFT`` records: the UAVs after the slot, if it goes as planned.
+        sea: (B, K) the residual data after the slot, if it goes as planned, without what arrives
+            in it [data units].
+        surplus: (B, K) by how much the data of the slots since the last search were more than
+            planned [data units].
     """
 
     made: np.ndarray
     waypoints: np.ndarray
     lengths: np.ndarray
     first: np.ndarray
+    sea: np.ndarray
+    surplus: np.ndarray
 
 
 # The memories by the identity of the arrays that they belong to, and the budget of the search.
@@ -69,7 +77,7 @@ _MEMORIES: dict[tuple[int, Budget], tuple[weakref.ref, Memory]] = {}
 class Planner:
     """Plan for the whole team by simulated annealing in a fluid model of the mission.
 
-    The plan is improved in every slot. It works for any fleet on any sea.
+    The plan is improved whenever the mission departs from it. It works for any fleet on any sea.
 
     Attributes:
         budget: How long it searches.
@@ -77,7 +85,7 @@ class Planner:
     """
 
     name, chunk = "planner", 10
-    budget = Budget(40_000, 4_000, 100)
+    budget = Budget(45_000, 3_000)
 
     def act(self, view: View) -> np.ndarray:
         """Choose the (R,) actions for the rows of the view."""
@@ -99,10 +107,10 @@ class Planner:
 
 
 class LongPlanner(Planner):
-    """Plan as ``planner`` does, with a search that is six times as long."""
+    """Plan as ``planner`` does, with searches that are about ten times as long."""
 
     name = "planner-long"
-    budget = Budget(240_000, 24_000, 600)
+    budget = Budget(480_000, 36_000)
 
 
 def memory_of(state: State, budget: Budget) -> Memory:
@@ -115,6 +123,8 @@ def memory_of(state: State, budget: Budget) -> Memory:
             np.zeros((*shape, MOST_WAYPOINTS + 1), WAYPOINT),
             np.zeros(shape, np.int64),
             np.zeros(shape, CRAFT),
+            np.zeros_like(state.residual),
+            np.zeros_like(state.residual),
         )
         forget = partial(_MEMORIES.pop, key)  # called with the reference, as the default of ``pop``
         _MEMORIES[key] = weakref.ref(missions, forget), memory
@@ -136,22 +146,31 @@ def _decide(
         slot = np.uint64(mission.slot + 1)
         is_same = made[0] == mission.seed and made[1] == np.uint64(mission.replication)
         if not is_same or made[2] != slot:
-            steps, hottest = budget.new, _NEW
-            if is_same and 0 < made[2] < slot:
-                steps, hottest = budget.short, _SHORT
-                if mission.slot % _ROUND == 0:
-                    steps, hottest = budget.thorough, _THOROUGH
-            if workspace.course[TRIED] == 0 and hottest != _NEW:
-                _take_up(mission, team, plan, memory.first[b])
-            elif workspace.course[TRIED] == 0:
-                _start(mission, team, residual[b].sum(), rates.chart, plan)
-            most -= improve(
-                mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest, most
-            )
-            if workspace.course[TRIED] > 0:
-                return row
+            is_new = not is_same or not 0 < made[2] < slot
+            steps, hottest = (budget.new, _NEW) if is_new else (budget.again, _AGAIN)
+            steps = (steps + mission.uavs - 1) // mission.uavs
+            if workspace.course[TRIED] == 0:
+                if is_new:
+                    _start(mission, team, residual[b].sum(), rates.chart, plan)
+                    memory.surplus[b] = 0.0
+                elif _departs(mission, team, residual[b], memory, b, slot - made[2]):
+                    memory.surplus[b] = 0.0
+                else:
+                    steps = 0
+                if not is_new:
+                    _take_up(mission, team, plan, memory.first[b])
+            if steps > 0:
+                most -= improve(
+                    mission, team, residual[b], nodes, rates, plan, workspace, steps, hottest, most
+                )
+                if workspace.course[TRIED] > 0:
+                    return row
+            else:
+                begin(mission, team, residual[b], workspace.flight)
             ahead = workspace.ahead
             fly(mission, rates, plan, workspace.flight, 0, ahead, 1)
+            for k in range(mission.nodes):
+                memory.sea[b, k] = ahead.sea[ahead.last[0], k].base
             for j in range(mission.uavs):
                 memory.first[b, j] = ahead.team[ahead.last[0], j]
             made[0], made[1], made[2] = mission.seed, np.uint64(mission.replication), slot
@@ -171,6 +190,21 @@ def _decide(
             action = step_towards(mission, team, i, rates.chart, moves, x, y)
         actions[row] = action
     return len(rows_mission)
+
+
+@kernel
+def _departs(mission, uavs, residual, memory, b, slots):
+    """Whether a mission is no longer what its plan, made that many slots ago, was made for."""
+    departs, arrived = False, mission.arrival_rate * slots
+    for k in range(mission.nodes):
+        memory.surplus[b, k] += residual[k] - memory.sea[b, k] - arrived
+        departs = departs or abs(memory.surplus[b, k]) > _TOLERANCE
+    for i in range(mission.uavs):
+        u, v = uavs[i], memory.first[b, i]
+        is_at_work = u.active and not u.grounded
+        is_elsewhere = u.x != v.x or u.y != v.y or u.charging != v.charging
+        departs = departs or is_at_work != v.active or (is_at_work and is_elsewhere)
+    return departs
 
 
 @inlined

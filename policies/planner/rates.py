@@ -1,12 +1,13 @@
 """The mean rates at which UAVs collect data, in tables that the planner reads.
 
 tables = rates_of(view)
-tables.ranks[place, 0]      # the node with the highest mean SNR at a place
+tables.candidates[row, 0]      # the node with the highest rate in a step
 
-A place is a point on the way between neighbouring cells at which a communication slot may be.
+A step is an action together with the cell that it leads to.
 """
 
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -14,34 +15,32 @@ import numpy as np
 from dess.code.memory import check_memory
 from dess.sea.chart import Chart
 from dess.sections.wind import surcharges
+from dess.state import STEP_X, STEP_Y
 from dess.view import View
 
-# Nodes kept per place. The farther ones give next to no data, and nothing is planned with them.
-_RANKS = 32
+# Nodes kept per step. The farther ones give next to no data, and nothing is planned with them.
+_RANKS = 12
 # Points of the Gauss-Hermite rule for the mean over the shadowing.
 _POINTS = 16
 
 
-# A node that a UAV may serve at a place, and its mean rate [data units per communication slot].
-CANDIDATE = np.dtype([("node", np.int64), ("rate", np.float64)])
+# A node that a UAV may serve in a slot, and its mean rate [data units per communication slot].
+CANDIDATE = np.dtype([("node", np.int32), ("rate", np.float32)])
 
 
 class Rates(NamedTuple):
-    """What a UAV may collect at each place, and what its moves cost.
+    """What a UAV may collect in a slot, and what its moves cost.
 
     Attributes:
-        candidates: (P, C) ``CANDIDATE`` records of each place, in descending order of the mean SNR.
-            The first places are those on the H rows of cells, counted along the row; the others
-            those on the W columns.
+        candidates: (5 * W * H, C) ``CANDIDATE`` records of each step, in descending order of the
+            rate; rows as in ``World.order``.
         extra: (4, H, W) surcharges of moves in the wind [%], by action and the cell that it leads
             to; (0, 0, 0) where there is no wind.
-        parts: Places per cell.
         chart: The zones, the no-fly cells and the ways between cells.
     """
 
     candidates: np.ndarray
     extra: np.ndarray
-    parts: int
     chart: Chart
 
 
@@ -53,6 +52,8 @@ def rates_of(view: View) -> Rates:
         view.world.nodes.tobytes(),
         snr.tobytes(),
         (columns, rows),
+        int(mission["communication_slots"]),
+        int(mission["slowest"]),
         float(mission["communication_slot_length"]),
         float(mission["shadowing_deviation"]),
     )
@@ -60,35 +61,49 @@ def rates_of(view: View) -> Rates:
     if mission["wind_most"] > 0:
         wind = (mission[name].item() for name in ("wind_x", "wind_y", "wind_gusts", "wind_seed"))
         extra = surcharges((columns, rows), *wind).copy()
-    return Rates(candidates, extra, (snr.shape[1] - 1) // (len(snr) - 1), chart)
+    return Rates(candidates, extra, chart)
 
 
 @lru_cache(maxsize=8)
 def _candidates(
-    nodes: bytes, mean_snr: bytes, size: tuple[int, int], length: float, deviation: float
-) -> np.ndarray:
-    cells = np.frombuffer(nodes, np.int64).reshape(-1, 2)
-    snr = np.frombuffer(mean_snr).reshape(max(size), -1)
-    mean_rate = _mean_rate(snr, length, deviation)
-    parts, kept = (snr.shape[1] - 1) // (len(snr) - 1), min(_RANKS, len(cells))
-    places = [parts * (cells - 1) + 1 for cells in size]  # of a row, and of a column
-    count = places[0] * size[1] + places[1] * size[0]
+    nodes: bytes, mean_snr: bytes, size: tuple[int, int], m: int, slowest: int, length: float,
+    deviation: float,
+) -> np.ndarray:  # fmt: skip
+    cells, snr = np.frombuffer(nodes, np.int64).reshape(-1, 2), np.frombuffer(mean_snr)
+    (columns, rows), longest = size, max(size)
+    rates = _mean_rate(snr.reshape(longest, -1), length, deviation)
+    kept, legs = min(_RANKS, len(cells)), slowest * (slowest + 1) // 2
     check_memory(
-        f"planner: a grid of {size[0]:,} x {size[1]:,} cells",
-        count * kept * CANDIDATE.itemsize,
-        "a smaller grid, or fewer nodes or communication slots",
+        f"planner: a grid of {columns:,} x {rows:,} cells",
+        5 * legs * columns * rows * kept * CANDIDATE.itemsize,
+        "a smaller grid, or fewer nodes or slots per cell",
     )
-    table, first = np.empty((count, kept), CANDIDATE), 0
-    for axis in range(2):
-        along, across = cells[:, axis], cells[:, 1 - axis]
-        fine = np.abs(np.arange(places[axis])[:, None] - parts * along)
-        for line in range(size[1 - axis]):
-            coarse, part = np.broadcast_to(np.abs(line - across), fine.shape), table[first:]
-            best = np.argsort(-snr[coarse, fine], axis=1, kind="stable")[:, :kept]
-            part["node"][: len(fine)] = best
-            part["rate"][: len(fine)] = np.take_along_axis(mean_rate[coarse, fine], best, 1)
-            first += len(fine)
-    return table
+    table = np.empty((legs, 5, rows, columns, kept), CANDIDATE)
+    parts = (rates.shape[1] - 1) // (longest - 1)
+    for s in range(1, slowest + 1):
+        part = parts // (m * s) if parts % (m * s) == 0 else 0
+        for stage, action, y in product(range(s), range(5), range(rows)):
+            # how far it still has to fly in the communication slots of this part of its move
+            ahead = part * (m * (s - stage) - 1 - np.arange(m))
+            mean = _of_steps(rates, parts, cells, action, y, ahead, columns)
+            best = np.argsort(-mean, axis=1, kind="stable")[:, :kept]
+            row = table[s * (s - 1) // 2 + stage, action, y]
+            row["node"], row["rate"] = best, np.take_along_axis(mean, best, 1)
+    return table.reshape(-1, kept)
+
+
+def _of_steps(
+    rates: np.ndarray, parts: int, cells: np.ndarray, action: int, y: int, ahead: np.ndarray,
+    columns: int,
+) -> np.ndarray:  # fmt: skip
+    """The (W, K) mean rates of the nodes during an action that leads to the cells of a row."""
+    dx, dy = np.broadcast_arrays(np.arange(columns)[:, None] - cells[:, 0], y - cells[:, 1])
+    step, along, across = STEP_X[action], dx, dy
+    if STEP_Y[action] != 0:
+        step, along, across = STEP_Y[action], dy, dx
+    fine = np.abs(parts * along[..., None] - step * ahead)
+    farthest = rates.shape[1] - 1  # beyond it are moves that begin off the grid
+    return rates[np.abs(across)[..., None], np.minimum(fine, farthest)].mean(-1)
 
 
 def _mean_rate(snr: np.ndarray, length: float, deviation: float) -> np.ndarray:

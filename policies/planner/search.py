@@ -25,13 +25,18 @@ from policies.planner.plan import Plan
 # The temperature [data units] falls to this in the last step.
 _COLDEST = 0.05
 # How often each edit is tried, in percent.
-_INSERT, _REMOVE, _MOVE, _SWAP, _STAY, _TURN, _NUDGE, _REVERSE, _CHARGE, _CROSS = range(10)
-_KINDS = np.repeat(np.arange(10), [12, 10, 30, 10, 12, 6, 12, 4, 2, 2])
+_INSERT, _REMOVE, _REPLACE, _MOVE, _SWAP, _STAY = range(6)
+_TURN, _NUDGE, _REVERSE, _CHARGE, _CROSS = range(6, 11)
+_KINDS = np.repeat(np.arange(11), [12, 10, 8, 22, 10, 12, 6, 12, 4, 2, 2])
 # How often a waypoint is inserted where its detour is the shortest, in 1/65536.
 _SHORTEST = 30_000
 # The most waypoints that are moved together.
 _MOST_MOVED = 3
 _NO_EDIT = -1
+# The flight of a team is given up if it is so far behind that of the present plan [data units]: it
+# would hardly ever catch up. A lone UAV is let fly on, since what it gains by another order of its
+# nodes may come late.
+_LAG = 6.0
 # Workspace.course: the edits tried so far, the values of the present and the best plan, and the
 # temperature. The first is 0 between two searches.
 TRIED, VALUE, BEST, HEAT = range(4)
@@ -87,12 +92,13 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     present, trial, flight, ahead, course = workspace
     slots, first = min(mission.max_slots - mission.slot, fluid.MOST_SLOTS), int(course[TRIED])
     if first == 0:
-        fluid.begin(mission, uavs, residual, rates, flight)
+        fluid.begin(mission, uavs, residual, flight)
         course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)
         course[HEAT] = hottest
         plans.copy_plan(mission, plan, present)
         plans.copy_plan(mission, plan, trial)
     value, best, heat = course[VALUE], course[BEST], course[HEAT]
+    lag = _LAG if mission.uavs > 1 else math.inf
     words = np.empty(4, np.uint64)
     cooling, last = (_COLDEST / hottest) ** (1.0 / max(steps, 1)), min(first + most, steps)
     for step in range(first, last):
@@ -106,9 +112,11 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
         if slot >= flight.last[1]:
             plans.copy_plan(mission, present, trial)
             continue
-        new = fluid.fly(mission, rates, trial, flight, slot // fluid.STRIDE, ahead, slots)
         luck = streams.uniform(words[0] >> _HIGH << _HIGH | words[3] & _LOW)
-        if new >= value or new - value > heat * math.log(luck):
+        least = heat * math.log(luck)
+        snapshot, behind = slot // fluid.STRIDE, lag - least
+        new = fluid.fly(mission, rates, trial, flight, snapshot, ahead, slots, behind)
+        if new >= value or new - value > least:
             value = new
             _keep(mission, ahead, flight, slot // fluid.STRIDE)
             for i in range(mission.uavs):  # waypoints that are not reached are of no use
@@ -175,6 +183,11 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
         if not is_open(chart, x, y) or (w.stay == plans.CHARGE and not in_zone(chart, x, y)):
             return _NO_EDIT
         w.x, w.y = x, y
+    elif kind == _REPLACE:
+        if w.stay == plans.CHARGE:
+            return _NO_EDIT
+        k, other = _pick(words[2], mission.nodes), _pick_low(words[2], mission.nodes)
+        w.x, w.y = _nearer(w, nodes[k], nodes[other])
     elif kind == _REVERSE:
         q = min(p + 1 + _pick(words[2], 5), length - 1)
         while p < q:
@@ -191,6 +204,13 @@ def _edit(mission, uavs, nodes, chart, flight, plan, words):
         else:
             slot = _cross(plan, i, p, j, _pick(words[3], plan.lengths[j] + 1))
     return slot
+
+
+@inlined
+def _nearer(w, one, other):
+    """The nearer one of two cells to a waypoint."""
+    is_first = abs(one[0] - w.x) + abs(one[1] - w.y) <= abs(other[0] - w.x) + abs(other[1] - w.y)
+    return (one[0], one[1]) if is_first else (other[0], other[1])
 
 
 @kernel

@@ -33,7 +33,7 @@ ScenarioOption = Annotated[
         "--scenario",
         metavar="NAME|FILE",
         autocompletion=completion.scenarios,
-        help="The name of a shipped scenario, or a TOML file.",
+        help="A shipped scenario, a generated one such as coast:7, or a TOML file.",
     ),
 ]
 SetOption = Annotated[

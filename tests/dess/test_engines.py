@@ -14,8 +14,10 @@ from dess.batch import BATCH_SIZE, MOST_WORK, simulate_batch
 from dess.mission import simulate
 from dess.record import EVENT_NAMES, FAILURE_EVENTS, PACKET_EVENTS, MissionRecord, Records
 from dess.scenario import ScenarioSpace, load_scenario
+from dess.sea.families import FAMILIES
 from dess.state import BATTERY, HOVER, QUOTA, TRUNCATED, sample_scenario
 from dess.view import View
+from policies import load
 from tests.drawn import (
     Commuter,
     Fidget,
@@ -88,6 +90,13 @@ def test_both_engines_agree_where_everything_happens(sections: dict[str, Any]) -
     assert seen == {*EVENT_NAMES} - absent
     assert ends == {QUOTA, BATTERY, TRUNCATED} and fleets == {1, 2, 3, 4, 5, 6}
     assert waited > 100
+
+
+@pytest.mark.parametrize("sea", [f"{family}:5" for family in FAMILIES] + ["german-bight"])
+def test_both_engines_agree_on_generated_seas_and_bays(sea: str) -> None:
+    space, greedy = load_scenario(sea), load("greedy")
+    records = simulate_batch(space, greedy, 3, range(2))
+    assert all(_is(records, job, simulate(space, greedy, 3, job)) for job in range(2))
 
 
 # --- batches ---

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from dess import InputError, streams
 from dess.files.parsing import parse_toml
-from dess.scenario import SAMPLED, ScenarioSpace, load_scenario, scenario_names
+from dess.scenario import (
+    SAMPLED,
+    ScenarioSpace,
+    load_scenario,
+    scenario_description,
+    scenario_names,
+)
+from dess.sea.chart import distance_home
 from dess.sections.age import MOST_TEETH
 from dess.state import check_seed, sample_scenario, spaces_of
 from tests.drawn import continuous_spaces, extended_spaces, replications, seeds, spaces
@@ -22,8 +29,23 @@ def test_a_space_survives_toml(space: ScenarioSpace) -> None:
     assert ScenarioSpace.of(**parse_toml(space.to_toml(), "text")) == space
 
 
-def test_the_shipped_scenarios_are_the_papers_and_a_bay() -> None:
-    assert scenario_names() == ["bay", "fig1", "fig4", "paper"]
+BAYS = ("biscay-corner", "galway-bay", "german-bight", "gulf-of-finland", "kattegat", "oresund")
+BAYS += ("puget-sound", "san-francisco-bay", "saronic-gulf", "tokyo-bay")
+
+
+@pytest.mark.parametrize("name", BAYS)
+def test_bays_have_land_and_invented_nodes_within_reach(name: str) -> None:
+    bay = load_scenario(name)
+    assert 24 <= min(bay.size) <= max(bay.size) <= 64 and bay.rows
+    assert 2 <= bay.uavs[0] <= bay.uavs[1] <= 5
+    assert 100 < len(bay.no_fly) < 0.8 * bay.size[0] * bay.size[1]
+    assert all(distance_home(bay.chart, x, y) <= 27 for x, y in bay.nodes)
+    assert "coarse" in scenario_description(name) and "invented" in scenario_description(name)
+
+
+def test_the_shipped_scenarios_are_the_papers_and_bays() -> None:
+    assert scenario_names() == sorted(["bay", "fig1", "fig4", "paper", *BAYS])
+    assert sum(len(load_scenario(name).zones) for name in BAYS) == 8
     paper, fig4 = load_scenario("paper"), load_scenario("fig4")
     assert paper == ScenarioSpace.of()  # Section VI-A, Table II and Table III are the defaults
     assert (paper.uavs, paper.initial_data, paper.flying_time) == ((1, 3), (5.0, 20.0), (70, 80))
@@ -106,7 +128,7 @@ def test_bad_files_are_named(tmp_path: Path, content: bytes, complaint: str) -> 
 
 
 def test_missing_scenarios_are_refused() -> None:
-    with pytest.raises(InputError, match="allowed: bay, fig1, fig4, paper, or a TOML file"):
+    with pytest.raises(InputError, match="allowed: bay, biscay-corner, fig1, .* others, or a TOML"):
         load_scenario("none")
     with pytest.raises(InputError, match=r"no such scenario \(did you mean paper\?\)"):
         load_scenario("papper")

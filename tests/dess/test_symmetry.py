@@ -1,5 +1,6 @@
 """A sea that is mirrored, turned or numbered otherwise is the same sea for rules and policies."""
 
+import math
 from collections.abc import Sequence
 from itertools import product
 from typing import Any, NamedTuple
@@ -131,11 +132,15 @@ def _turned(turn: Turn, team: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     """How far away the cells are where UAV ``i`` may charge, and whether the choice was clear.
 
-    In plain Python: the UAVs choose one after the other, the lowest battery first; around a parked
-    teammate a way that is in line or around an island takes two cells more.
+    In plain Python: the UAVs choose one after the other, the lowest battery first. Parked teammates
+    are islands, where the way around them is not longer than to wait for a charge. Without other
+    islands, they take two cells more on a way that is in line.
     """
     team, space = [u for u in sea.state.uavs[0] if u["active"]], sea.space
-    me, clear = sea.state.uavs[0][i], True
+    me, clear, mission = sea.state.uavs[0][i], True, sea.state.missions[0]
+    wait = math.ceil(
+        (mission["charge_complete"] - mission["charge_start"]) / mission["charge_rate"]
+    )
     cells = [(x + a, y + b) for x, y, w, h in space.rectangles for b in range(h) for a in range(w)]
     places = [(int(u["x"]), int(u["y"])) for u in team]
     parked = [p for p, u in zip(places, team, strict=True) if u["latch"] and u["zone"] >= 0]
@@ -150,13 +155,17 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
         for cell in cells:
             if cell in taken and cell != place:
                 continue
-            to = reached(cell, *space.size, {*space.no_fly})
-            length, straight = to[place], abs(cell[0] - place[0]) + abs(cell[1] - place[1])
-            back = reached(place, *space.size, {*space.no_fly})
-            is_only = cell[0] == place[0] or cell[1] == place[1] or length > straight
-            mates = [p for p in parked if p != place]
-            blocked = is_only and any(to[p] + back[p] == length for p in mates)
-            ways[cell] = length + 2 * blocked
+            mates = {p for p in parked if p != place and p != cell}
+            islands = {*space.no_fly}
+            length = reached(place, *space.size, islands)[cell]
+            if islands:
+                around = reached(place, *space.size, islands | mates)
+                ways[cell] = min(around.get(cell, math.inf), length + wait)
+            else:
+                corners = map(min, place, cell), map(max, place, cell)
+                (left, top), (right, bottom) = corners
+                line = {*product(range(left, right + 1), range(top, bottom + 1))}
+                ways[cell] = length + 2 * bool((left == right or top == bottom) and line & mates)
         lengths = sorted(ways.values())
         clear &= len(lengths) < 2 or lengths[0] < lengths[1]
         if place == own:

@@ -88,7 +88,7 @@ def quick() -> Iterator[None]:
     """Bounds that take no time, and planners that search little."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(jobs, "upper_bound", made_up)
-        patch.setattr(Planner, "budget", Budget(500, 20, 20))
+        patch.setattr(Planner, "budget", Budget(500, 20))
         yield
 
 

@@ -151,6 +151,11 @@ def test_nodes_of_a_file_stay_where_they_are(tmp_path):
     assert study(set={"grid": 14}).points[0].scenario.nodes == ((6, 7), (7, 6))
     with pytest.raises(InputError, match="at grid=14: grid moves the nodes of a file; allowed"):
         study(design=grid(grid=[12, 14]))
+    (tmp_path / "rocks.csv").write_text("lon,lat\n8.52,54.25\n")
+    scenario.write_text(f'no_fly = "rocks.csv"\n{scenario.read_text()}')
+    with pytest.raises(InputError, match="at grid=14: grid moves the no_fly of a file; allowed"):
+        study(design=grid(grid=[12, 14]), set={"nodes": [[7, 1]]})
+    scenario.write_text(scenario.read_text().partition("\n")[2])
     fixed = grid(grid=[12, 14])
     assert study(design=fixed, set={"nodes": [[1, 1]]}).points[1].scenario.nodes == ((1, 1),)
 

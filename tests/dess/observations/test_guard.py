@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import event, given
 
+import policies
 from dess import streams
+from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.observations.guard import guard
+from dess.observations.states import HOME, compact_states
 from dess.scenario import ScenarioSpace
 from dess.state import BATTERY, HOVER
 from dess.view import View
@@ -46,10 +49,10 @@ def test_the_battery_of_a_guarded_lone_uav_is_never_depleted(
     event(f"charged {record.uavs['slots_charging'][0] > 0}")
 
 
-def _mask(*uavs: dict[str, Any]) -> np.ndarray:
+def _mask(*uavs: dict[str, Any], **scenario: Any) -> np.ndarray:
     """The guard's masks for UAVs in given states, 400 communications short of the quota."""
     rows = np.zeros(len(uavs), int), np.arange(len(uavs))
-    state, chart = placed([*uavs])
+    state, chart = placed([*uavs], **scenario)
     return guard(View(state, SimpleNamespace(chart=chart), *rows))
 
 
@@ -85,6 +88,125 @@ def test_who_has_been_overruled_leaves_contested_cells_to_the_right_of_way() -> 
     assert collided[1, [EAST, SOUTH, WEST, HOVER]].all()
 
 
+# --- islands and zones ---
+
+WALL = [[24, y] for y in range(12)]  # from the northern edge, between the UAV and the zone
+
+
+def test_behind_an_island_the_way_around_it_counts() -> None:
+    # From (20, 4) to the corner (26, 5): 8 cells south, 6 east and 7 north.
+    (mask,) = _mask({"x": 20, "y": 4, "battery": 22}, no_fly=WALL)
+    assert np.nonzero(mask)[0].tolist() == [EAST, SOUTH]
+    (mask,) = _mask({"x": 23, "y": 4, "battery": 60}, no_fly=WALL)
+    assert np.nonzero(mask)[0].tolist() == [NORTH, SOUTH, WEST, HOVER]
+    (mask,) = _mask({"x": 20, "y": 4, "battery": 22})
+    assert mask.all()
+
+
+ROW = [[x, 5] for x in range(17, 24)]  # 4 cells around either end
+NEAR = {"zones": [{"cells": [20, 8, 1, 1]}]}
+PADS_FAIL = {"failures": {"pad_rate": 0.1}}
+HERE, THERE = {"x": 20, "y": 4}, {"x": 20, "y": 8, "latch": True}
+
+
+@pytest.mark.parametrize(
+    ("uavs", "scenario", "home"),
+    [
+        ([HERE], {}, (26, 4, 6)),
+        ([HERE], NEAR, (20, 8, 4)),
+        ([HERE], NEAR | {"no_fly": ROW}, (26, 4, 6)),  # around it, it is 4 + 4 + 4 cells away
+        ([HERE, THERE], NEAR, (26, 4, 6)),  # it is full
+        ([HERE | {"battery": 70}, {"x": 20, "y": 10}], NEAR, (26, 4, 6)),  # less battery first
+        ([HERE], NEAR | PADS_FAIL, (26, 4, 6)),  # its pad is out of order for good
+        ([HERE], NEAR | {"failures": {"pad_rate": 0.1, "pad_repair": 9.0}}, (20, 8, 4)),
+    ],
+)
+def test_a_uav_charges_at_the_nearest_cell_that_is_free(
+    uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
+) -> None:
+    state, chart = placed(uavs, **scenario)
+    state.missions["pads_out"][0, 16] = 1  # the first pad of the second zone
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart) == home
+
+
+def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there() -> None:
+    for uavs, needed in (([HERE, {}], 8), ([HERE, THERE], 12)):  # two slots per cell
+        states = compact_states(*placed(uavs, **NEAR, fleet=[{"slots_per_cell": 2}]), True)
+        assert states.uavs[0, 0, HOME] == needed
+
+
+# A zone of 3 x 3 cells in the corner of the grid, with a coast to the north of it.
+COAST: dict[str, Any] = {"grid": 8, "zone": [0, 2, 3, 3], "nodes": [[7, 7]]}
+COAST |= {"no_fly": [[0, 1], [1, 1], [2, 1]]}
+PARKED = {"x": 2, "y": 2, "latch": True}
+# A zone at the end of a corridor, in the first row.
+CORRIDOR = COAST | {"zone": [0, 0, 4, 1], "no_fly": [[x, 1] for x in range(6)]}
+MOUTH = {"x": 3, "y": 0, "latch": True}
+
+
+@pytest.mark.parametrize(
+    ("uavs", "scenario", "home"),
+    [
+        # From (3, 1) the only way of 3 cells to (1, 2) is over (2, 2).
+        ([{"x": 3, "y": 1}, PARKED], COAST, (2, 3, 3)),
+        # No way leads around a teammate, which is charged after 5 slots at most.
+        ([{"x": 7, "y": 0}, MOUTH], CORRIDOR, (2, 0, 5 + 5)),
+    ],
+)
+def test_parked_teammates_are_islands(
+    uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
+) -> None:
+    state, chart = placed(uavs, **scenario, charge_complete=80)
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart) == home
+
+
+ISLANDS = """
+    ...##...........
+    ...##...0000....
+    ........0000.##.
+    .###....00...##.
+    .#............#.
+    ......###.......
+    ..#...###....#..
+    ..#...........#.
+    ..##....1....##.
+    ........1.......
+    .##.......###...
+    """
+CORRIDORS = """
+    ....#....#.....
+    ....#....#.....
+    ....#....#.....
+    .000......1....
+    .000#....#.....
+    .000#....#.....
+    ....#.##.####.#
+    ....#....#.....
+    .........#.....
+    ....#..........
+    """
+
+
+@pytest.mark.parametrize("picture", [ISLANDS, CORRIDORS], ids=["islands", "corridors"])
+def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(picture: str) -> None:
+    rows = picture.split()
+    cells = {(x, y): kind for y, row in enumerate(rows) for x, kind in enumerate(row)}
+    water = [cell for cell, kind in cells.items() if kind == "."]
+    zone = [1, 3, 3, 3] if picture == CORRIDORS else [8, 1, 4, 2]
+    further = [10, 3, 1, 1] if picture == CORRIDORS else [8, 8, 1, 2]
+    space = ScenarioSpace.of(
+        **{"grid": len(rows[0]), "rows": len(rows), "zone": zone, "nodes": water[::9]},
+        zones=[{"cells": further}],
+        no_fly=[cell for cell, kind in cells.items() if kind == "#"],
+        **{"uavs": [1, 4], "flying_time": [40, 60], "charge_start": [15, 30]},
+        **{"initial_data": 1e6, "max_slots": 300},
+    )
+    records = simulate_batch(space, policies.load("random"), 3, 400)
+    dry = (records.uavs["end"] == BATTERY).sum(1)
+    assert dry.sum() <= 0.01 * records.missions["uavs"].sum()
+    assert not dry[records.missions["uavs"] == 1].any()
+
+
 # --- pads ---
 
 # One UAV far off, and two in the zone; C_S 30, C_C 80, 10 % per slot.
@@ -108,6 +230,7 @@ OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
         ([60, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
         ([20, 20, 20], [0, 1], {}, 0),  # it has asked
         ([60, 50, 50], [], {"quota": 40}, 0),  # they need not charge
+        ([60, 30, 60], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 0),  # all are at another zone
     ],
 )
 def test_the_time_that_a_uav_expects_to_wait(

@@ -42,6 +42,7 @@ _nodes = st.sampled_from(NODES)
 _names = st.sampled_from(
     [("policies", f'["{steps.EVIL}:Evil0"]'), ("policies", f'["greedy", "{steps.EVIL}:Evil1"]')]
     + [("nodes", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "fifo.csv")]
+    + [("no_fly", f'"{path}"') for path in ("../home/secret.csv", "/etc/passwd", "fifo.csv")]
     + [("scenario", f'"{path}"') for path in ("../home/secret.csv", "../in", "/dev/stdin")]
 )
 

@@ -19,7 +19,9 @@ from tests.fuzz.strategies.changes import (
     training_changes,
 )
 
-_NAMES = (ready.SCENARIO, ready.SECTIONS, "bay.csv", ready.STUDY, ready.SELECTION)
+# What scenarios name beside them: nodes, polygons and a map of no-fly cells.
+SEAS = ("bay.csv", "oresund.csv", "oresund.geojson", "galway-bay.csv", "galway-bay.txt")
+_NAMES = (ready.SCENARIO, ready.SECTIONS, *SEAS, ready.STUDY, ready.SELECTION)
 _NAMES += (ready.STUDIED, ready.TRAINING, ready.RESULTS, ready.SELECTED, ready.EXTENDED)
 INPUTS: tuple[Step, ...] = tuple(
     copy(name, f"in/{name}") for name in (*_NAMES, ready.POLICY, ready.PAGE)
@@ -29,9 +31,10 @@ _STUDY_OF = {  # of results
     ready.SELECTED: ready.SELECTION,
     ready.EXTENDED: ready.STUDIED,
 }
+_BAYS = ("bay.toml", "oresund.toml", "galway-bay.toml")
 # The ready inputs of each kind.
 _READY = {
-    "scenario": (ready.SCENARIO, ready.SECTIONS, ready.SECTIONS, "paper.toml", "bay.toml"),
+    "scenario": (ready.SCENARIO, ready.SECTIONS, ready.SECTIONS, "paper.toml", *_BAYS),
     "study": (*_STUDY_OF.values(), "sweet-spot.toml", "screening.toml", "precise.toml"),
     "config": (ready.TRAINING, ready.TRAINING, "ddqn-paper.toml"),
     "results": (*_STUDY_OF, ready.EXTENDED),
@@ -71,7 +74,9 @@ def forged(
 
 def _changes(kind: str, path: str, place: str) -> st.SearchStrategy[Step]:
     if kind in ("scenario", "study", "config"):
-        return st.one_of(*[document_changes(path)] * 5, table_changes("in/bay.csv"))
+        tables = [table_changes(f"in/{name}") for name in SEAS if not name.endswith("json")]
+        polygons = json_changes("in/oresund.geojson")
+        return st.one_of(*[document_changes(path)] * 5, st.one_of(*tables, polygons))
     if kind == "policy":
         return training_changes(
             path, "model.safetensors" if place == IN else "checkpoint.safetensors"

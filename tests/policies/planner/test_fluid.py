@@ -53,7 +53,7 @@ def _flown(view: View, plan: Plan, slots: int) -> tuple[list[np.ndarray], float,
     """The UAVs at the start of each slot of a flight, its value, and the data it collects."""
     (mission,), uavs, residual = view.state.missions, view.state.uavs[0], view.state.residual[0]
     flight, rates = empty_flight(MOST_SLOTS, len(uavs), len(residual)), rates_of(view)
-    begin(mission, uavs, residual, rates, flight)
+    begin(mission, uavs, residual, flight)
     crafts, value = [flight.team[0].copy()], 0.0
     for slot in range(1, slots + 1):
         value = fly(mission, rates, plan, flight, 0, flight, slot)
@@ -75,7 +75,7 @@ def _improved(view: View, plan: Plan, steps: int, most: int = 10_000) -> float:
 
 @pytest.mark.parametrize("uavs", [1, 2, 3, 6])
 def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int) -> None:
-    """Cells, batteries, the quota, charging, and the data that are collected."""
+    """Cells, batteries, the quota, charging; data within 2 %, as rates are means of a slot."""
     scenario = ScenarioSpace.of(load_scenario("fig4"), uavs=uavs, quota=400, **CALM)
     view, plan = _view(scenario, 5), empty_plan(uavs)
     for i in range(uavs):
@@ -85,8 +85,8 @@ def test_a_flight_is_the_engines_where_nothing_is_random(uavs: int) -> None:
     record = simulate(scenario, policy, 5, 0, events=True)
     assert record.events is not None
     assert record.metrics["success"] and (record.uavs["slots_charging"] > 0).all()
-    assert record.metrics["collected"] == pytest.approx(policy.collected, rel=1e-9)
-    assert policy.value == pytest.approx(policy.collected, rel=0.01)  # next to no penalty
+    assert record.metrics["collected"] == pytest.approx(policy.collected, rel=0.02)
+    assert policy.value == pytest.approx(policy.collected, rel=0.02)  # next to no penalty
     log = record.events.columns()
     for i in range(uavs):
         moves = (log["event"] == "move") & (log["uav"] == i)
@@ -142,7 +142,7 @@ def test_where_next_to_nothing_arrives_an_empty_node_stays_empty(rate: float) ->
     view = _view(Scenario.of(**ALONE, arrival_rate=rate))
     (mission,), uavs = view.state.missions, view.state.uavs[0]
     flight = empty_flight(MOST_SLOTS, 1, 1)
-    begin(mission, uavs, np.zeros(1), rates_of(view), flight)
+    begin(mission, uavs, np.zeros(1), flight)
     assert flight.sea["since"][0].tolist() == [NEVER]
 
 

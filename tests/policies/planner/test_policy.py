@@ -10,12 +10,13 @@ from hypothesis import strategies as st
 
 import policies
 from dess import load_scenario, simulate, simulate_batch
+from dess.env.stepper import MissionStepper
 from dess.observations.guard import guard
 from dess.scenario import ScenarioSpace
-from dess.view import View
+from dess.view import View, acting_rows
 from policies.planner import Planner, plan_of
 from policies.planner import policy as module
-from policies.planner.policy import _MEMORIES, Budget
+from policies.planner.policy import _MEMORIES, Budget, memory_of
 from tests.drawn import Checked, extended_spaces, replications, seeds, spaces
 
 
@@ -23,7 +24,7 @@ class Quick(Planner):
     """The planner with a search that is short enough for tests."""
 
     name = "quick"
-    budget = Budget(60, 20, 3)
+    budget = Budget(60, 20)
 
 
 QUICK = Quick()
@@ -108,6 +109,31 @@ def test_plans_go_with_the_missions_that_they_belong_to() -> None:
     assert len(_MEMORIES) == before
 
 
+def test_a_mission_departs_from_its_plan_by_a_node_or_by_a_uav() -> None:
+    """Small surprises add up, and cancel out; those of nodes count over several slots."""
+    stepper = MissionStepper(load_scenario("paper", uavs=2), 1, 1)
+    stepper.start_at(1, 0)
+    stepper.launch(stepper.indices)
+    state = stepper.state
+    QUICK.act(View(state, stepper.world, *acting_rows(state.missions, state.uavs, 1, 0)))
+    mission, memory = state.missions[0], memory_of(state, QUICK.budget)
+    uavs, expected = state.uavs[0], memory.sea[0] + mission["arrival_rate"]
+    for name in ("x", "y", "charging"):
+        uavs[name] = memory.first[0][name]
+
+    def departs(residual: np.ndarray) -> bool:
+        return module._departs(mission, uavs, residual, memory, 0, 1)
+
+    surprise = np.zeros(len(expected))
+    surprise[3] = 1.0
+    assert not departs(expected)
+    assert not departs(expected + surprise) and not departs(expected - surprise)
+    assert not departs(expected - surprise) and departs(expected - surprise)
+    memory.surplus[0] = 0.0
+    uavs["x"][1] += 1
+    assert departs(expected)
+
+
 # --- how good it is ---
 
 
@@ -115,7 +141,7 @@ def test_a_longer_search_pays_and_beats_the_best_heuristic() -> None:
     paper, products = load_scenario("paper"), {}
 
     class Better(Planner):
-        budget = Budget(3_000, 200, 20)
+        budget = Budget(6_000, 600)
 
     for name, policy in (
         ("quick", QUICK),

@@ -13,7 +13,7 @@ BAD = {
     "report what-if --parameter policies=greedy": ["text in quotes: 'scenario=\"bay\"'"],
     "study run comparson": ["no such study (did you mean comparison?)"],
     "train quik --out out": ["no such config (did you mean quick?)"],
-    "simulate --scenario nope": ["nope: no such scenario", "fig4, paper"],
+    "simulate --scenario nope": ["nope: no such scenario", "bay, biscay-corner, fig1"],
     "simulate --scenario .": ["cannot be read"],
     "simulate --policy gredy": ["'gredy' is unknown", "nearest, greedy, tour"],
     "simulate --policy greedy,tour,nearest --set uavs=2": ["3 policies", "2 at most"],

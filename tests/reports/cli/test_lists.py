@@ -9,7 +9,7 @@ import pytest
 import dess as dess_package
 from analysis import load_study
 from dess import ScenarioSpace, load_scenario
-from dess.scenario import fields_of
+from dess.scenario import fields_of, scenario_families, scenario_names
 from policies.registry import SHIPPED, trained_names
 from tests.analysis.small import environment
 
@@ -17,7 +17,7 @@ from tests.analysis.small import environment
 def test_names_are_listed(dess):
     for command, names in {
         "policies": [*SHIPPED, *trained_names()],
-        "scenarios": ["bay", "fig1", "fig4", "paper"],
+        "scenarios": [*scenario_names(), *scenario_families()],
         "studies": [
             *("age", "charge-limits", "comparison", "explorer", "failures", "fig1", "fig4", "fig5"),
             *("gap", "pads", "precise", "screening", "sensitivity", "sweet-spot", "table4"),
@@ -76,10 +76,22 @@ def test_a_scenario_of_ones_own_may_have_a_description(dess, dess_json, tmp_path
     assert all(len(line.split(maxsplit=1)[1]) > 20 for line in out.splitlines())
 
 
+def test_a_generated_sea_is_listed_and_shown(dess, dess_json):
+    _, out, _ = dess("scenarios")
+    assert re.search(r"^coast:SEED +land along one side,.* e.g. coast:7$", out, re.M)
+    shown = dess_json("scenarios", "show", "coast:7", "--set", "uavs=1")
+    fields = {field["name"]: field["value"] for field in shown["fields"]}
+    assert (fields["uavs"], shown["scenario"]) == (1, "coast:7")
+    assert fields["quota"] == load_scenario("coast:7").quota
+    code, out, err = dess("simulate", "--scenario", "coast:seven", "--policy", "greedy")
+    assert (code, out) == (2, "")
+    assert err.strip().endswith("coast: has the seed 'seven'; allowed: coast:0..coast:999999999")
+
+
 def test_a_policy_is_shown_with_its_card(dess, dess_json, tmp_path):
     code, out, _ = dess("policies", "show", "greedy")
     assert code == 0
-    assert "any scenario; of the shipped ones bay, fig1, fig4, paper" in out
+    assert "any scenario; of the shipped ones bay, biscay-corner, fig1" in out
     assert "Fly to the node with the most residual data" in out
     shown = dess_json("policies", "show", "ddqn")
     assert shown["scenarios"] == ["fig4", "paper"]

@@ -110,7 +110,7 @@ def test_the_price_of_a_node_is_the_sum_over_cuts(results):
 
 
 def test_the_plan_begins_where_the_uavs_start(results, monkeypatch):
-    monkeypatch.setattr(Planner, "budget", Budget(500, 0, 0))
+    monkeypatch.setattr(Planner, "budget", Budget(500, 0))
     for replication in range(LOGGED):
         courses = planner.plan(results, "planner", replication)
         log = results.events("greedy", 0, replication)

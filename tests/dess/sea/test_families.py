@@ -1,0 +1,165 @@
+"""Generated seas: the same everywhere, valid, within reach, and of all numbers of UAVs."""
+
+import hashlib
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis import load_study
+from dess import InputError, load_scenario
+from dess.scenario import ScenarioSpace, scenario_description, scenario_names
+from dess.sea import families
+from dess.sea.chart import distance_home, parking_of, spread
+from dess.sea.families import FAMILIES, MOST_SEED, SETS, sea_of, seas_of
+
+# What never changes: a sea of each family, as TOML.
+HASHES = {
+    "scattered:7": "d09a00c22cd03891",
+    "clustered:7": "8765eace45cefdce",
+    "coast:7": "c0860422834f70ea",
+    "archipelago:7": "77ae766b0a8402ff",
+    "corridor:7": "afbce02bbee5de3c",
+    "dense:7": "69ff6f86cea1bcf0",
+    "large:7": "e4a8b5258898f52d",
+}
+
+
+def check(name: str) -> ScenarioSpace:
+    """A sea with all that its family promises."""
+    space = load_scenario(name)  # which checks that all is on the grid and can be reached
+    chart, least = space.chart, space.charge_complete[0]
+    columns, rows = space.size
+    assert 16 <= min(columns, rows) <= max(columns, rows) <= 64
+    assert 6 <= len(space.nodes) <= (100 if name.startswith("dense") else 60)
+    assert all(chart.zones[y, x] == -1 for x, y in space.nodes)  # in no zone
+    assert all(5 * distance_home(chart, x, y) <= 2 * least for x, y in space.nodes)
+    assert 1 <= len(space.rectangles) <= 3
+    for (*_, width, height), pads in zip(space.rectangles, space.zone_pads, strict=True):
+        assert 2 <= min(width, height) <= max(width, height) <= 4 and 1 <= pads <= width * height
+    ways = spread(chart.zones, np.array(parking_of(space.rectangles[:1])))[0]
+    for x, y, *_ in space.rectangles[1:]:
+        assert 0 < ways[y * columns + x] <= 0.8 * least  # a charged UAV comes from the start zone
+    assert space.uavs[1] <= space.zone_cells and space.pads is not None
+    assert 3 * space.pads >= space.uavs[1]
+    assert 60 <= space.quota / space.communication_slots <= 150
+    return space
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_seas_are_valid_and_their_nodes_within_reach(family: str) -> None:
+    for seed in (0, 1, 2, SETS["train"][0], SETS["validation"][0], SETS["test"][-1], MOST_SEED):
+        check(f"{family}:{seed}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SETS)
+def test_all_seas_of_the_sets_are(name: str) -> None:
+    drawn = [check(sea) for sea in seas_of(name)]
+    assert len({*drawn}) == len(drawn)
+
+
+@pytest.mark.parametrize("name", HASHES)
+def test_a_sea_never_changes(name: str) -> None:
+    assert hashlib.sha256(load_scenario(name).to_toml().encode()).hexdigest()[:16] == HASHES[name]
+
+
+def test_a_sea_depends_on_its_name_alone() -> None:
+    """Not on those drawn before it, nor on the hashes of a process."""
+    script = "from dess import load_scenario; print(load_scenario('archipelago:11').to_toml())"
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[3])
+    assert done.stdout.strip() == load_scenario("archipelago:11").to_toml().strip()
+    sea_of("archipelago:11").clear()
+    families._fields_of.cache_clear()
+    assert load_scenario("archipelago:11").to_toml().strip() == done.stdout.strip()
+
+
+def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
+    sizes = {"train": 200, "validation": 10, "test": 20}
+    drawn = {name: seas_of(name) for name in sizes}
+    for name, size in sizes.items():
+        assert len(drawn[name]) == size * len(FAMILIES)
+        assert {sea.split(":")[0] for sea in drawn[name]} == {*FAMILIES}
+    assert len({sea for name in drawn for sea in drawn[name]}) == sum(map(len, drawn.values()))
+    with pytest.raises(InputError, match="'tests' is unknown .did you mean test.*; allowed: train"):
+        seas_of("tests")
+
+
+def test_the_test_seas_of_a_family_have_one_to_six_uavs_alike() -> None:
+    uavs = [load_scenario(f"coast:{seed}").uavs for seed in SETS["test"]]
+    assert sorted(map(uavs.count, [(1, 2), (3, 4), (5, 6)])) == [6, 7, 7]
+
+
+def test_coasts_face_all_ways_and_corridors_run_both_ways() -> None:
+    """So that no policy learns that the shore is in the north."""
+    sides, shapes = set(), set()
+    for seed in range(30):
+        zones = load_scenario(f"coast:{seed}").chart.zones
+        shores = [zones[0], zones[-1], zones[:, 0], zones[:, -1]]
+        sides.add(int(np.argmax([(shore == -2).mean() for shore in shores])))
+        columns, rows = load_scenario(f"corridor:{seed}").size
+        assert max(columns, rows) >= 2 * min(columns, rows)
+        shapes.add(columns > rows)
+    assert sides == {0, 1, 2, 3} and shapes == {True, False}
+
+
+def test_families_differ_in_what_they_are_named_after() -> None:
+    seas = {family: load_scenario(f"{family}:5") for family in FAMILIES}
+    assert {f for f, sea in seas.items() if not sea.no_fly} <= {
+        *("scattered", "clustered", "dense", "large")
+    }
+    assert len(seas["archipelago"].no_fly) > len(seas["archipelago"].nodes)
+    assert len(seas["dense"].nodes) > 60
+    assert min(seas["large"].size) >= 56
+
+
+@given(st.sampled_from([*FAMILIES]), st.integers(0, MOST_SEED))
+def test_a_sea_is_a_scenario_as_any(family: str, seed: int) -> None:
+    name = f"{family}:{seed}"
+    space = check(name)
+    changed = load_scenario(name, uavs=1, no_fly=[])
+    assert (changed.uavs, changed.no_fly, changed.nodes) == ((1, 1), (), space.nodes)
+    assert f"seed {seed}" in scenario_description(name)
+    assert name not in scenario_names()
+
+
+def test_the_paper_s_channel_cell_by_cell() -> None:
+    """The SNR at a distance of 5 cells is that of the paper, give or take 2 dB and rounding."""
+
+    def at_five_cells(space: ScenarioSpace) -> float:
+        half = np.hypot(*space.size) / 2
+        return space.edge_snr + 10 * space.path_loss_exponent * np.log10(half / 5)
+
+    paper = at_five_cells(load_scenario("paper"))
+    assert all(abs(at_five_cells(load_scenario(sea)) - paper) < 2.1 for sea in seas_of("test")[::9])
+
+
+def test_a_study_names_a_sea(tmp_path: Path) -> None:
+    path = tmp_path / "sea-study.toml"
+    path.write_text('scenario = "scattered:4"\npolicies = ["greedy"]\nmissions = 2\n')
+    study = load_study(path)
+    assert study.scenario == "scattered:4"
+    assert study.points[0].scenario == load_scenario("scattered:4")
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("coast", "coast: has no seed; allowed: coast:0..coast:999999999"),
+        ("coast:", "coast: has no seed; allowed: coast:0..coast:999999999"),
+        ("coast:x\n7", r"coast: has the seed 'x\\n7'; allowed: coast:0"),
+        ("coast:-1", "coast: has the seed '-1'; allowed: coast:0"),
+        ("coast:07", "coast: has the seed '07'; allowed: coast:0"),
+        ("coast:1000000000", "coast: has the seed '1000000000'; allowed: coast:0"),
+        ("coats:7", "coats:7: no such family of seas .did you mean coast.*; allowed: scattered, "),
+    ],
+)
+def test_bad_names_are_refused_in_one_line(name: str, line: str) -> None:
+    with pytest.raises(InputError, match=f"^{line}") as error:
+        load_scenario(name)
+    assert "\n" not in str(error.value)
