@@ -212,7 +212,7 @@ class Training:
         order = range(first, first + self.config.seas_per_tick)
         return [self.seas[number % len(self.seas)] for number in order]
 
-    def flown(self, ticks: int) -> list[int]:
+    def simulated(self, ticks: int) -> list[int]:
         """How often the missions of each sea have flown a slot in the first ticks of a phase."""
         seas, each = len(self.seas), self.config.seas_per_tick
         turns, last = divmod(ticks, STRETCH)
