@@ -217,9 +217,16 @@ class _Pool(nn.Module):
         """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
         each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
         each = torch.relu_(self.layer(each))
-        present = moves[:, -1, :, None]
-        weights = torch.softmax(self.weights(each) + ABSENT * (1 - present), 1) * present
-        values = self.values(each).unflatten(2, (HEADS, -1)) * weights[..., None].to(each.dtype)
+        weights, present = self.weights(each), moves[:, -1, :, None]
+        if present.is_meta or present.all():  # on meta, only sizes are asked for
+            weights = torch.softmax(weights, 1)
+        else:
+            weights = torch.softmax(weights + ABSENT * (1 - present), 1) * present
+        values, weights = self.values(each).unflatten(2, (HEADS, -1)), weights[..., None]
+        if torch.is_grad_enabled():
+            values = values * weights.to(values.dtype)
+        else:  # in place, which takes less time
+            values *= weights
         pooled = moves.to(each.dtype) @ values.flatten(2)
         nearer, along = self.nearer(pooled[:, :4]), self.along(pooled[:, 4:8])
         return self.of_all(pooled[:, 8]), nearer.add_(along)

@@ -16,6 +16,8 @@ from dess.view import View
 # action must not. So if the two best values differ by less than CLOSE, the values are computed
 # again in double precision and rounded to DECIMALS.
 CLOSE, DECIMALS = 1e-3, 9
+# The same for networks on sets, which are small: their rounding errors are some 1e-6.
+CLOSE_ON_SETS = 1e-4
 # How many rows with sets a network evaluates together: what it computes stays in the cache.
 ROWS = 256
 
@@ -67,7 +69,7 @@ class DDQN:
         values = np.where(allowed, _values(self.network, parts).astype(np.float64), -np.inf)
         if self.exact is not None:
             second, best = np.partition(values, -2)[:, -2:].T
-            close = best - second < CLOSE
+            close = best - second < (CLOSE if self.layout else CLOSE_ON_SETS)
             if close.any():
                 exact = _values(self.exact, [part[close] for part in parts]).round(DECIMALS)
                 values[close] = np.where(allowed[close], exact, -np.inf)

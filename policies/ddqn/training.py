@@ -188,7 +188,9 @@ class Training:
             self._collect(epsilon)
         for _ in range(self.config.updates):
             rate = _between(self.phase.learning_rate, share)
-            self.learner.anchor_weight = _between(self.config.anchor, share)
+            self.learner.anchor_weight = _between(
+                self.config.anchor, share / self.phase.epsilon_decay
+            )
             first, *others = self._samples()
             self.losses.append(self.learner.update(first, rate, *others))
             self.updates += 1
