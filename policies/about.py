@@ -46,7 +46,7 @@ def about(name: str) -> About:
     described = read_description(folder) if folder else None
     requires = described.layout.model_dump() if described and described.layout else {}
     scenarios = {name: load_scenario(name).model_dump(mode="json") for name in scenario_names()}
-    trained_on = described.training.scenario if described else ""
+    trained_on = described.training.scenario if described and described.layout else ""
     return About(
         name=name,
         origin=_origin(name),

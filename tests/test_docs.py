@@ -138,7 +138,7 @@ def test_commands_are_accepted(arguments: list[str]) -> None:
     if arguments[0] == "sweep":
         values = ranges.all_values(given["settings"])
         assert load_scenario(given["scenario"], **{field: of[0] for field, of in values.items()})
-    elif "scenario" in given:
+    elif given.get("scenario"):
         assert settings.load_space(given["scenario"], given["settings"])
     if arguments[:2] == ["study", "run"]:
         assert all(map(load_study, given["names"]))

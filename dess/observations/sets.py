@@ -31,7 +31,7 @@ SCALES = np.array([1.5, 4.0, 12.0])
 _NORMS = np.array([1.0, 2.5, 8.0], np.float32)  # by which sums of data x nearness are divided
 # By which the nearness changes if the way is one cell shorter, and longer.
 _FACTORS = np.stack([exp(1 / SCALES), exp(-1 / SCALES)]).astype(np.float32)
-_FARTHEST = 255  # [cells]; all longer ways are alike
+_FARTHEST = 255  # [cells]; all longer ways count as this one
 # Euclidean distances [cells] at which the rate tells what the channel is like.
 _PROBES = (1.0, 3.0, 8.0)
 

@@ -174,7 +174,7 @@ def _check_progress(header: Header, training: Training, path: Path) -> None:
     begun, end = starts[index], starts[index + 1]
     evaluations = now.tick // config.evaluate_every - begun // config.evaluate_every
     evaluations += now.tick == config.ticks and now.tick % config.evaluate_every > 0
-    slots = training.flown(now.tick - begun)
+    slots = training.simulated(now.tick - begun)
     slots = [count + (config.learning_starts if now.tick > begun else 0) for count in slots]
     seed, *replications = header.stepper
     right = {

@@ -10,18 +10,18 @@ type of the weights.
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from itertools import pairwise
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
+from dess.code.kernels import kernel
 from dess.state import ACTION_NAMES
 
 ACTIONS = len(ACTION_NAMES)
 KERNELS, KERNEL_SIZE = 16, 5
 NARROWEST = 2 * (KERNEL_SIZE - 1) + 1  # smallest width of a map: two convolutions leave one cell
 DENSE = (256, 256, 256)
-HEADS = 8  # of the attention to nodes, teammates and zones
-ABSENT = -1e9  # added to the weight of a row that stands for nothing
 
 
 class PaperNetwork(nn.Module):
@@ -149,12 +149,13 @@ class NodeNetwork(_Dueling):
 
 
 class SetNetwork(nn.Module):
-    """A dueling network for the sets of any sea: what is in them is pooled by attention.
+    """A dueling network for the sets of any sea: it takes the best of what is in them.
 
-    Every node gives rise to ``HEADS`` weights and values. The state pools all of them. A move pools
-    those to which it makes the way shorter, and each with the share of the straight line there that
-    it is along. Teammates and zones likewise. All actions share the layers that follow, so a
-    mirrored sea has mirrored values, and the number and order of nodes does not matter.
+    Every node gives rise to some values. The state has the highest of each over all nodes. A move
+    has the highest over those to which it makes the way shorter, and over all, each times the share
+    of the straight line there that it is along. Teammates and zones likewise. All actions share the
+    layers that follow, so a mirrored sea has mirrored values, and the number and order of nodes
+    does not matter.
     """
 
     def __init__(
@@ -201,14 +202,13 @@ class SetNetwork(nn.Module):
 
 
 class _Pool(nn.Module):
-    """The pooled values of a set: of the whole, and of what each move comes nearer to."""
+    """What is best in a set: in the whole, and in what each move comes nearer to."""
 
     def __init__(self, own: int, columns: int, width: int, joint: int) -> None:
         super().__init__()
         self.context = nn.Linear(own, width)
         self.inputs = nn.Linear(columns, width, bias=False)
-        self.layer = nn.Linear(width, width)
-        self.weights, self.values = nn.Linear(width, HEADS), nn.Linear(width, 2 * width)
+        self.layer, self.values = nn.Linear(width, width), nn.Linear(width, 2 * width)
         self.of_all, self.nearer, self.along = (
             nn.Linear(2 * width, joint, bias=False) for _ in range(3)
         )
@@ -217,19 +217,83 @@ class _Pool(nn.Module):
         """What (R, N, columns) mean for the state (R, joint) and for the moves (R, 4, joint)."""
         each = torch.relu_(self.inputs(rows).add_(self.context(own)[:, None]))
         each = torch.relu_(self.layer(each))
-        weights, present = self.weights(each), moves[:, -1, :, None]
-        if present.is_meta or present.all():  # on meta, only sizes are asked for
-            weights = torch.softmax(weights, 1)
-        else:
-            weights = torch.softmax(weights + ABSENT * (1 - present), 1) * present
-        values, weights = self.values(each).unflatten(2, (HEADS, -1)), weights[..., None]
-        if torch.is_grad_enabled():
-            values = values * weights.to(values.dtype)
-        else:  # in place, which takes less time
-            values *= weights
-        pooled = moves.to(each.dtype) @ values.flatten(2)
+        pooled = highest(torch.relu_(self.values(each)), moves)
         nearer, along = self.nearer(pooled[:, :4]), self.along(pooled[:, 4:8])
         return self.of_all(pooled[:, 8]), nearer.add_(along)
+
+
+def highest(values: Tensor, factors: Tensor) -> Tensor:
+    """The highest product (R, M, C) of the rows' values (R, N, C) and factors (R, M, N), or 0."""
+    if values.device.type == "cpu":
+        return _Highest.apply(values, factors)  # type: ignore[no-any-return, no-untyped-call]
+    if values.shape[1] == 0:
+        return factors @ values
+    products = [(factor[:, :, None] * values).amax(1) for factor in factors.unbind(1)]
+    return torch.relu(torch.stack(products, 1))
+
+
+class _Highest(torch.autograd.Function):
+    """``highest`` on the CPU, in compiled code that touches each product once."""
+
+    @staticmethod
+    def forward(context: Any, values: Tensor, factors: Tensor) -> Tensor:
+        """Compute the products; remember which rows have the highest."""
+        values, factors = values.contiguous(), factors.to(values.dtype).contiguous()
+        shape = len(values), factors.shape[1], values.shape[2]
+        if not values.requires_grad:
+            out = torch.zeros(shape, dtype=values.dtype)
+            _pool(values.numpy(), factors.numpy(), out.numpy())
+            return out
+        out, best = torch.zeros(shape, dtype=values.dtype), torch.full(shape, -1, dtype=torch.int16)
+        arrays = (tensor.detach().numpy() for tensor in (values, factors, out, best))
+        _pool_and_remember(*arrays)
+        context.save_for_backward(factors, best)
+        return out
+
+    @staticmethod
+    def backward(context: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        """Give the gradients to the rows with the highest products."""
+        factors, best = context.saved_tensors
+        shape = len(factors), factors.shape[2], gradient.shape[2]
+        out = torch.zeros(shape, dtype=gradient.dtype)
+        _give_back(gradient.contiguous().numpy(), factors.numpy(), best.numpy(), out.numpy())
+        return out, None
+
+
+@kernel
+def _pool(values, factors, out):
+    for row in range(len(values)):
+        for number in range(values.shape[1]):
+            value = values[row, number]
+            for move in range(factors.shape[1]):
+                factor, to = factors[row, move, number], out[row, move]
+                if factor > 0:
+                    for c in range(len(value)):
+                        to[c] = max(to[c], factor * value[c])
+
+
+@kernel
+def _pool_and_remember(values, factors, out, best):
+    for row in range(len(values)):
+        for number in range(values.shape[1]):
+            value = values[row, number]
+            for move in range(factors.shape[1]):
+                factor, to, place = factors[row, move, number], out[row, move], best[row, move]
+                if factor > 0:
+                    for c in range(len(value)):
+                        product = factor * value[c]
+                        place[c] = number if product > to[c] else place[c]
+                        to[c] = max(to[c], product)
+
+
+@kernel
+def _give_back(gradient, factors, best, out):
+    for row in range(len(gradient)):
+        for move in range(gradient.shape[1]):
+            for c in range(gradient.shape[2]):
+                number = best[row, move, c]
+                if number >= 0:
+                    out[row, number, c] += factors[row, move, number] * gradient[row, move, c]
 
 
 def units_of(network: nn.Module, shapes: Sequence[Sequence[int]]) -> int:

@@ -110,7 +110,7 @@ class Training:
         config: The settings of the training.
         learner: The networks and the optimizer.
         seas: The missions on each sea.
-        sea: Those that are flown at present.
+        sea: Those that are simulated at present.
         tick: Number of ticks done, over all phases.
         curve: One row per evaluation: progress, metrics and losses.
     """
@@ -205,8 +205,8 @@ class Training:
         order = range(first, first + self.config.seas_per_tick)
         return [self.seas[number % len(self.seas)] for number in order]
 
-    def flown(self, ticks: int) -> list[int]:
-        """How often the missions of each sea have flown a slot in the first ticks of a phase."""
+    def simulated(self, ticks: int) -> list[int]:
+        """The slots of each sea that are simulated in the first ticks of a phase."""
         seas, each = len(self.seas), self.config.seas_per_tick
         turns, last = divmod(ticks, STRETCH)
         counts = [STRETCH * ((turns * each - number + seas - 1) // seas) for number in range(seas)]

@@ -116,7 +116,7 @@ def test_seas_fly_in_turn() -> None:
     training = Training(tiny(**SEAS), CPU)
     for ticks in (0, 1, STRETCH - 1, STRETCH, STRETCH + 1, 5 * STRETCH + 7):
         due = [sea for tick in range(ticks) for sea in training._due(tick)]
-        assert training.flown(ticks) == [due.count(sea) for sea in training.seas]
+        assert training.simulated(ticks) == [due.count(sea) for sea in training.seas]
 
 
 def test_data_count_as_a_share_of_all_data_of_their_sea() -> None:
