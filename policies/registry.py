@@ -38,6 +38,7 @@ HEURISTICS = {
 }
 PLANNERS = {
     "planner": ("policies.planner:Planner", "a plan for the whole team, kept up to date"),
+    "planner-short": ("policies.planner:ShortPlanner", "the same with a fifth of the search"),
     "planner-long": ("policies.planner:LongPlanner", "the same with a longer search"),
 }
 SHIPPED = HEURISTICS | PLANNERS

@@ -13,7 +13,7 @@ from analysis.figures import style
 from analysis.names import COST, METRICS, PRODUCT, metric_name
 
 WIDE = 20.0  # if the costs differ by this factor, their axis is logarithmic
-MOST_NAMES = 6  # largest number of settings on the front that are named
+MOST_NAMES = 6  # largest number of settings that are named, of all or of those on the front
 FAINT = 0.15  # the opacity of a setting that is not on the front
 
 
@@ -31,7 +31,8 @@ def costs(table: pd.DataFrame, metric: str, currency: str, required: float | Non
     looks = style.policy_colours(table["policy"])
     best = table[table["on_front"]].sort_values(COST)
     with style.panels(4.1) as (figure, ax):
-        _front(best[COST], best[metric], "front of the estimates", ax)
+        if len(best) > 1:
+            _front(best[COST], best[metric], "front of the estimates", ax)
         for _, row in table.iterrows():
             colour, marker = looks[row["policy"]]
             x_arm, y_arm = (style.arms(row, m, f"{m}_low", f"{m}_high") for m in (COST, metric))
@@ -40,9 +41,12 @@ def costs(table: pd.DataFrame, metric: str, currency: str, required: float | Non
                         alpha=FAINT + (1 - FAINT) * row["probability"])  # fmt: skip
         for policy, (colour, marker) in looks.items():
             ax.plot([], [], color=colour, marker=marker, linestyle="", label=policy)
-        for row in best.to_dict("records") if len(best) <= MOST_NAMES else ():
-            ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va="top",
-                        fontsize=8, xytext=(7, -5), textcoords="offset points")  # fmt: skip
+        named = table.sort_values(COST) if len(table) <= MOST_NAMES else best
+        for n, row in enumerate(named.to_dict("records") if len(named) <= MOST_NAMES else ()):
+            side = ("top", -5) if n % 2 else ("bottom", 5)  # so that neighbours do not overlap
+            ax.annotate(row["fleet"].replace(" and ", "\n"), (row[COST], row[metric]), va=side[0],
+                        fontsize=8, xytext=(7, side[1]), textcoords="offset points",
+                        **style.OUTLINED)  # fmt: skip
         if required is not None:
             ax.axhline(required, color=style.MUTED, linestyle="--", linewidth=1.1, label="required")
         ax.margins(x=0.12, y=0.12)

@@ -77,7 +77,7 @@ def ablation(table: pd.DataFrame, last: pd.DataFrame, metric: str, baseline: str
     split = ((values.min() < OFF * level) & (values.max() >= OFF * level)).any()
     ends = drawn[drawn >= (0 if split else OFF * level)].agg(["min", "max"])
     room = 0.06 * (ends["max"] - ends["min"]) or 0.01
-    left, right = max(ends["min"] - room, 0.0), min(ends["max"] + room, 1.02)
+    left, right = max(ends["min"] - room, -0.02), min(ends["max"] + room, 1.02)
     with style.panels(0.9 + 0.42 * len(table), values="x") as (figure, ax):
         ax.axvline(level, color=style.INK, linestyle="--", linewidth=1, zorder=1, gid="baseline")
         for y, (_, row) in enumerate(table.iterrows()):

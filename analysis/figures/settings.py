@@ -115,8 +115,8 @@ def lines(rows: pd.DataFrame, x: str, line: str, metric: str, panel: str | None 
     with style.panels(height, len(parts), "y", 4, heading, **shared) as (figure, axes):
         for ax, (value, part) in zip(axes.flat, parts, strict=True):
             drawings.along(part, looks, style.unit_of(metric), ax, line)
-            name = "" if panel in (None, "policy") else parameter(str(panel)).name
-            ax.set_title(f"{name} {value_text(value)}".strip(), fontsize=10, fontweight="normal")
+            title = settings.value_in_words(panel, value) if panel else ""
+            ax.set_title(title[:1].upper() + title[1:], fontsize=10, fontweight="normal")
         figure.suptitle(metric_label(metric), fontsize=11, fontweight="bold")
         axes.flat[-1].set_xlabel(parameter(x).label, parse_math=True)
     return figure

@@ -154,17 +154,20 @@ def age_changes(results: Results) -> pd.DataFrame:
 
 
 def age(results: Results) -> str:
-    """How the average age falls with the fleet, at the extreme arrival rates."""
-    table = age_changes(results).dropna(subset=["published"]).sort_values("arrival_rate")
-    parts = []
-    for uavs, rows in table[table["policy"] == results.policies[0]].groupby("uavs"):
-        ends = rows.drop_duplicates().iloc[[0, -1]].itertuples()
-        at_rates = [f"{relative(row.mean, row.low, row.high)}" for row in ends]
-        parts.append(f"by {' to '.join(dict.fromkeys(at_rates))} from 1 to {uavs} UAVs")
-    rates = " to ".join(map(value_text, table["arrival_rate"].iloc[[0, -1]].unique()))
+    """The mean age with the smallest and the third fleet, at the extreme arrival rates."""
+    table = means(results, [AGE])
+    table = table[table["policy"] == results.policies[0]].sort_values("uavs")
+    few, more = table["uavs"].unique()[:3][[0, -1]]
+    ends = table[table["uavs"].isin([few, more])].set_index("arrival_rate")[_ENDS]
+    parts = [
+        f"from {' to '.join(ages)} slots at an arrival rate of {value_text(rate)}"
+        for rate in dict.fromkeys([ends.index.min(), ends.index.max()])
+        for rows in [ends.loc[[rate]].to_numpy()]
+        for ages in [[numbers.decimals(mean, low, high, 1) for mean, low, high in rows]]
+    ]
     return (
-        f"The average age of information changes {numbers.words(parts)}, at arrival rates of "
-        f"{rates} (policy {results.policies[0]})."
+        f"From {few} to {more} UAVs the mean age of the data falls {numbers.words(parts)} "
+        f"(policy {results.policies[0]})."
     )
 
 

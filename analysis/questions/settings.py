@@ -76,8 +76,10 @@ def in_words(results: Results) -> list[str]:
 
 
 def value_in_words(field: str, value: Any) -> str:
-    """``3 UAVs``, or ``arrival rate 0.02``."""
+    """``3 UAVs``, ``failed UAVs lost for good``, or ``arrival rate 0.02``."""
     text = value_text(value)
+    if field == "failures.uav_repair":
+        return f"failed UAVs {f'repaired in {text} slots' if value else 'lost for good'}"
     if unit := _UNITS.get(field):
         return f"{text} {unit}{'' if text == '1' else 's'}"
     return f"{parameter(field).within} {text}"

@@ -328,7 +328,9 @@ def config_of(values: dict[str, Any], where: str) -> TrainingConfig:
 def learner_of(config: TrainingConfig) -> str:
     """An identifier that trainings share if they differ only in the seed: name and hash."""
     settings = config.model_dump(mode="json", exclude={"seed", "description"})
-    for part, kind in ((settings, TrainingConfig), *((p, Phase) for p in settings["phases"])):
+    parts: list[tuple[dict[str, Any], type[BaseModel]]] = [(settings, TrainingConfig)]
+    parts += [(phase, Phase) for phase in settings["phases"]]
+    for part, kind in parts:
         for name in _LATER & part.keys():  # policies have been trained before they existed
             if part[name] in ([], {}, [0.0, 0.0], kind.model_fields[name].default):
                 del part[name]

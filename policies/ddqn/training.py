@@ -33,7 +33,7 @@ from policies.ddqn.network import NARROWEST, DuelingNetwork, NodeNetwork, PaperN
 from policies.ddqn.policy import DDQN
 from policies.ddqn.replay import Batch, ReplayMemory
 from policies.ddqn.tensors import require_forms
-from policies.planner import Budget, LongPlanner, Planner
+from policies.planner import LongPlanner, Planner, ShortPlanner
 
 METRICS = ("success", "collection_ratio", "collection_ratio_and_communication", "reward")
 MISSIONS_PER_PHASE = 2**28
@@ -65,13 +65,6 @@ def build(config: TrainingConfig, layout: Layout | None) -> tuple[Any, nn.Module
     if config.observation == "nodes":
         return observation, NodeNetwork(observation.shapes, config.hidden, precision)
     return observation, DuelingNetwork(observation.shapes[0][0], config.hidden, precision)
-
-
-class ShortPlanner(Planner):
-    """``planner`` with a fifth of its search, so that more of its decisions can be imitated."""
-
-    name = "planner-short"
-    budget = Budget(8_000, 800)
 
 
 TEACHERS = {kind.name: kind for kind in (Planner, LongPlanner, ShortPlanner)}

@@ -1,6 +1,6 @@
 """A planner: a fluid model of the mission, and a search for the best plan in it."""
 
 from policies.planner.drawing import Course, first_plan, plan_of
-from policies.planner.policy import Budget, LongPlanner, Planner
+from policies.planner.policy import Budget, LongPlanner, Planner, ShortPlanner
 
-__all__ = ["Budget", "Course", "LongPlanner", "Planner", "first_plan", "plan_of"]
+__all__ = ["Budget", "Course", "LongPlanner", "Planner", "ShortPlanner", "first_plan", "plan_of"]

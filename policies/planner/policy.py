@@ -106,6 +106,13 @@ class Planner:
         return actions
 
 
+class ShortPlanner(Planner):
+    """Plan as ``planner`` does, with a fifth of its search, so that long sweeps can use it."""
+
+    name = "planner-short"
+    budget = Budget(8_000, 600)
+
+
 class LongPlanner(Planner):
     """Plan as ``planner`` does, with searches that are about ten times as long."""
 

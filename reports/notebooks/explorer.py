@@ -10,7 +10,7 @@
 # ---
 
 # %% [markdown]
-# # What does each parameter change?
+# # How good is every policy at a setting of our choice?
 #
 # Sliders for the parameters of the paper, and the metrics of every policy at each setting.
 
@@ -21,7 +21,6 @@ results = "../../results"  # folder with the results folder of explorer
 from pathlib import Path
 
 from analysis import load_results, names, numbers
-from analysis.figures.settings import performance
 from analysis.questions.settings import in_words
 from reports.explorer import Grid, explorer
 from reports.pages import html
@@ -52,17 +51,10 @@ html.say(
 # ## The setting in the middle
 
 # %%
-caption = f"at {in_words(study)[grid.start]}. n = {numbers.span(start['n'])} missions per policy."
-html.gallery(
-    [
-        (performance(start, metric), f"{name} of every policy", f"{name} {caption}")
-        for metric, name in names.METRICS.items()
-    ]
-)
-
-# %%
 table = numbers.wide(start, "policy").rename(columns=names.METRICS).reset_index(names="Policy")
-html.table(table, "The same in numbers; the CSV file has all settings", data=grid.table())
+html.table(
+    table, f"With {in_words(study)[grid.start]}; the CSV file has all settings", data=grid.table()
+)
 
 # %% [markdown]
 # ## How this page was made

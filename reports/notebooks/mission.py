@@ -52,10 +52,10 @@ library()
 
 # %%
 def played(mission: missions.LoggedMission, name: str) -> html.HTML:
-    flown_by = mission.row["policy"]
-    title = f"{mission.fleet}, {flown_by}: {numbers.percent(mission.row[RATIO])} collected"
+    policy_name = mission.row["policy"]
+    title = f"{mission.fleet}, {policy_name}: {numbers.percent(mission.row[RATIO])} collected"
     caption = (
-        f"n = 1 mission of {flown_by}, replication {replication} of seed {seed}, "
+        f"n = 1 mission of {policy_name}, replication {replication} of seed {seed}, "
         f"{mission.row['slots']} mission slots."
     )
     return player(mission.log, mission.scenario, name, title, caption)
@@ -76,7 +76,7 @@ html.say("{reading}", reading=READING)
 # %% [markdown]
 # ## Two policies in step
 #
-# The same mission, flown by the best policy and by the next one.
+# The same mission with the best policy and with the next one.
 
 # %%
 second = next((p for p in ranked_policies(fig4.missions) if p != shown_policy), shown_policy)

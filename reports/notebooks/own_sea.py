@@ -28,37 +28,32 @@ workers = 1  # processes
 yes = False  # True if the sweep may take more than an hour
 
 # %%
-from analysis import numbers, sweep
+from analysis import sweep
 from analysis.figures.missions import mission_figure, sea_figure
-from analysis.names import METRICS
 from analysis.questions import costs as questions
 from analysis.results.resimulate import mission_of
 from dess import load_scenario
 from policies import load_team
 from reports.pages import html
+from reports.pages.study import costs
 
 # %%
 sea = load_scenario(scenario)
 priced = {**prices, "currency": currency, "missions": planned}
 about = (scenario, policies, missions, seed, results, workers, priced, requirements)
 answer = sweep(*about, yes=yes, **fields)
-costs, found = answer.table("cost"), answer.answers()
 
 # %%
 html.answer(questions.answer(answer.results), answer.cheapest() or "none")
 
 # %%
-html.lead(
-    answer.plot(metric="success"),
-    "Success against the number of UAVs, by number of pads",
-    "Bars are 95 % intervals; n is small for settings that were ruled out early (see the table).",
-)
+html.lead(*costs.deciding(answer.results))
 
 # %% [markdown]
 # ## Why
 
 # %%
-html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in found)))
+html.say("{lines}", lines=html.composed("\n".join(f"- {line}" for line in answer.answers())))
 
 # %%
 policy = answer.results.policies[0]
@@ -82,13 +77,10 @@ html.say("Guarantee: {guarantee}.", guarantee=answer.guarantee)
 # %% [markdown]
 # ## Tables
 #
-# The verdict is *open* where no decision was needed to find the cheapest fleet.
+# *Not shown* is a requirement where no decision was needed to find the cheapest fleet.
 
 # %%
-columns = ["policy", *answer.fields, "success", "collection_ratio", "n", "cost", "verdict"]
-shown = costs[columns].assign(cost=costs["cost"].map("{:,.0f}".format))
-shown[[*METRICS][:2]] = shown[[*METRICS][:2]].map(numbers.percent)
-html.table(shown, f"Mean cost of {planned:,} planned missions in {currency}", data=costs)
+costs.judged_table(answer.results)
 
 # %% [markdown]
 # ## With your own sea
@@ -115,13 +107,14 @@ html.say("{lines}", lines=html.commands([answer.command]))
 # %%
 html.say(
     "The sea has {nodes} sensor nodes on {columns} x {rows} cells of {size:g} m. The sweep has "
-    "{settings} settings and simulated {n:,} missions.",
+    "{settings} settings and simulated {n:,} missions. Costs are means for {planned:,} missions.",
     nodes=len(sea.nodes),
     columns=sea.size[0],
     rows=sea.size[1],
     size=sea.cell_size,
-    settings=len(costs),
+    settings=len(answer.table()),
     n=len(answer.results.missions),
+    planned=planned,
 )
 
 # %%

@@ -49,7 +49,7 @@ html.answer(words.answer(study, ranked, by))
 html.answer(words.of_variance(study, by))
 
 # %%
-html.lead(*drawings.leading(study, next(iter(costs.required(study)), by)))
+html.lead(*(costs.deciding(study) if costs.required(study) else drawings.leading(study, by)))
 
 # %% [markdown] tags=["if-cheapest"]
 # ## Why

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from bs4 import BeautifulSoup, Tag
 from bs4.element import NavigableString
+from markupsafe import Markup
 from nbconvert import HTMLExporter
 from nbformat import NotebookNode
 
@@ -41,13 +42,13 @@ class Body:
     """The parts of a page.
 
     Attributes:
-        answer: The answer to the question of the page, as text; empty if it has none.
+        answer: The answer to the question of the page, with its terms explained; may be empty.
         number: The number of the answer, which the index shows large; may be empty.
         sections: The headings of the sections, by their anchors.
         html: The rest.
     """
 
-    answer: str
+    answer: Markup
     number: str
     sections: dict[str, str]
     html: str
@@ -67,11 +68,11 @@ class Body:
             prompt.decompose()
         for wrapper in soup.select(_WRAPPERS):
             wrapper.unwrap()
-        found = soup.select_one("p.answer")
-        answer = found.extract() if found else soup.new_tag("p")
         for count, figure in enumerate(soup.find_all("figure"), 1):
             _number(soup, figure, count)
         _explain(soup)
+        found = soup.select_one("p.answer")
+        answer = found.extract() if found else soup.new_tag("p")
         for scrolling in soup.find_all("pre"):
             scrolling["tabindex"] = "0"
         for text in [*soup.find_all(string=_INDEX)]:
@@ -79,7 +80,7 @@ class Body:
                 text.replace_with(*_with_indices(soup, text))
         sections = {str(section["id"]): title for section, title in _sections(soup)}
         number = str(answer.get("data-number", ""))
-        return cls(answer.get_text(), number, sections, soup.decode(formatter="minimal").strip())
+        return cls(Markup(answer.decode_contents()), number, sections, soup.decode().strip())
 
 
 def _number(soup: BeautifulSoup, figure: Tag, number: int) -> None:

@@ -38,6 +38,7 @@ _IMAGE = re.compile(
 )
 _TITLE = re.compile("<h1>([^<]*)</h1>")
 _LEAD = re.compile('<p class="lead"(?: data-number="([^"<>]*)")?>([^<]*)</p>')
+_EXPLAINED = re.compile('<abbr title="[^"<>]*">|</abbr>')  # a term in a finding
 _BAR = re.compile('<nav class="bar" aria-label="All pages">.*?</nav>', re.S)
 _OF_STUDY = re.compile(rf"{PREFIX}.+(?<!\.partial)\.html")
 
@@ -54,6 +55,7 @@ class Card:
     @classmethod
     def of(cls, page: str, content: str) -> "Card":
         """The card of a page."""
+        content = _EXPLAINED.sub("", content)
         title, (number, finding) = _first(_TITLE, content), _first(_LEAD, content) or ("", "")
         return cls(page, Markup(title), Markup(number), Markup(finding))
 

@@ -23,9 +23,12 @@ def answer(rows: Sequence[Row]) -> str:
     telling = [row for row in rows if row.is_diagnostic]
     held, all_held = (sum(row.findings[0].holds for row in of) for of in (telling, rows))
     names = numbers.words(COLUMNS[2:])
+    short = [f"“{r.claim.text}”" for r in telling if r.findings[0].outcome == FALLS_SHORT]
     return (
         f"Of {len(rows)} claims, {len(telling)} are diagnostic: {names} do not pass them. "
         f"{_named(rows, 0)} passes {held} of these {len(telling)}, and {all_held} of all."
+        + f" It falls short of {numbers.words(short)}; open: {len(telling) - held - len(short)}."
+        * bool(short)
     )
 
 

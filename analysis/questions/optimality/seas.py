@@ -43,7 +43,7 @@ def missions(results: Results) -> pd.DataFrame:
     group = np.searchsorted(_NODES, counts)[point]
     return results.missions.assign(
         sea=sea, family=[name.partition(":")[0] for name in sea], all=ALL,
-        nodes=np.array([*_in_words(counts)])[group],
+        nodes=np.array(_in_words())[group],
     )  # fmt: skip
 
 
@@ -164,8 +164,10 @@ def _first_number(group: object) -> int:
     return int(str(group).partition(" ")[0])
 
 
-def _in_words(counts: np.ndarray) -> list[str]:
-    """The groups of seas by their number of nodes: ``up to 15``, ``16 to 30``, ..."""
+def _in_words() -> list[str]:
+    """The groups of seas by their number of nodes: ``1 to 15``, ``16 to 30``, ..."""
     least = [1, *(most + 1 for most in _NODES)]
-    most = [*_NODES, max(counts.max(), _NODES[-1] + 1)]
-    return [f"{low} to {high}" for low, high in zip(least, most, strict=True)]
+    return [
+        *(f"{n} to {most}" for n, most in zip(least, _NODES, strict=False)),
+        f"{least[-1]} and more",
+    ]

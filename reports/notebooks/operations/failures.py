@@ -39,7 +39,7 @@ rate, repair = operations.RATE, operations.REPAIR
 # %%
 caption = (
     f"n = {numbers.span(means.loc[means['metric'].isin(metrics), 'n'])} missions per dot; bars are "
-    f"{numbers.level(LEVEL)} intervals. A repair time of 0 means that a failed UAV is lost."
+    f"{numbers.level(LEVEL)} intervals."
 )
 drawn = [
     (

@@ -5,6 +5,7 @@ html.gallery(costs.drawn(study, fronts))
 """
 
 from collections.abc import Mapping
+from math import inf
 
 import pandas as pd
 from IPython.display import HTML
@@ -42,7 +43,7 @@ def required(results: Results) -> Mapping[str, float]:
     return {str(metric): least for metric, least in given.items()}
 
 
-def drawn(results: Results, fronts: Fronts) -> list[Drawing]:
+def drawn(results: Results, fronts: Fronts, marks: str = MARKS) -> list[Drawing]:
     """Figures of the cost against the metrics of the fronts, for every condition."""
     drawings: list[Drawing] = []
     for metric, front in fronts.items():
@@ -51,8 +52,21 @@ def drawn(results: Results, fronts: Fronts) -> list[Drawing]:
             drawing = figures.costs(rows, metric, _currency(results), least)
             title = f"Cost against {metric_name(metric).lower()}{', ' * bool(condition)}{condition}"
             counted = f"{_LEVEL} intervals; n = {numbers.span(rows['n'])} missions per setting."
-            drawings.append((drawing, title, f"{title}. {MARKS} Bars are {counted}", rows))
+            drawings.append((drawing, title, f"{title}. {marks} Bars are {counted}", rows))
     return drawings
+
+
+def deciding(results: Results) -> Drawing:
+    """The cost against the metric whose requirement asks for the most expensive fleet."""
+    rows, least = questions.judged(results), required(results)
+    rows = rows[rows["policy"] == results.policies[0]].assign(on_front=rows["selected"])
+    rows["probability"] = 0.4 + 0.6 * (rows["verdict"] == questions.MET)
+    parts = [(m, part) for m in least for _, part in rows.groupby("condition", sort=False)]
+    cheapest = [min(part[COST][part[m] >= least[m]], default=inf) for m, part in parts]
+    metric, part = parts[cheapest.index(max(cheapest))]
+    wanted = numbers.words([f"{metric_name(m).lower()} {100 * q:g} %" for m, q in least.items()])
+    marks = f"Large, dark marks are shown to meet all requirements ({wanted}); faint ones are not."
+    return drawn(results, {metric: part}, marks)[0]
 
 
 def front_table(results: Results, fronts: Fronts) -> HTML:

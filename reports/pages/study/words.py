@@ -14,6 +14,7 @@ from analysis.study.design import NOISE
 from dess import InputError
 from reports.pages import html
 
+MOST_NAMES = 3  # the largest number of settings that are named because they may be as good
 MOST_ROWS = 25  # the largest number of rows of a table on the page; its data have all rows
 _BEST = "Which setting is the best for {}?"
 _MOST_VALUES = 12  # the largest number of values of a field in a list
@@ -81,19 +82,21 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
     """
     best, others, tied = ranked.iloc[0], len(ranked) - 1, int(ranked["tied"].sum()) - 1
     value = numbers.written(metric)(*best[[metric, f"{metric}_low", f"{metric}_high"]])
-    where = settings.in_words(results)[best["point"]]
+    where = [f" with {w}" * (w != settings.AS_IT_IS) for w in settings.in_words(results)]
+    names = [p + where[k] for p, k in ranked.loc[ranked["tied"], ["policy", "point"]].to_numpy()]
     what = "setting" if settings.varied(results) else "policy"
-    setting = f" with {where}" if where != settings.AS_IT_IS else ""
     if others == 1:
         rest = f" The other {what} {'may be as good' if tied else 'is significantly worse'}."
     elif not tied:
         rest = f" All {others:,} others are significantly worse." if others else ""
     else:
+        named = f" ({'; '.join(names[1:])})" * (tied <= MOST_NAMES)
         rest = (
-            f" Of the {others:,} others, {tied:,} may be as good; the rest are significantly worse."
+            f" Of the {others:,} others, {tied:,} may be as good{named}; the rest are "
+            "significantly worse."
         )
     return (
-        f"The best {what} is {best['policy']}{setting}: {metric_name(metric).lower()} {value}, "
+        f"The best {what} is {names[0]}: {metric_name(metric).lower()} {value}, "
         f"n = {best['n']:,}.{rest}"
     )
 

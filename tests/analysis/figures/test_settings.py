@@ -47,7 +47,8 @@ def test_curves_are_the_means_with_intervals_at_their_places(results):
 def test_a_second_field_has_a_curve_per_value_and_policies_have_panels(results):
     drawing = figures.plot(results, "initial_data", hue="uavs")
     table = settings.averaged(results, ["initial_data", "uavs"])
-    assert [ax.get_title(loc="left") for ax in drawing.axes] == results.policies
+    titles = [ax.get_title(loc="left") for ax in drawing.axes]
+    assert titles == [f"Policy {name}" for name in results.policies]
     for ax, policy in zip(drawing.axes, results.policies, strict=True):
         for uavs, (_, y, _) in zip((1, 2), curves(ax), strict=True):
             own = table[(table["policy"] == policy) & (table["uavs"] == uavs)]

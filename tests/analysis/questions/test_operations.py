@@ -94,8 +94,9 @@ def test_the_age_is_compared_with_the_published_effect(tmp_path):
     assert table["mean"].tolist() == pytest.approx([-1 / 2, -2 / 3, -1 / 2, -2 / 3])
     assert table["published"].dropna().tolist() == [-0.46, -0.46]
     text = operations.age(halved)
-    assert "changes by −50.0 % [−50.0, −50.0] from 1 to 2 UAVs" in text
-    assert "at arrival rates of 0.1 to 0.5" in text
+    # By hand: 80 to 84 in five missions, so half a width of t * sqrt(2.5 / 5) with t = 2.776.
+    assert "From 1 to 3 UAVs the mean age of the data falls from 82.0 [80.0, 84.0] to" in text
+    assert "to 27.3 [26.7, 28.0] slots at an arrival rate of 0.5" in text
 
 
 def test_failures_are_compared_with_none(tmp_path):

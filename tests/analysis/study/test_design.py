@@ -17,6 +17,7 @@ from dess import InputError
 from dess.errors import validation_line
 from dess.files.parsing import parse_toml
 from dess.scenario import load_scenario
+from dess.sea.families import seas_of
 from dess.streams import MAX_REPLICATION, MAX_SEED
 
 
@@ -101,6 +102,12 @@ def test_one_at_a_time_fixes_one_field_per_point():
         {"initial_data": 5},
         {"initial_data": (7.5, 10)},
     ]
+
+
+def test_a_set_of_seas_has_a_point_for_each():
+    design = plan('[design]\nkind = "seas"\nset = "validation"')
+    assert values_of(design) == [{"scenario": name} for name in seas_of("validation")]
+    assert design.count == len(design.points)
 
 
 def test_a_latin_hypercube_has_one_point_per_stratum_of_every_field():

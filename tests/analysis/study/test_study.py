@@ -1,24 +1,25 @@
 import pickle
+import shlex
 
 import pytest
 import tomli_w
 from pydantic import ValidationError
 
-from analysis import load_study, study_names
+from analysis import load_study, run_study, study_names
 from analysis.study.study import Study, budget_of
-from dess import InputError
+from dess import InputError, load_scenario
 from policies.registry import HEURISTICS, TypedByUser, load_team, trained_names
 from tests.analysis.small import grid, small_study, write_scenario
 
-# Trainings of ddqn that tell how much chance there is in one.
-REPEATED = ("ddqn-2", "ddqn-3")
+# Trainings of ddqn that tell how much chance there is in one, and the policy for other seas.
+REPEATED = ("ddqn-2", "ddqn-3", "any")
 
 
 def test_the_shipped_studies():
     names = study_names()
     assert [load_study(name).name for name in names] == names
     kinds = {load_study(name).design.kind for name in names if load_study(name).design}
-    assert kinds == {"grid", "one-at-a-time", "latin-hypercube", "saltelli"}
+    assert kinds == {"grid", "one-at-a-time", "seas", "latin-hypercube", "saltelli"}
     assert any(load_study(name).precision for name in names)
     rules = [load_study(name).selection for name in names]
     assert {rule.procedure for rule in rules if rule} == {"kn", "kn-bounded"}
@@ -46,7 +47,7 @@ BAD = {
     "missions = true": ["missions: True is not an integer"],
     "seed = -1": ["seed: -1 is out of range; allowed: an integer 0.."],
     "logged = 2000": ["logged: 2000", "0..1000"],
-    "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "nearest, greedy, tour"],
+    "policies = ['greedy', 'gredy']": ["'gredy' is unknown", "did you mean greedy"],
     "policies = ['greedy', 'greedy']": ["greedy is listed twice"],
     "set.uavs = 99": ["uavs: 99", "1..16"],
     "set.uavz = 2": ["uavz: unknown key (did you mean uavs?)"],
@@ -92,10 +93,26 @@ def test_a_bad_study_gets_one_line(text, tmp_path):
         assert part in line
 
 
-def test_a_study_that_is_not_there(tmp_path):
-    with pytest.raises(
-        InputError, match="no such study; allowed: .*, verification, or a TOML file"
+def test_the_sea_may_differ_from_point_to_point(tmp_path):
+    names = ("coast:4", "bay", "german-bight")
+    design = {"kind": "grid", "values": {"scenario": [*names]}}
+    study = small_study(tmp_path, design=design, set={"uavs": 2}, missions=2)
+    expected = [load_scenario(name, uavs=2) for name in names]
+    assert [point.scenario for point in study.points] == expected
+    results = run_study(study, tmp_path / "seas")
+    assert [results.scenario(point) for point in range(3)] == expected
+    command = shlex.split(results.command("greedy", 0, 1))
+    assert command[command.index("--scenario") + 1] == "coast:4"
+    for unknown, line in (
+        ("small.toml", "scenario: 'small.toml' is unknown"),
+        ("coats:4", "coast"),
     ):
+        with pytest.raises(InputError, match=line):
+            small_study(tmp_path, design={"kind": "grid", "values": {"scenario": [unknown, "bay"]}})
+
+
+def test_a_study_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="no such study; allowed: age, .* others, or a TOML file"):
         load_study(tmp_path / "none.toml")
     with pytest.raises(InputError, match="cannot be read"):
         load_study(tmp_path)

@@ -30,7 +30,7 @@ def asking(tmp_path):
 def sweep_of(fields, folder, **about):
     """The study of a sweep of the small scenario."""
     values = {field: values_of(field, given) for field, given in fields.items()}
-    return question(values, write_scenario(folder), **about)
+    return question(values, write_scenario(folder), **{"policies": ["greedy"]} | about)
 
 
 def tables(results):

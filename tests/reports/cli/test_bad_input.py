@@ -15,7 +15,7 @@ BAD = {
     "train quik --out out": ["no such config (did you mean quick?)"],
     "simulate --scenario nope": ["nope: no such scenario", "bay, biscay-corner, fig1"],
     "simulate --scenario .": ["cannot be read"],
-    "simulate --policy gredy": ["'gredy' is unknown", "nearest, greedy, tour"],
+    "simulate --policy gredy": ["'gredy' is unknown", "did you mean greedy"],
     "simulate --policy greedy,tour,nearest --set uavs=2": ["3 policies", "2 at most"],
     "evaluate --policy greedy --policy greedy,tour --set uavs=1": ["2 policies", "1 at most"],
     "study run trial.toml --policy greedy,tour,random,tour": ["largest fleet", "3 at most"],

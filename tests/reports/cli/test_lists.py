@@ -20,8 +20,8 @@ def test_names_are_listed(dess):
         "scenarios": [*scenario_names(), *scenario_families()],
         "studies": [
             *("age", "charge-limits", "comparison", "explorer", "failures", "fig1", "fig4", "fig5"),
-            *("gap", "pads", "precise", "screening", "sensitivity", "sweet-spot", "table4"),
-            "verification",
+            *("fig5-paper", "gap", "pads", "precise", "screening", "seas", "sensitivity"),
+            *("sweet-spot", "sweet-spot-paper", "table4", "verification"),
         ],
     }.items():
         code, out, err = dess(command)
@@ -121,7 +121,7 @@ def test_a_package_is_the_command(module):
         ("dess simulate --scenario pap", ["paper"]),
         ("dess simulate --policy greedy,tou", ["greedy,tour"]),
         ("dess simulate --set charge_", ["charge_rate=", "charge_start=", "charge_complete="]),
-        ("dess study run fig", ["fig1", "fig4", "fig5"]),
+        ("dess study run fig", ["fig1", "fig4", "fig5", "fig5-paper"]),
         ("dess train qui", ["quick"]),
     ],
 )

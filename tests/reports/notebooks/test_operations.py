@@ -27,7 +27,7 @@ def test_the_page_on_pads(results: Path) -> None:
 
 def test_the_page_on_the_age(results: Path) -> None:
     text = said_by("age", results=str(results))
-    assert text.lstrip().startswith("The average age of information changes by")
+    assert text.lstrip().startswith("From 1 to 2 UAVs the mean age of the data falls from")
     study = load_results(results / "age")
     means = study.missions.query("policy == 'age' and arrival_rate == 0.5").groupby("uavs")["age"]
     change = means.mean()[2] / means.mean()[1] - 1

@@ -6,6 +6,7 @@ import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
 from reports.pages.body import FOLDED, TERMS, Body
+from reports.pages.index import Card
 
 
 def body(*cells: str) -> Body:
@@ -26,9 +27,17 @@ FIGURE = '<figure><img alt="a" src=""><figcaption>n = 3.</figcaption></figure>'
 
 def test_the_answer_moves_out_of_the_text() -> None:
     found = body('<p class="answer" data-number="4 %">It is 4 % &amp; more.</p>', "<p>rest</p>")
-    assert (found.answer, found.number) == ("It is 4 % & more.", "4 %")
+    assert (found.answer, found.number) == ("It is 4 % &amp; more.", "4 %")
     assert "more" not in found.html and "rest" in found.html
     assert body("<p>rest</p>").answer == ""
+
+
+def test_the_answer_explains_a_term_where_it_stands_first() -> None:
+    found = body('<p class="answer">The product is 4 %.</p>', "<p>a product</p>")
+    assert f'<abbr title="{TERMS["product"]}">product</abbr>' in found.answer
+    assert "abbr" not in found.html
+    page = f'<h1>A</h1><p class="lead">{found.answer}</p>'
+    assert Card.of("a.html", page).finding == "The product is 4 %."
 
 
 def test_figures_have_numbers_and_anchors() -> None:

@@ -23,7 +23,7 @@ def rendered(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The names of the pages that are rendered, each with a cell that shows a number."""
     names: list[str] = []
     monkeypatch.setattr(
-        kernels, "run", lambda reports, progress: names.extend(report.name for report in reports)
+        kernels, "run", lambda reports, *_: names.extend(report.name for report in reports)
     )
     return names
 

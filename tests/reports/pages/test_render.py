@@ -374,7 +374,7 @@ def test_a_path_is_relative_in_the_notebook_and_a_name_on_the_page(
 ) -> None:
     """Values stand in the cell of the parameters; the notebook runs in another folder."""
     ran: list[Report] = []
-    monkeypatch.setattr(kernels, "run", lambda reports, progress: ran.extend(reports))
+    monkeypatch.setattr(kernels, "run", lambda reports, *_: ran.extend(reports))
     monkeypatch.chdir(tmp_path)
     given = {"policy": "./sea.toml"}
     render(["mission"], results, "out", parameters=given, notebooks=notebooks)
@@ -413,7 +413,7 @@ def test_a_notebook_that_fails_or_dies_leaves_a_partial_page_and_names_the_cell(
         assert "the cell before" in text and "the cell after" not in text
     assert (tmp_path / "mission.html").read_text() == "before"  # the complete page stays
     assert "the cell after" in words_of((tmp_path / "performance.html").read_text("utf-8"))
-    monkeypatch.setattr(kernels, "run", lambda reports, progress: None)
+    monkeypatch.setattr(kernels, "run", lambda reports, *_: None)
     render(["mission"], results, tmp_path, notebooks=notebooks)
     assert not (tmp_path / "mission.partial.html").exists()
 

@@ -128,7 +128,8 @@ def test_columns_are_named_by_their_policies_and_verdicts_are_counted(html: str)
 def test_the_answer_counts_diagnostic_claims_apart() -> None:
     passed = replace(ROWS[0], findings=(*ROWS[0].findings[:2], *[Finding(HOLDS, "greedy")] * 3))
     assert "Of 3 claims, 3 are diagnostic" in answer(ROWS)
-    assert "ddqn passes 1 of these 3, and 1 of all." in answer(ROWS)
+    assert "ddqn passes 1 of these 3, and 1 of all. It falls short of “" in answer(ROWS)
+    assert answer(ROWS).endswith("”; open: 1.")
     text = answer([passed, *ROWS[1:]])
     assert "2 are diagnostic" in text and "ddqn passes 0 of these 2, and 1 of all." in text
 
