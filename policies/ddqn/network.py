@@ -225,7 +225,7 @@ class _Pool(nn.Module):
 def highest(values: Tensor, factors: Tensor) -> Tensor:
     """The highest product (R, M, C) of the rows' values (R, N, C) and factors (R, M, N), or 0."""
     if values.device.type == "cpu":
-        return _Highest.apply(values, factors)  # type: ignore[no-any-return, no-untyped-call]
+        return _Highest.apply(values, factors)
     if values.shape[1] == 0:
         return factors @ values
     products = [(factor[:, :, None] * values).amax(1) for factor in factors.unbind(1)]
