@@ -192,8 +192,8 @@ def listed(times: Times) -> pd.DataFrame:
             "Policy": cost.policy,
             "Median": numbers.seconds(cost.median),
             "95 % below": numbers.seconds(cost.slow),
-            "In batches, per UAV": numbers.seconds(cost.batch) if cost.batch else "",
             "Calls": f"{cost.calls:,}",
+            "In batches, per UAV": numbers.seconds(cost.batch) if cost.batch else "",
         }
         for cost in times.costs
     )

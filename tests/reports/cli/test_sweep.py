@@ -67,6 +67,7 @@ def test_only_what_is_new_is_simulated(dess, unrendered):
 def test_the_cheapest_fleet_is_named(dess, unrendered):
     asked = ["sweep", "--scenario", "small.toml", "--set", "uavs=1,2", "--set", "quota=20,40"]
     asked += ["--price", "uav=20000", "--require", "ratio=0.1", "--missions", 5]
+    asked += ["--policy", "greedy"]
     code, out, _ = dess(*asked)
     assert code == 0
     assert re.search(r"quota 20, greedy: the cheapest .* is 1 UAV for 20,000 EUR", out)
