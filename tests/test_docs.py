@@ -287,7 +287,7 @@ def test_the_table_of_policies_is_what_its_command_prints(
 
 def test_the_readme_has_the_figures_of_the_table_of_policies() -> None:
     rows = re.findall(r"^ +\| .*(?:`(\w+)`|the (paper)'s).*?\| (.*) \|$", README, re.M)
-    assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "paper"]
+    assert [a or b for a, b, _ in rows] == ["greedy", "ddqn", "planner", "paper"]
     for name, other, cells in rows:
         assert re.search(rf"^\| `?{name or other}`? \| {re.escape(cells)} \|$", POLICIES, re.M)
 
