@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
+from analysis import numbers
 from analysis.names import (
     COST,
     LESS_IS_BETTER,
@@ -72,6 +73,25 @@ def in_words(results: Results) -> list[str]:
     rows = points(results).to_dict("records")
     return [
         ", ".join(value_in_words(str(f), v) for f, v in row.items()) or AS_IT_IS for row in rows
+    ]
+
+
+def dependence(results: Results, ranked: pd.DataFrame, metric: str) -> list[str]:
+    """A sentence for each policy but the best: which setting it would have found, and its mean.
+
+    Args:
+        results: The study.
+        ranked: The result of ``ranked`` for the metric.
+        metric: The metric.
+    """
+    words, best = in_words(results), ranked.iloc[0]
+    others = ranked[ranked["policy"] != best["policy"]].drop_duplicates("policy")
+    ends = others[[metric, f"{metric}_low", f"{metric}_high"]].to_numpy()
+    named = zip(others["policy"], others["point"], ends, strict=True)
+    return [
+        f"With {policy}, it would be {words[point]}: {numbers.written(metric)(*of_metric)}."
+        for policy, point, of_metric in named
+        if len(words) > 1
     ]
 
 

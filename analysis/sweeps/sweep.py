@@ -77,9 +77,15 @@ class Sweep:
         return table.drop_duplicates("policy", ignore_index=True)
 
     def answers(self) -> list[str]:
-        """With requirements: the cheapest fleets that meet them, and why cheaper ones do not."""
+        """The best setting and what other policies would have said, in sentences.
+
+        With requirements: the cheapest fleets that meet them, and why cheaper ones do not.
+        """
         if not self.study.selection:
-            return []
+            ranked, words = self.table(), settings.in_words(self.results)
+            best = f"The best setting is {ranked['policy'][0]} with {words[ranked['point'][0]]}."
+            others = settings.dependence(self.results, ranked, PRODUCT)
+            return [best, *others] if others else []
         lines = costs.answers(self.results, costs.judged(self.results))
         lines += costs.dependence(self.results)
         return [line.replace("**", "").replace("`", "") for line in lines]

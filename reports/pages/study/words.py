@@ -95,10 +95,9 @@ def answer(results: Results, ranked: pd.DataFrame, metric: str) -> str:
             f" Of the {others:,} others, {tied:,} may be as good{named}; the rest are "
             "significantly worse."
         )
-    return (
-        f"The best {what} is {names[0]}: {metric_name(metric).lower()} {value}, "
-        f"n = {best['n']:,}.{rest}"
-    )
+    best_one = f"The best {what} is {names[0]}: {metric_name(metric).lower()} {value}, "
+    policies = settings.dependence(results, ranked, metric) if len(results.policies) == 2 else []
+    return " ".join([f"{best_one}n = {best['n']:,}.{rest}", *policies])
 
 
 def of_variance(results: Results, metric: str) -> str:

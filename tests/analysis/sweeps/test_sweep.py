@@ -40,7 +40,10 @@ def test_settings_are_ranked(asking):
     best = answer.best()
     assert [*best["policy"]] == [*table["policy"].unique()]
     assert best["rank"].iloc[0] == 1
-    assert answer.answers() == []
+    best, other = answer.answers()
+    assert best.startswith(f"The best setting is {table['policy'][0]} with ")
+    found = table[table["policy"] != table["policy"][0]].iloc[0]
+    assert other.startswith(f"With {found['policy']}, it would be {found['uavs']} UAV")
     assert answer.guarantee == ""
 
 
