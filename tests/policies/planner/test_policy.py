@@ -179,3 +179,12 @@ def test_a_plan_is_drawn_as_it_is_flown() -> None:
     start = plans[0][0]
     assert (start.stays == -1).any()  # it must charge
     assert len(start.path) > 100  # some 110 flying slots, and those to charge
+
+
+def test_a_search_is_the_same_after_one_for_another_mission() -> None:
+    """Teams fly these missions for a number of slots that ends between two snapshots."""
+    space, numbers = load_scenario("paper", uavs=3), [4, 11, 24]
+    together = simulate_batch(space, policies.load("planner-short"), 0, numbers).missions
+    for record, number in zip(together, numbers, strict=True):
+        alone = simulate_batch(space, policies.load("planner-short"), 0, [number]).missions[0]
+        assert record.tobytes() == alone.tobytes()
