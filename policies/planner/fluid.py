@@ -190,7 +190,6 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
         t += 1
     s = (t + STRIDE - 1) // STRIDE
     copy_snapshot(mission, flight, -1, flight, s)
-    flight.sums[s, 0], flight.sums[s, 1] = collected, penalty
     flight.last[0], flight.last[1] = s, t
     share = (mission.collected + collected) / max(total + arriving * t, 1e-9)
     return share * total - penalty
