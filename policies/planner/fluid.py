@@ -53,6 +53,7 @@ _HALF_A_PACKET = 0.5
 # A communication slot in which no node has data counts toward the quota if at least so many data
 # units arrive per slot: then some node far away is likely to have got some.
 _SOME_ARRIVE = 0.1
+_NOTHING = 1e-6  # [data units]
 # Penalties [data units]: a depleted battery, and each slot that then lacks for the quota; each
 # percent of battery below the guard's reserve at the charging zone; a slot in which the guard would
 # send the UAV home; a move that a teammate blocks.
@@ -153,7 +154,7 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
     while t < slots:
         if t % STRIDE == 0:
             s = t // STRIDE
-            if first < s <= source.last[0]:
+            if first < s < source.last[0]:
                 behind = source.sums[s, 0] - source.sums[s, 1] - collected + penalty
                 if behind > lag:
                     return -math.inf
@@ -180,7 +181,8 @@ def fly(mission, rates, plan, source, first, flight, slots, lag=math.inf):
             if v.active == 0:
                 continue
             if v.charging == 0:
-                collected += _collect(mission, rates, sea, v, t, wait)
+                left = present + arriving * t - collected
+                collected += _collect(mission, rates, sea, v, t, wait, left)
             penalty += _settle(mission, v)
             if v.charging != 0 and v.latch == 0:
                 v.charging = 0
@@ -259,7 +261,7 @@ def _act(mission, rates, waypoints, team, i, t):
 
 
 @inlined
-def _collect(mission, rates, sea, v, t, wait):
+def _collect(mission, rates, sea, v, t, wait, data_left):
     """Let a UAV serve one node after another for a slot, and return what it collects."""
     candidates, (rows, columns) = rates.candidates, rates.chart.zones.shape
     row = ((leg(v) * 5 + v.action) * rows + v.y) * columns + v.x
@@ -280,7 +282,7 @@ def _collect(mission, rates, sea, v, t, wait):
         left -= int(math.ceil(held / amount))
         collected += held
         node.base, node.since = -rate * t, t + wait
-    if rate * mission.nodes < _SOME_ARRIVE:
+    if rate * mission.nodes < _SOME_ARRIVE and data_left - collected < _NOTHING:
         v.counted -= left
     return collected
 

@@ -92,9 +92,6 @@ def improve(mission, uavs, residual, nodes, rates, plan, workspace, steps, hotte
     present, trial, flight, ahead, course = workspace
     slots, first = min(mission.max_slots - mission.slot, fluid.MOST_SLOTS), int(course[TRIED])
     if first == 0:
-        # the sums at the end of a flight are those of an earlier one: not of another mission
-        flight.sums[:] = 0.0
-        ahead.sums[:] = 0.0
         fluid.begin(mission, uavs, residual, flight)
         course[VALUE] = course[BEST] = fluid.fly(mission, rates, plan, flight, 0, flight, slots)
         course[HEAT] = hottest
