@@ -22,7 +22,7 @@ STUDIES = {
     "comparison": "--missions 1000",
     "explorer age": "--missions 50",
     "gap": "--missions 12",
-    "seas": "--missions 2 --policy any --policy greedy --policy planner",
+    "seas": "--missions 1 --policy any --policy greedy --policy planner",
 }
 # What says which libraries are installed.
 REQUIREMENTS = ("pyproject.toml", "constraints.txt")

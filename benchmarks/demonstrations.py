@@ -1,20 +1,27 @@
-"""The first part of the training of ``any``, away from its learner: planned missions as examples.
+"""The training of ``any`` by imitation: planned missions on generated seas as examples.
 
-    python -m benchmarks.demonstrations --out runs/demonstrations
-    dess train any --from runs/demonstrations --out runs/any
+    python -m benchmarks.demonstrations --out runs/any
 
-A short planner flies missions on generated seas, and a share of its decisions is replaced by random
-ones, so that it also shows how to go on from there. A network on sets then learns its decisions by
-cross entropy. The folder is a policy, with which the double DQN of the config ``any`` begins.
+A planner flies missions on the seas of the set ``train``, and another policy makes a share of the
+decisions, so that the planner also shows how to go on from there. In the first round that policy is
+random; then it is the network that has learned from the first round (S. Ross et al., *A reduction of
+imitation learning and structured prediction to no-regret online learning*, 2011). A network on sets
+learns the decisions of both rounds by cross entropy. The folder is a policy. The examples are kept in
+``OUT-examples``, so a run that was cut off goes on from there.
 """
 
 import argparse
+import pickle
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import nn
+from tqdm import tqdm
 
 from dess import load_scenario, simulate_batch
 from dess.observations.guard import guard
@@ -26,11 +33,31 @@ from dess.view import View
 from policies.ddqn.config import MISSION_SEED, TrainingConfig, load_config
 from policies.ddqn.learner import Learner
 from policies.ddqn.network import SetNetwork
+from policies.ddqn.policy import DDQN
 from policies.ddqn.trained import save_policy
-from policies.ddqn.training import ShortPlanner
+from policies.planner import LongPlanner, Planner
 
-DEVIATIONS = (0.03, 0.2)  # share of random decisions, by mission
+
+class Round(NamedTuple):
+    """Missions of one kind.
+
+    Attributes:
+        seas: How many seas of each family, of the set ``train`` in order.
+        deviations: The share of decisions that the other policy makes, in each mission of a sea.
+        updates: The updates by which a network learns from this round and those before.
+    """
+
+    seas: int
+    deviations: tuple[float, ...]
+    updates: int
+
+
+ROUNDS = (Round(80, (0.03, 0.2), 4000), Round(120, (0.5, 0.9), 20_000))
+# On the largest seas a longer search finds clearly better plans.
+TEACHERS = {"large": LongPlanner}
 PARTS = 8  # seas of a minibatch
+BATCH = 512
+NEIGHBOURS = 0.1  # share of the seas, alike in the number of nodes, that a minibatch is drawn from
 RATES = (2e-3, 2e-5)  # learning rates of the first and the last update
 VALUE = 12.5  # of all states: about what a mission is worth from its beginning
 
@@ -53,12 +80,13 @@ class Examples(NamedTuple):
 
 
 class Demonstrator:
-    """The planner with random deviations, and a record of what it decides."""
+    """The planner, of whose decisions another policy makes some, and a record of what it decides."""
 
     name = "demonstrator"
 
-    def __init__(self, seed: int):
-        self.planner, self.generator = ShortPlanner(), np.random.default_rng(seed)
+    def __init__(self, planner: Planner, deviations: Sequence[float], other: Any, seed: int):
+        self.planner, self.deviations, self.other = planner, np.array(deviations), other
+        self.generator = np.random.default_rng(seed)
         self.seen: list[tuple[np.ndarray, ...]] = []
 
     def act(self, view: View) -> np.ndarray:
@@ -68,42 +96,76 @@ class Demonstrator:
         labels = np.full(view.state.uavs.shape, -1, np.int8)
         labels[view.mission, view.uav] = planned
         self.seen.append(tuple(a[np.unique(view.mission)] for a in (*states, labels)))
-        safe = guard(view)
-        random = np.where(safe, self.generator.random(safe.shape), -1.0).argmax(1)
-        share = np.array(DEVIATIONS)[view.constants["replication"] % len(DEVIATIONS)]
-        return np.where(self.generator.random(len(planned)) < share, random, planned)
+        replaced = self.other.act(view) if self.other else self._random(view)
+        share = self.deviations[view.constants["replication"] % len(self.deviations)]
+        return np.where(self.generator.random(len(planned)) < share, replaced, planned)
+
+    def _random(self, view: View) -> np.ndarray:
+        allowed = guard(view)
+        return np.where(allowed, self.generator.random(allowed.shape), -1.0).argmax(1)
 
 
-def examples_on(name: str) -> Examples:
-    """What the planner shows in two missions on a sea, where it had a choice."""
-    space, seed = load_scenario(name), int(name.partition(":")[2])
-    demonstrator = Demonstrator(seed)
-    simulate_batch(space, demonstrator, MISSION_SEED + seed, len(DEVIATIONS))
+def examples_on(name: str, deviations: Sequence[float], weights: Path | None) -> Examples:
+    """What the planner shows in a mission per share of deviations, where it had a choice."""
+    torch.set_num_threads(1)
+    space, (family, _, seed) = load_scenario(name), name.partition(":")
+    other = None
+    if weights:
+        network = _network(load_config("any"))
+        network.load_state_dict(torch.load(weights))
+        other = DDQN("other", Sets, network, True, None)
+    planner = TEACHERS.get(family, Planner)()
+    demonstrator = Demonstrator(planner, deviations, other, int(seed))
+    simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(deviations))
     *parts, labels = (np.concatenate(arrays) for arrays in zip(*demonstrator.seen, strict=True))
     states = CompactStates(*parts)
     rows, uavs = np.nonzero(labels >= 0)
     is_choice = masks(states, rows, uavs).sum(1) > 1
     rows, uavs = rows[is_choice], uavs[is_choice]
-    return Examples(encoder_of("sets", space), states, rows, uavs, labels[rows, uavs].astype(int))
+    encoder = encoder_of("sets", space)
+    chart = encoder.sea.chart._replace(ways=np.zeros((0, 0), np.int16))  # it has those it needs
+    encoder.sea = encoder.sea._replace(chart=chart)
+    return Examples(encoder, states, rows, uavs, labels[rows, uavs])
+
+
+def recorded(folder: Path, names: Sequence[str], kind: Round, weights: Path | None) -> list[Path]:
+    """Files with the examples on seas, of which those that do not exist are made."""
+    paths = [folder / f"{name.replace(':', '-')}.pickle" for name in names]
+    missing = [place for place in zip(names, paths, strict=True) if not place[1].exists()]
+    with ProcessPoolExecutor() as workers:
+        made = workers.map(
+            partial(examples_on, deviations=kind.deviations, weights=weights),
+            [name for name, _ in missing],
+        )
+        for (_, path), examples in zip(missing, tqdm(made, total=len(missing)), strict=True):
+            temporary = path.with_suffix(".tmp")
+            temporary.write_bytes(pickle.dumps(examples))
+            temporary.rename(path)
+    return paths
 
 
 def imitate(config: TrainingConfig, shown: list[Examples], updates: int) -> dict[str, Any]:
     """The weights of a network that has learned the decisions."""
     torch.manual_seed(config.seed)
+    torch.set_num_threads(1)
     generator = np.random.default_rng(config.seed)
-    network = SetNetwork(Sets.shapes, config.hidden)
+    network = _network(config)
     learner = Learner(network, Sets, config, torch.device("cpu"))
     assert learner.average is not None
-    for update in range(updates):
-        chosen = [shown[n] for n in generator.integers(0, len(shown), PARTS)]
-        picks = [generator.integers(0, len(e.rows), config.batch // PARTS) for e in chosen]
+    shown = sorted(shown, key=lambda examples: len(examples.encoder.sea.nodes))
+    near = round(NEIGHBOURS * len(shown))
+    for update in tqdm(range(updates)):
+        middle = generator.integers(len(shown))
+        places = generator.integers(middle - near, middle + near + 1, PARTS)
+        chosen = [shown[n] for n in places.clip(0, len(shown) - 1)]
+        picks = [generator.integers(0, len(e.rows), BATCH // PARTS) for e in chosen]
         at = [(e.states, e.rows[p], e.uavs[p]) for e, p in zip(chosen, picks, strict=True)]
         seen = learner._observe((e.encoder, *rows) for e, rows in zip(chosen, at, strict=True))
         allowed = torch.from_numpy(np.concatenate([masks(*rows) for rows in at]))
         planned = np.concatenate([e.planned[p] for e, p in zip(chosen, picks, strict=True)])
         logits = network(*seen) / config.imitation_temperature
         loss = nn.functional.cross_entropy(
-            logits.masked_fill(~allowed, -1e9), torch.from_numpy(planned)
+            logits.masked_fill(~allowed, -1e9), torch.from_numpy(planned.astype(np.int64))
         )
         learner.optimizer.zero_grad(set_to_none=True)
         loss.backward()
@@ -120,18 +182,29 @@ def imitate(config: TrainingConfig, shown: list[Examples], updates: int) -> dict
     return weights
 
 
+def _network(config: TrainingConfig) -> SetNetwork:
+    return SetNetwork(Sets.shapes, config.hidden)
+
+
 def main() -> None:
-    """Record, learn and save."""
+    """Record and learn, round by round, and save."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the policy")
-    parser.add_argument("--seas", type=int, default=60, help="of each family")
-    parser.add_argument("--updates", type=int, default=4000)
     options = parser.parse_args()
-    seeds = SETS["train"][: options.seas]
-    shown = [examples_on(f"{family}:{seed}") for seed in seeds for family in FAMILIES]
-    print(f"{len(shown)} seas, {sum(len(e.rows) for e in shown):,} decisions")
-    config = load_config("any")
-    save_policy(options.out, imitate(config, shown, options.updates), config, config.space)
+    config, weights, paths = load_config("any"), None, []
+    first = 0
+    for number, kind in enumerate(ROUNDS, 1):
+        folder = options.out.with_name(f"{options.out.name}-examples") / str(number)
+        folder.mkdir(parents=True, exist_ok=True)
+        seeds = SETS["train"][first : first + kind.seas]
+        names, first = [f"{f}:{s}" for s in seeds for f in FAMILIES], first + kind.seas
+        paths += recorded(folder, names, kind, weights)
+        shown = [pickle.loads(path.read_bytes()) for path in paths]
+        print(f"{len(shown)} seas, {sum(len(e.rows) for e in shown):,} decisions")
+        weights = folder / "weights.pt"
+        if not weights.exists():
+            torch.save(imitate(config, shown, kind.updates), weights)
+    save_policy(options.out, torch.load(weights), config, config.space)
 
 
 if __name__ == "__main__":

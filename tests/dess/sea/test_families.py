@@ -80,7 +80,7 @@ def test_a_sea_depends_on_its_name_alone() -> None:
 
 
 def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
-    sizes = {"train": 200, "validation": 10, "test": 20}
+    sizes = {"train": 200, "validation": 10, "test": 60}
     drawn = {name: seas_of(name) for name in sizes}
     for name, size in sizes.items():
         assert len(drawn[name]) == size * len(FAMILIES)
@@ -92,7 +92,7 @@ def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
 
 def test_the_test_seas_of_a_family_have_one_to_six_uavs_alike() -> None:
     uavs = [load_scenario(f"coast:{seed}").uavs for seed in SETS["test"]]
-    assert sorted(map(uavs.count, [(1, 2), (3, 4), (5, 6)])) == [6, 7, 7]
+    assert sorted(map(uavs.count, [(1, 2), (3, 4), (5, 6)])) == [20, 20, 20]
 
 
 def test_coasts_face_all_ways_and_corridors_run_both_ways() -> None:
