@@ -26,7 +26,7 @@ class Blocks(NamedTuple):
     """The blocks of the nodes, and what a UAV remembers of the block before.
 
     Attributes:
-        home: (M, M) home node of each cell ``x, y``.
+        home: (W, H) home node of each cell ``x, y``.
         near: (K, N) nodes that a UAV in a node's block can remember; -1 for none.
         place: (K, K) place of a node in the row ``near`` of another one, -1 if it is not there.
         levels: (R,) indices of the local prices at which a node is remembered; the first is 0.
@@ -38,9 +38,9 @@ class Blocks(NamedTuple):
     levels: np.ndarray
 
 
-def blocks_of(nodes: np.ndarray, grid: int, most: int, levels: np.ndarray) -> Blocks:
+def blocks_of(nodes: np.ndarray, size: tuple[int, int], most: int, levels: np.ndarray) -> Blocks:
     """The cells that are nearest to each node, and up to ``most`` blocks beside each block."""
-    cells = np.stack(np.meshgrid(np.arange(grid), np.arange(grid), indexing="ij"), axis=-1)
+    cells = np.moveaxis(np.indices(size), 0, -1)
     home = np.argmin(((cells[:, :, None] - nodes) ** 2).sum(axis=-1), axis=-1)
     borders = np.zeros((len(nodes), len(nodes)), np.int64)
     for one, other in ((home[1:], home[:-1]), (home[:, 1:], home[:, :-1])):
@@ -63,24 +63,17 @@ def data_had(data, phases, phase, f):
 
 
 @inlined
-def may_charge(mission, phases, phase, f, x, y):
+def may_charge(to_zone, phases, phase, f, x, y):
     """Whether a UAV may charge after f flying slots."""
-    return phases.opens[phase] <= f <= phases.closes[phase] and _home(mission, x, y) == 0
+    return phases.opens[phase] <= f <= phases.closes[phase] and to_zone[x, y] == 0
 
 
 @inlined
-def _is_reached(mission, phases, phase, f, x, y):
-    """Whether a UAV can be in a cell after f flying slots: it has left the zone before them."""
+def is_reached(to_zone, phases, phase, f, x, y):
+    """Whether a UAV can be in a cell after f flying slots: it has left a zone before them."""
+    width, height = to_zone.shape
     radius = f if phase == 0 else f - phases.opens[0]
-    return _home(mission, x, y) <= radius
-
-
-@inlined
-def _home(mission, x, y):
-    """The cells from a cell to the zone, if no no-fly cell is in the way."""
-    east, south = mission.zone_x + mission.zone_width, mission.zone_y + mission.zone_height
-    along_x = max(mission.zone_x - x, x - east + 1, 0)
-    return along_x + max(mission.zone_y - y, y - south + 1, 0)
+    return 0 <= x < width and 0 <= y < height and to_zone[x, y] <= radius
 
 
 @inlined
@@ -134,11 +127,11 @@ def beginning(blocks, local, now, ahead, had, then_had, home, there, level, late
     return least + max(left - start, 0.0) * had[home], best
 
 
-def bound_paths(mission, phases, data, period, blocks, local, values, waiting, ceilings):
+def bound_paths(to_zone, phases, data, period, blocks, local, values, waiting, ceilings):
     """Bound what a UAV can earn from every state.
 
     Args:
-        mission: ``MISSION`` record with the constants of the scenario.
+        to_zone: (W, H) cells on the shortest way from each cell to the nearest charging zone.
         phases: ``Phases``.
         data: (T + 1, K) data [data units] that each node has had by the start of slot t.
         period: (T + 1,) period between cuts of slot t.
@@ -146,18 +139,18 @@ def bound_paths(mission, phases, data, period, blocks, local, values, waiting, c
         local: (K, Q) local prices, ascending; the first is 0.
         values: From ``step_values``.
         waiting: (T + 1,) what it costs a UAV that its last flying slot is not before slot t.
-        ceilings: (F + 1, P, M, M, J, Q) worth of the future per memory and local price,
+        ceilings: (F + 1, P, W, H, J, Q) worth of the future per memory and local price,
             overwritten where a UAV can be.
     """
     for f in range(len(ceilings) - 1, -1, -1):  # between two, a signal can end it
-        _bound_slot(f, mission, phases, data, period, blocks, local, values, waiting, ceilings)
+        _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting, ceilings)
 
 
 @kernel
-def _bound_slot(f, mission, phases, data, period, blocks, local, values, waiting, ceilings):
+def _bound_slot(f, to_zone, phases, data, period, blocks, local, values, waiting, ceilings):
     """Bound what a UAV can earn after f flying slots, from what it can earn after f + 1."""
-    slots, grid, levels = len(ceilings) - 1, len(blocks.home), len(blocks.levels)
-    begins = np.empty((5, grid, grid, levels, levels))
+    slots, levels, (width, height) = len(ceilings) - 1, len(blocks.levels), to_zone.shape
+    begins = np.empty((5, width, height, levels, levels))
     scratch = np.empty(local.shape[1]), np.empty(local.shape[1])
     for phase in range(len(phases.deadline) - 1, -1, -1):
         if phase > 0 and f < min(phases.opens[0], slots):
@@ -169,18 +162,18 @@ def _bound_slot(f, mission, phases, data, period, blocks, local, values, waiting
         had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
         if f < phases.deadline[phase]:
             gain, then = values[period[phases.clock[phase, f]]], ceilings[f + 1, phase]
-            _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
-            for x in range(grid):
-                for y in range(grid):
-                    if _is_reached(mission, phases, phase, f, x, y):
+            _begin(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins)
+            for x in range(width):
+                for y in range(height):
+                    if is_reached(to_zone, phases, phase, f, x, y):
                         _act(
-                            blocks, local, gain, then, had, then_had, begins, x, y, scratch,
-                            here[x, y],
+                            to_zone, phases, f, phase, blocks, local, gain, then, had, then_had,
+                            begins, x, y, scratch, here[x, y],
                         )  # fmt: skip
         target = phases.after[f]
-        for x in range(grid):
-            for y in range(grid):
-                if may_charge(mission, phases, phase, f, x, y):
+        for x in range(width):
+            for y in range(height):
+                if may_charge(to_zone, phases, phase, f, x, y):
                     new = data_had(data, phases, target, f) - had
                     _charge(blocks, local, new, ceilings[f, target, x, y], x, y, here[x, y])
 
@@ -198,17 +191,17 @@ def _charge(blocks, local, new, charged, x, y, here):
 
 
 @inlined
-def _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
+def _begin(to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins):
     """The least bounds of all steps into another block, per level of memory before and after."""
-    grid, levels = len(blocks.home), len(blocks.levels)
+    levels, (width, height) = len(blocks.levels), to_zone.shape
     for action in range(4):
-        for x in range(grid):
-            for y in range(grid):
+        for x in range(width):
+            for y in range(height):
                 x2, y2 = x + STEP_X[action], y + STEP_Y[action]
-                if not (0 <= x2 < grid and 0 <= y2 < grid):
+                if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
                     continue
                 home, there = blocks.home[x, y], blocks.home[x2, y2]
-                if there == home or not _is_reached(mission, phases, phase, f, x, y):
+                if there == home or not is_reached(to_zone, phases, phase, f, x, y):
                     continue
                 for level in range(levels):
                     for later in range(levels):
@@ -219,13 +212,15 @@ def _begin(mission, phases, f, phase, blocks, local, gain, then, had, then_had, 
 
 
 @inlined
-def _act(blocks, local, gain, then, had, then_had, begins, x, y, scratch, here):
+def _act(
+    to_zone, phases, f, phase, blocks, local, gain, then, had, then_had, begins, x, y, scratch, here
+):  # fmt: skip
     """Raise the ceilings of a state to what its actions can earn."""
-    grid, home, prices = len(blocks.home), blocks.home[x, y], local.shape[1]
+    home, prices = blocks.home[x, y], local.shape[1]
     line, least = scratch
     for action in range(5):
         x2, y2 = x + STEP_X[action], y + STEP_Y[action]
-        if not (0 <= x2 < grid and 0 <= y2 < grid):
+        if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
         there = blocks.home[x2, y2]
         for memory in range(len(here)):

@@ -24,6 +24,7 @@ from dess.channel import world_of
 from dess.code.kernels import kernel
 from dess.errors import InputError
 from dess.scenario import ScenarioSpace
+from dess.sea import chart
 from dess.state import sample_scenario, starts_of, state_of
 
 ITERATIONS = 20
@@ -73,13 +74,14 @@ class Bound:
 class Known(NamedTuple):
     """What is known of a mission before its first slot, arrivals included."""
 
-    record: np.ndarray
     starts: np.ndarray
     data: np.ndarray
     nodes: np.ndarray
     rates: np.ndarray
     below: np.ndarray
     phases: Phases
+    zones: np.ndarray
+    to_zone: np.ndarray
 
 
 def upper_bound(
@@ -106,19 +108,11 @@ def upper_bound(
 def check_scenario(scenario: ScenarioSpace) -> None:
     """Refuse a scenario whose missions have no bound.
 
-    No-fly cells are allowed: who may fly over them collects no less, so the bound stays valid.
-
     Raises:
-        InputError: If it has a section beyond the paper, several zones or a grid that is not
-            square, or if a bound takes too much memory.
+        InputError: If it has a section beyond the paper, or if a bound takes too much memory.
     """
     if scenario.is_extended:
         raise InputError("bound: the scenario has sections beyond the paper; allowed: none of them")
-    if scenario.rows or scenario.zones:
-        raise InputError(
-            "bound: the sea has several charging zones or is not square; allowed: one zone on a "
-            "square grid"
-        )
     memory = ceilings_memory(scenario, Detail())
     if memory > MOST_MEMORY:
         raise InputError(
@@ -133,13 +127,15 @@ def ceilings_memory(scenario: ScenarioSpace, detail: Detail) -> int:
     slots, near = most_flying(scenario), min(detail.near, max(len(scenario.nodes) - 1, 1))
     battery = scenario.flying_time[0], scenario.charge_start[1], scenario.charge_complete[0]
     phases = 2 + len(early_charges(slots, *battery)) if scenario.flight_cost else 1
-    return math.prod(_shape(slots, phases, scenario.grid, near, detail)) * np.dtype(float).itemsize
+    return math.prod(_shape(slots, phases, scenario.size, near, detail)) * np.dtype(float).itemsize
 
 
-def _shape(slots: int, phases: int, grid: int, near: int, detail: Detail) -> tuple[int, ...]:
+def _shape(
+    slots: int, phases: int, size: tuple[int, int], near: int, detail: Detail
+) -> tuple[int, ...]:
     """The shape of ``Bounds.ceilings``, with ``near`` blocks that can be remembered."""
     memories = 1 + near * (len(detail.levels) - 1)
-    return slots + 1, phases, grid, grid, memories, len(detail.local)
+    return slots + 1, phases, *size, memories, len(detail.local)
 
 
 def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
@@ -155,7 +151,10 @@ def known_of(scenario: ScenarioSpace, seed: int, replication: int) -> Known:
     points = POINTS if scenario.shadowing_variance > 0 else np.zeros(1)
     below = spread(points) if scenario.shadowing_variance > 0 else np.array([0.0, 1.0])
     rates = rates_of(record, world.mean_snr, points)
-    return Known(record, starts, data, world.nodes, rates, below, phases)
+    zones, cells = np.array(scenario.rectangles), world.chart.zones
+    ways = chart.spread(cells, world.chart.parking)[0].reshape(cells.shape)
+    to_zone = ways.T.astype(np.int64, order="C")
+    return Known(starts, data, world.nodes, rates, below, phases, zones, to_zone)
 
 
 @kernel
@@ -177,16 +176,16 @@ class Bounds:
 
     def __init__(self, known: Known, detail: Detail):
         self.known = known
-        grid, slots, phases = int(known.record["grid"]), *known.phases.clock.shape[::-1]
-        self.blocks = blocks_of(known.nodes, grid, detail.near, np.array(detail.levels))
+        size, (phases, slots) = known.to_zone.shape, known.phases.clock.shape
+        self.blocks = blocks_of(known.nodes, size, detail.near, np.array(detail.levels))
         self.parts = np.array(detail.local)
         last = int(known.phases.clock.max())
         inner = np.array([int(part * last) for part in detail.cuts], np.int64)
         self.cuts = np.append(inner, last)
         times = np.arange(len(known.data))
         self.period = np.searchsorted(inner, times)
-        self.values = np.empty((len(self.cuts), 5, grid, grid, len(self.parts)))
-        self.ceilings = np.empty(_shape(slots, phases, grid, self.blocks.near.shape[1], detail))
+        self.values = np.empty((len(self.cuts), 5, *size, len(self.parts)))
+        self.ceilings = np.empty(_shape(slots, phases, size, self.blocks.near.shape[1], detail))
 
     def at(self, prices: np.ndarray) -> tuple[float, np.ndarray]:
         """The bound at prices (S, K), as a share of all data, and its derivatives (S, K)."""
@@ -197,7 +196,7 @@ class Bounds:
         waiting = ((1.0 - prices[-1]) * data).sum(axis=1) / team
         service = (known.nodes, known.rates, known.below)
         step_values(worth, local, known.nodes, self.blocks.home, *service[1:], self.values)
-        before = (known.record, known.phases, data, self.period, self.blocks, local)
+        before = (known.to_zone, known.phases, data, self.period, self.blocks, local)
         bound_paths(*before, self.values, waiting, self.ceilings)
         bound = total + (prices[:-1] * data[cuts]).sum()
         slope, takings = np.zeros(prices.shape), np.zeros(prices.shape)
@@ -228,11 +227,9 @@ def improve(known: Known, iterations: int, detail: Detail) -> Bound:
 
 
 def _first_prices(known: Known, shape: tuple[int, int]) -> np.ndarray:
-    """High prices near the zone, where data are easy to fetch, and low ones far away."""
-    record = known.record
-    corner = np.array([record["zone_x"], record["zone_y"]])
-    centre = corner + np.array([record["zone_width"], record["zone_height"]]) / 2
-    distance = np.abs(known.nodes - centre).sum(axis=1)
+    """High prices near a zone, where data are easy to fetch, and low ones far away."""
+    centres = known.zones[:, :2] + known.zones[:, 2:] / 2
+    distance = np.abs(known.nodes[:, None] - centres).sum(axis=-1).min(axis=-1)
     prices = np.zeros(shape)
     prices[-1] = 1.0 - (1.0 - (1.0 - distance / (distance.max() + 1)) ** 2) / len(known.starts) ** 2
     return prices

@@ -143,10 +143,10 @@ def step_values(worth, local, nodes, block, rates, below, values):
         worth: (S, K) worth of a data unit of each node, per period between cuts.
         local: (K, Q) local prices of a node while it is the home node.
         nodes: (K, 2) cells of the nodes.
-        block: (M, M) home node of each cell ``x, y``.
+        block: (W, H) home node of each cell ``x, y``.
         rates: From ``rates_of``.
         below: (J + 1,) From ``spread``.
-        values: (S, 5, M, M, Q) worth of the step with an action to a cell ``x, y``, overwritten.
+        values: (S, 5, W, H, Q) worth of the step with an action to a cell ``x, y``, overwritten.
     """
     values[:] = 0.0
     for of_period, values_of_period in zip(worth, values, strict=True):
@@ -157,24 +157,24 @@ def step_values(worth, local, nodes, block, rates, below, values):
 @kernel
 def _row_values(x, worth, local, nodes, block, rates, below, values):
     """Add to ``values`` what hovering in the cells of row ``x`` and flying from there is worth."""
-    grid, count, levels = len(block), len(nodes), rates.shape[2]
-    m = (rates.shape[1] - 1) // (grid - 1)
+    (width, height), count, levels = block.shape, len(nodes), rates.shape[2]
+    m = (rates.shape[1] - 1) // (rates.shape[0] - 1)
     scratch = (
         np.empty((count, levels)), np.empty(count * levels + 1), np.empty(count * levels + 1),
         np.empty(count * levels + 1, np.int64), np.empty(count, np.int64),
         np.empty(count, np.int64),
     )  # fmt: skip
-    for y in range(grid):
+    for y in range(height):
         cell = values[HOVER, x, y]
         _place_values(x, y, 0, True, block[x, y], worth, local, nodes, rates,
                       below, scratch, cell)  # fmt: skip
         for action in range(4):
             values[action, x, y] += cell
         cell *= m
-    for y in range(grid):
+    for y in range(height):
         for along_x in (True, False):
             x2, y2 = x + along_x, y + (not along_x)
-            if x2 == grid or y2 == grid:
+            if x2 == width or y2 == height:
                 continue
             there, back = (EAST, WEST) if along_x else (SOUTH, NORTH)
             between = np.zeros((2, local.shape[1]))

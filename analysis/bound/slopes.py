@@ -10,6 +10,7 @@ from analysis.bound.paths import (
     STOP,
     beginning,
     data_had,
+    is_reached,
     last_slot,
     may_charge,
     memory_of,
@@ -47,7 +48,7 @@ def _leave(blocks, local, now, ahead, had, then_had, home, there, level, q):
 
 @kernel
 def _choose(
-    mission, phases, data, period, blocks, local, values, waiting, ceilings,
+    to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
     f, phase, x, y, memory, q,
 ):  # fmt: skip
     """What determines the ceiling of a state: the choice, its local price, the level kept."""
@@ -56,7 +57,7 @@ def _choose(
     had, then_had = data_had(data, phases, phase, f), data_had(data, phases, phase, f + 1)
     most = -waiting[last_slot(phases, phase, f, len(waiting) - 1)]
     choice, line, later = STOP, q, 0
-    if may_charge(mission, phases, phase, f, x, y):
+    if may_charge(to_zone, phases, phase, f, x, y):
         new = data_had(data, phases, phases.after[f], f) - had
         value = ceilings[f, phases.after[f], x, y, memory, q] + local[home, q] * new[home]
         if memory > 0:
@@ -68,7 +69,7 @@ def _choose(
     s = period[phases.clock[phase, f]]
     for action in range(5):
         x2, y2 = x + STEP_X[action], y + STEP_Y[action]
-        if not (0 <= x2 < len(blocks.home) and 0 <= y2 < len(blocks.home)):
+        if not is_reached(to_zone, phases, phase, f + 1, x2, y2):
             continue
         there, now, ahead = blocks.home[x2, y2], values[s, action, x2, y2], ceilings[f + 1, phase]
         if there == home:
@@ -88,13 +89,13 @@ def _choose(
 
 @kernel
 def add_slopes(
-    mission, phases, data, period, blocks, local, parts, values, waiting, ceilings,
+    to_zone, phases, data, period, blocks, local, parts, values, waiting, ceilings,
     x, y, worth, nodes, rates, below, slopes,
 ):  # fmt: skip
     """Add the derivatives of the bound of a UAV that starts at ``x, y``.
 
     Args:
-        mission, phases, data, period, blocks, local, values, waiting, ceilings: As in
+        to_zone, phases, data, period, blocks, local, values, waiting, ceilings: As in
             ``bound_paths``.
         parts: (Q,) the local prices as parts of the worth in the last period.
         x, y: Start cell.
@@ -113,7 +114,7 @@ def add_slopes(
     takings = np.empty(len(nodes))
     while f < len(ceilings) - 1:
         choice, line, later = _choose(
-            mission, phases, data, period, blocks, local, values, waiting, ceilings,
+            to_zone, phases, data, period, blocks, local, values, waiting, ceilings,
             f, phase, x, y, memory, q,
         )  # fmt: skip
         if choice == STOP:

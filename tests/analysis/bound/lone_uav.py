@@ -18,7 +18,7 @@ def bound_of_data(space: ScenarioSpace, seed: int) -> float:
     bounds.at(np.zeros((1, len(known.nodes))))  # sets the worth of the steps
     local = np.tile(bounds.parts, (len(known.nodes), 1))
     bound_paths(
-        known.record, known.phases, known.data, bounds.period, bounds.blocks, local,
+        known.to_zone, known.phases, known.data, bounds.period, bounds.blocks, local,
         bounds.values, np.zeros(len(known.data)), bounds.ceilings,
     )  # fmt: skip
     x, y = known.starts[0]

@@ -12,7 +12,7 @@ from tests.analysis.bound.lone_uav import bound_of_data
 
 def test_the_block_before_is_a_neighbour() -> None:
     nodes = np.array([[1, 1], [4, 1], [1, 4]])
-    blocks = blocks_of(nodes, 6, 4, np.array([0, 2]))
+    blocks = blocks_of(nodes, (6, 6), 4, np.array([0, 2]))
     assert blocks.home[0, 0] == 0
     assert blocks.home[5, 0] == 1
     assert {*blocks.near[0]} - {-1} == {1, 2}

@@ -182,7 +182,7 @@ class TinySea:
         nodes, count = len(space.nodes), len(values)
         offset = space.cell_size * (np.array(space.nodes) - (x, y))
         distance = np.sqrt((offset**2).sum(axis=1) + space.altitude**2)
-        edge = space.cell_size * space.grid / np.sqrt(2)
+        edge = space.cell_size * np.hypot(*space.size) / 2
         mean = space.edge_snr - 10 * space.path_loss_exponent * np.log10(distance / edge)
         snr = mean[:, None] + np.sqrt(space.shadowing_variance) * values
         rates = np.zeros((nodes * count + 1, nodes))
