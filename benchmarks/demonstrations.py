@@ -3,11 +3,11 @@
     python -m benchmarks.demonstrations --out runs/any
 
 A planner flies missions on the seas of the set ``train``, and another policy makes a share of the
-decisions, so that the planner also shows how to go on from there. In the first round that policy is
-random; then it is the network that has learned from the first round (S. Ross et al., *A reduction of
-imitation learning and structured prediction to no-regret online learning*, 2011). A network on sets
-learns the decisions of both rounds by cross entropy. The folder is a policy. The examples are kept in
-``OUT-examples``, so a run that was cut off goes on from there.
+decisions, so that the planner also shows how to go on from there. In the first round that policy
+is random; then it is the network that has learned from the first round (S. Ross et al., *A
+reduction of imitation learning and structured prediction to no-regret online learning*, 2011). A
+network on sets learns the decisions of both rounds by cross entropy. The folder is a policy. The
+examples are kept in ``OUT-examples``, so a run that was cut off goes on from there.
 """
 
 import argparse
@@ -57,7 +57,7 @@ ROUNDS = (Round(80, (0.03, 0.2), 4000), Round(120, (0.5, 0.9), 20_000))
 TEACHERS = {"large": LongPlanner}
 PARTS = 8  # seas of a minibatch
 BATCH = 512
-NEIGHBOURS = 0.1  # share of the seas, alike in the number of nodes, that a minibatch is drawn from
+NEIGHBOURS = 0.1  # share of the seas, near in the number of nodes, that a minibatch is of
 RATES = (2e-3, 2e-5)  # learning rates of the first and the last update
 VALUE = 12.5  # of all states: about what a mission is worth from its beginning
 
@@ -80,7 +80,7 @@ class Examples(NamedTuple):
 
 
 class Demonstrator:
-    """The planner, of whose decisions another policy makes some, and a record of what it decides."""
+    """The planner, with some decisions of another policy, and a record of what it decides."""
 
     name = "demonstrator"
 

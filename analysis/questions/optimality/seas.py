@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis import numbers
-from analysis.names import PRODUCT
+from analysis.names import BOUND, PRODUCT, SUCCESS
 from analysis.questions.decision_times import Times
 from analysis.results.tables import Results
 from analysis.stats.differences import column_tests
@@ -25,6 +25,7 @@ from dess.scenario import SEA
 # Groups of seas by their number of nodes: the largest number of each but the last.
 _NODES = (15, 30, 60)
 ALL = "all"
+REFERENCES = ("planner", "planner-long")  # the slow policies that others are compared with
 GROUPS = {"family": "Family", "nodes": "Nodes", "uavs": "UAVs"}
 
 
@@ -110,6 +111,25 @@ def front(results: Results, times: Times) -> pd.DataFrame:
     table = table.assign(seconds=table["policy"].map(seconds)).dropna()
     table = table.sort_values("seconds", ignore_index=True)
     return table.assign(on_front=on_front(table["seconds"].to_numpy(), table["mean"].to_numpy()))
+
+
+def summary(results: Results, times: Times) -> pd.DataFrame:
+    """Every policy over all seas, as a table of text: quality, as a share of others, and time.
+
+    The bound counts in the missions in which it is below 100 %, if the study has bounds.
+    """
+    means = {m: quality(results, metric=m).set_index("policy")["mean"] for m in (SUCCESS, PRODUCT)}
+    columns = {"Success": means[SUCCESS], "Product": means[PRODUCT]}
+    for reference in REFERENCES:
+        if reference in results.policies:
+            share = shares(results, reference).set_index("policy")["mean"]
+            columns[f"Of {reference}"] = share
+    if BOUND in results.missions:
+        says = results.missions[results.missions[BOUND] < 1.0].groupby("policy")
+        columns["Of the bound"] = says[PRODUCT].sum() / says[BOUND].sum()
+    table = pd.DataFrame(columns).loc[results.policies].map(numbers.percent)
+    seconds = {cost.policy: numbers.seconds(cost.batch) for cost in times.costs if cost.batch}
+    return table.assign(Decision=table.index.map(seconds)).fillna("").reset_index(names="Policy")
 
 
 def worst(results: Results, policy: str, reference: str, count: int = 8) -> pd.DataFrame:

@@ -82,6 +82,12 @@ html.table(
 # ## Tables
 
 # %%
+html.table(
+    seas.summary(study, times),
+    "Every policy over all seas, and the time of a decision in batches on one core",
+)
+
+# %%
 for by, name in seas.GROUPS.items():
     rows = seas.quality(study, by)
     html.table(
@@ -105,9 +111,6 @@ html.table(
     f"Points of the product more than {baseline}, paired, with 95 % intervals",
     data=differences,
 )
-
-# %%
-html.table(decision_times.listed(times), "Time of a decision")
 
 # %% [markdown]
 # ## How this page was made

@@ -1,12 +1,13 @@
 """What policies reach on many seas, where a sea counts once."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from analysis import load_results, run_study
-from analysis.names import PRODUCT, SUCCESS
+from analysis import load_results, numbers, run_study
+from analysis.names import BOUND, PRODUCT, SUCCESS
 from analysis.questions.decision_times import Cost, Times
 from analysis.questions.optimality import seas
 from analysis.results.tables import Results
@@ -68,6 +69,22 @@ def test_the_answer_names_share_time_and_gain(results: Results) -> None:
     assert "On 4 unseen seas, nearest reaches" in text
     assert "in 1/4 of its time" in text
     assert [*seas.front(results, times)["policy"]] == ["nearest", "greedy"]
+
+
+def test_the_summary_has_shares_of_references_and_of_bounds_below_one(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a mission whose bound is 100 %, a share of it would say nothing."""
+    monkeypatch.setattr(seas, "REFERENCES", ("nearest", "planner"))
+    costs = [Cost(policy="greedy", calls=1, median=1, slow=1, batch=2.0)]
+    bounded = np.where(results.missions["point"] == 1, 0.9, 1.0)
+    with_bounds = replace(results, missions=results.missions.assign(**{BOUND: bounded}))
+    table = seas.summary(with_bounds, Times(processor="x", costs=costs)).set_index("Policy")
+    known = of_sea(results, "greedy")[1] / 0.9
+    assert table.loc["greedy", "Of the bound"] == numbers.percent(known)
+    assert table.loc["nearest", "Of nearest"] == numbers.percent(1.0)
+    assert table["Decision"].tolist() == [numbers.seconds(2.0), ""]
+    assert "Of planner" not in table
 
 
 def test_a_study_of_one_sea_is_refused(tmp_path: Path) -> None:
