@@ -45,14 +45,21 @@ class Round(NamedTuple):
         seas: How many seas of each family, of the set ``train`` in order.
         deviations: The share of decisions that the other policy makes, in each mission of a sea.
         updates: The updates by which a network learns from this round and those before.
+        fields: Fields of the scenarios that are changed.
     """
 
     seas: int
     deviations: tuple[float, ...]
     updates: int
+    fields: dict[str, Any] = {}
 
 
-ROUNDS = (Round(80, (0.03, 0.2), 4000), Round(120, (0.5, 0.9), 20_000))
+# Seas have data for their number of UAVs; on those of the last round there may be too many or few.
+ROUNDS = (
+    Round(80, (0.03, 0.2), 4000),
+    Round(120, (0.5, 0.9), 20_000),
+    Round(100, (0.2, 0.7), 20_000, {"uavs": [1, 4]}),
+)
 # On the largest seas a longer search finds clearly better plans.
 TEACHERS = {"large": LongPlanner}
 PARTS = 8  # seas of a minibatch
@@ -105,18 +112,18 @@ class Demonstrator:
         return np.where(allowed, self.generator.random(allowed.shape), -1.0).argmax(1)
 
 
-def examples_on(name: str, deviations: Sequence[float], weights: Path | None) -> Examples:
+def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     """What the planner shows in a mission per share of deviations, where it had a choice."""
     torch.set_num_threads(1)
-    space, (family, _, seed) = load_scenario(name), name.partition(":")
+    space, (family, _, seed) = load_scenario(name, **kind.fields), name.partition(":")
     other = None
     if weights:
         network = _network(load_config("any"))
         network.load_state_dict(torch.load(weights))
         other = DDQN("other", Sets, network, True, None)
     planner = TEACHERS.get(family, Planner)()
-    demonstrator = Demonstrator(planner, deviations, other, int(seed))
-    simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(deviations))
+    demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
+    simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))
     *parts, labels = (np.concatenate(arrays) for arrays in zip(*demonstrator.seen, strict=True))
     states = CompactStates(*parts)
     rows, uavs = np.nonzero(labels >= 0)
@@ -134,7 +141,7 @@ def recorded(folder: Path, names: Sequence[str], kind: Round, weights: Path | No
     missing = [place for place in zip(names, paths, strict=True) if not place[1].exists()]
     with ProcessPoolExecutor() as workers:
         made = workers.map(
-            partial(examples_on, deviations=kind.deviations, weights=weights),
+            partial(examples_on, kind=kind, weights=weights),
             [name for name, _ in missing],
         )
         for (_, path), examples in zip(missing, tqdm(made, total=len(missing)), strict=True):

@@ -25,7 +25,7 @@ from dess.sea.terrain import Draws, grow_island, make_coast, make_islands, make_
 MOST_SEED = 10**9 - 1
 
 # The seeds of each set of seas, for every family. Seeds below 1000 are for examples.
-SETS = {"train": range(1000, 1200), "validation": range(2000, 2010), "test": range(3000, 3060)}
+SETS = {"train": range(1000, 1300), "validation": range(2000, 2010), "test": range(3000, 3060)}
 
 # The least battery of a charged UAV, and that on seas of more rows and columns together than these.
 _LEAST, _LEAST_FAR, _FAR = 60, 80, 80

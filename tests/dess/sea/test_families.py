@@ -80,7 +80,7 @@ def test_a_sea_depends_on_its_name_alone() -> None:
 
 
 def test_sets_are_disjoint_and_have_seas_of_each_family() -> None:
-    sizes = {"train": 200, "validation": 10, "test": 60}
+    sizes = {"train": 300, "validation": 10, "test": 60}
     drawn = {name: seas_of(name) for name in sizes}
     for name, size in sizes.items():
         assert len(drawn[name]) == size * len(FAMILIES)
