@@ -4,9 +4,9 @@
 
 A planner flies missions on the seas of the set ``train``, and another policy makes a share of the
 decisions, so that the planner also shows how to go on from there. In the first round that policy
-is random; then it is the network that has learned from the first round (S. Ross et al., *A
+is random; then it is the network that has learned from the rounds before (S. Ross et al., *A
 reduction of imitation learning and structured prediction to no-regret online learning*, 2011). A
-network on sets learns the decisions of both rounds by cross entropy. The folder is a policy. The
+network on sets learns the decisions of all rounds by cross entropy. The folder is a policy. The
 examples are kept in ``OUT-examples``, so a run that was cut off goes on from there.
 """
 
@@ -45,20 +45,20 @@ class Round(NamedTuple):
         seas: How many seas of each family, of the set ``train`` in order.
         deviations: The share of decisions that the other policy makes, in each mission of a sea.
         updates: The updates by which a network learns from this round and those before.
-        fields: Fields of the scenarios that are changed.
+        any_team: Whether a mission has from one UAV to one more than its sea has data for,
+            if the zone has room for it.
     """
 
     seas: int
     deviations: tuple[float, ...]
     updates: int
-    fields: dict[str, Any] = {}
+    any_team: bool
 
 
-# Seas have data for their number of UAVs; on those of the last round there may be too many or few.
 ROUNDS = (
-    Round(80, (0.03, 0.2), 4000),
-    Round(120, (0.5, 0.9), 20_000),
-    Round(100, (0.2, 0.7), 20_000, {"uavs": [1, 4]}),
+    Round(80, (0.03, 0.2), 4000, any_team=False),
+    Round(120, (0.5, 0.9), 4000, any_team=True),
+    Round(100, (0.2, 0.7), 26_000, any_team=True),
 )
 # On the largest seas a longer search finds clearly better plans.
 TEACHERS = {"large": LongPlanner}
@@ -115,12 +115,13 @@ class Demonstrator:
 def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     """What the planner shows in a mission per share of deviations, where it had a choice."""
     torch.set_num_threads(1)
-    space, (family, _, seed) = load_scenario(name, **kind.fields), name.partition(":")
+    space, (family, _, seed) = load_scenario(name), name.partition(":")
+    if kind.any_team:
+        room = space.zone[2] * space.zone[3]
+        space = load_scenario(name, uavs=[1, min(space.uavs[1] + 1, room)])
     other = None
     if weights:
-        network = _network(load_config("any"))
-        network.load_state_dict(torch.load(weights))
-        other = DDQN("other", Sets, network, True, None)
+        other = DDQN("other", Sets, _network(load_config("any"), weights), True, None)
     planner = TEACHERS.get(family, Planner)()
     demonstrator = Demonstrator(planner, kind.deviations, other, int(seed))
     simulate_batch(space, demonstrator, MISSION_SEED + int(seed), len(kind.deviations))
@@ -151,12 +152,14 @@ def recorded(folder: Path, names: Sequence[str], kind: Round, weights: Path | No
     return paths
 
 
-def imitate(config: TrainingConfig, shown: list[Examples], updates: int) -> dict[str, Any]:
-    """The weights of a network that has learned the decisions."""
+def imitate(
+    config: TrainingConfig, shown: list[Examples], updates: int, weights: Path | None
+) -> dict[str, Any]:
+    """The weights of a network that has learned the decisions, from weights of a round before."""
     torch.manual_seed(config.seed)
     torch.set_num_threads(1)
     generator = np.random.default_rng(config.seed)
-    network = _network(config)
+    network = _network(config, weights)
     learner = Learner(network, Sets, config, torch.device("cpu"))
     assert learner.average is not None
     shown = sorted(shown, key=lambda examples: len(examples.encoder.sea.nodes))
@@ -183,14 +186,17 @@ def imitate(config: TrainingConfig, shown: list[Examples], updates: int) -> dict
         learner.optimizer.step()
         rate = max(config.average_rate, 1 / (update + 1))
         torch._foreach_lerp_([*learner.average.parameters()], [*network.parameters()], rate)
-    weights = learner.average.state_dict()
-    weights["value.weight"] *= 0.0  # it has learned no values
-    weights["value.bias"][:] = VALUE
-    return weights
+    learned = learner.average.state_dict()
+    learned["value.weight"] *= 0.0  # it has learned no values
+    learned["value.bias"][:] = VALUE
+    return learned
 
 
-def _network(config: TrainingConfig) -> SetNetwork:
-    return SetNetwork(Sets.shapes, config.hidden)
+def _network(config: TrainingConfig, weights: Path | None) -> SetNetwork:
+    network = SetNetwork(Sets.shapes, config.hidden)
+    if weights:
+        network.load_state_dict(torch.load(weights))
+    return network
 
 
 def main() -> None:
@@ -208,9 +214,10 @@ def main() -> None:
         paths += recorded(folder, names, kind, weights)
         shown = [pickle.loads(path.read_bytes()) for path in paths]
         print(f"{len(shown)} seas, {sum(len(e.rows) for e in shown):,} decisions")
-        weights = folder / "weights.pt"
-        if not weights.exists():
-            torch.save(imitate(config, shown, kind.updates), weights)
+        learned = folder / "weights.pt"
+        if not learned.exists():
+            torch.save(imitate(config, shown, kind.updates, weights), learned)
+        weights = learned
     save_policy(options.out, torch.load(weights), config, config.space)
 
 
