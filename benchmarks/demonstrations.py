@@ -45,20 +45,19 @@ class Round(NamedTuple):
         seas: How many seas of each family, of the set ``train`` in order.
         deviations: The share of decisions that the other policy makes, in each mission of a sea.
         updates: The updates by which a network learns from this round and those before.
-        any_team: Whether a mission has from one UAV to one more than its sea has data for,
-            if the zone has room for it.
+        team: The fewest and the most UAVs of a mission, beyond the most that its sea has data for.
     """
 
     seas: int
     deviations: tuple[float, ...]
     updates: int
-    any_team: bool
+    team: tuple[int, int]
 
 
 ROUNDS = (
-    Round(80, (0.03, 0.2), 4000, any_team=False),
-    Round(120, (0.5, 0.9), 4000, any_team=True),
-    Round(100, (0.2, 0.7), 26_000, any_team=True),
+    Round(80, (0.03, 0.2), 4000, (-1, 0)),
+    Round(120, (0.5, 0.9), 4000, (-5, 1)),
+    Round(100, (0.2, 0.7), 26_000, (-5, 1)),
 )
 # On the largest seas a longer search finds clearly better plans.
 TEACHERS = {"large": LongPlanner}
@@ -116,9 +115,9 @@ def examples_on(name: str, kind: Round, weights: Path | None) -> Examples:
     """What the planner shows in a mission per share of deviations, where it had a choice."""
     torch.set_num_threads(1)
     space, (family, _, seed) = load_scenario(name), name.partition(":")
-    if kind.any_team:
-        room = space.zone[2] * space.zone[3]
-        space = load_scenario(name, uavs=[1, min(space.uavs[1] + 1, room)])
+    room = space.zone[2] * space.zone[3]
+    uavs = [min(max(space.uavs[1] + more, 1), room) for more in kind.team]
+    space = load_scenario(name, uavs=uavs)
     other = None
     if weights:
         other = DDQN("other", Sets, _network(load_config("any"), weights), True, None)
