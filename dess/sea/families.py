@@ -190,7 +190,7 @@ def _cells(mask: np.ndarray) -> list[Cell]:
 # --- a sea with its zones, nodes and limits ---
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def _fields_of(name: str, seed: int) -> dict[str, Any]:
     family = FAMILIES[name]
     for attempt in count():

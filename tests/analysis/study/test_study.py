@@ -16,14 +16,14 @@ REPEATED = ("ddqn-2", "ddqn-3", "any")
 
 
 def test_the_shipped_studies():
-    names = study_names()
-    assert [load_study(name).name for name in names] == names
-    kinds = {load_study(name).design.kind for name in names if load_study(name).design}
+    studies = {name: load_study(name) for name in study_names()}
+    assert [study.name for study in studies.values()] == [*studies]
+    kinds = {study.design.kind for study in studies.values() if study.design}
     assert kinds == {"grid", "one-at-a-time", "seas", "latin-hypercube", "saltelli"}
-    assert any(load_study(name).precision for name in names)
-    rules = [load_study(name).selection for name in names]
+    assert any(study.precision for study in studies.values())
+    rules = [study.selection for study in studies.values()]
     assert {rule.procedure for rule in rules if rule} == {"kn", "kn-bounded"}
-    table4, fig4 = load_study("table4"), load_study("fig4")
+    table4, fig4 = studies["table4"], studies["fig4"]
     assert (table4.scenario, table4.missions, table4.seed) == ("paper", 1000, 2022)
     assert [point.scenario.uavs for point in fig4.points] == [(1, 1), (2, 2), (3, 3)]
 
