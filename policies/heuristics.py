@@ -138,28 +138,32 @@ def _decide(
     kind, missions, uavs, residual, sensors, nodes, circuit, chart, reach, rows_mission, rows_uav
 ):  # fmt: skip
     actions = np.empty(len(rows_mission), np.int64)
-    taken = np.empty(len(chart.parking), np.bool_)
+    memory = guard.parking_memory(chart, uavs.shape[1])
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         actions[row] = _action(
             kind, missions[b], uavs[b], i, residual[b], sensors[b], nodes, circuit, chart, reach,
-            taken,
+            memory,
         )  # fmt: skip
     return actions
 
 
 @inlined
-def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach, taken):
-    """The action of UAV ``i``; ``taken`` is working memory."""
+def _action(kind, mission, team, i, data, sensors, nodes, circuit, chart, reach, memory):
+    """The action of UAV ``i``; ``memory`` is that of its parking cell."""
     u = team[i]
     charge = guard.must_charge(mission, u, data_left(mission, data))
-    home_x, home_y = u.x, u.y
+    home_x, home_y, wait = u.x, u.y, 0
     if charge:
-        home_x, home_y, _ = guard.parking_cell(mission, team, i, chart, taken)
-    safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, reach)
+        home_x, home_y, _, wait = guard.parking_cell(mission, team, i, chart, memory)
+    safe = guard.safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
+    spare = guard.slots_needed(mission, u)
+    if charge:
+        spare = u.battery - 1 - guard.margin(mission, u) - wait
     node = _goal(
-        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, reach
-    )
+        kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y,
+        spare, reach,
+    )  # fmt: skip
     if node >= 0:
         home_x, home_y = nodes[node, 0], nodes[node, 1]
     return step_towards(mission, team, i, chart, safe, home_x, home_y)
@@ -183,14 +187,11 @@ def step_towards(mission, team, i, chart, safe, goal_x, goal_y):
 
 @inlined
 def _goal(
-    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, reach
+    kind, mission, team, i, data, sensors, nodes, circuit, chart, charge, home_x, home_y, spare,
+    reach,
 ):  # fmt: skip
-    """The goal of UAV ``i``: the best node within its reach, or -1 if there is none."""
+    """The goal of UAV ``i``: the best node for which it has battery to spare, or -1."""
     u = team[i]
-    spare = guard.slots_needed(mission, u)
-    if charge:
-        waiting = guard.waiting_time(mission, team, i, chart, home_x, home_y)
-        spare = u.battery - 1 - guard.margin(mission, u) - waiting
     worth = _WORTH * 0.5 * (mission.initial_low + mission.initial_high)
     best, node = 0.0, -1
     for k in range(mission.nodes):

@@ -49,8 +49,8 @@ def must_charge(mission, u, data):
 
 
 @kernel
-def waiting_time(mission, uavs, i, chart, home_x, home_y):
-    return guard.waiting_time(mission, uavs, i, chart, home_x, home_y)
+def path(mission, uavs, i, chart, x, y):
+    return guard.path_length(mission, uavs, i, chart, uavs[i].x, uavs[i].y, x, y)
 
 
 @kernel
@@ -65,17 +65,21 @@ def distances(chart, x, y, to):
 
 @kernel
 def parking_cell(mission, uavs, i, chart):
-    return guard.parking_cell(mission, uavs, i, chart, np.empty(len(chart.parking), np.bool_))
+    return guard.parking_cell(mission, uavs, i, chart, guard.parking_memory(chart, len(uavs)))
 
 
 @kernel
 def goal(kind, mission, uavs, i, residual, sensors, nodes, chart, reach):
     """The node that a heuristic chooses, and the way there."""
     charge = guard.must_charge(mission, uavs[i], rules.data_left(mission, residual))
-    home_x, home_y, _ = parking_cell(mission, uavs, i, chart)
+    home_x, home_y, _, wait = parking_cell(mission, uavs, i, chart)
+    u = uavs[i]
+    spare = guard.slots_needed(mission, u)
+    if charge:
+        spare = u.battery - 1 - guard.margin(mission, u) - wait
     node = heuristics._goal(
         kind, mission, uavs, i, residual, sensors, nodes, np.zeros(0, np.int64), chart, charge,
-        home_x, home_y, reach,
+        home_x, home_y, spare, reach,
     )  # fmt: skip
     return node
 

@@ -10,9 +10,12 @@ mission; ``chart`` is a ``dess.sea.chart.Chart``, ``reach`` the table of
 ``dess.observations.reach``.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from dess.code.kernels import inlined, kernel
+from dess.constants import MOST_ZONES
 from dess.observations.reach import reach_of
 from dess.rules import data_left, flies
 from dess.sea.chart import distance, distance_home, in_zone, is_open, length_around
@@ -80,68 +83,86 @@ def is_parked(u):
 
 @inlined
 def path_length(mission, uavs, i, chart, x, y, to_x, to_y):
-    """Cells that UAV ``i`` flies from one to another, with a detour around a parked teammate.
-
-    Without no-fly cells, a way that does not follow a line has others of the same length.
-    """
-    if chart.ways.size > 0:
-        return _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y)
-    length = distance(chart, x, y, to_x, to_y)
-    if x == to_x or y == to_y:
-        for j in range(mission.uavs):
-            o = uavs[j]
-            if j != i and is_parked(o):
-                before = distance(chart, x, y, o.x, o.y)
-                if before + distance(chart, o.x, o.y, to_x, to_y) == length:
-                    return length + 2
-    return length
+    """Cells that UAV ``i`` flies from one to another, with a detour around parked teammates."""
+    length, parked = distance(chart, x, y, to_x, to_y), 0
+    for j in range(mission.uavs):
+        o = uavs[j]
+        if j != i and is_parked(o):
+            before = distance(chart, x, y, o.x, o.y)
+            parked += before + distance(chart, o.x, o.y, to_x, to_y) == length
+    if parked == 0:
+        return length
+    if parked == 1 and chart.ways.size == 0:
+        # without no-fly cells, a way that does not follow a line has others of the same length
+        return length + 2 if x == to_x or y == to_y else length
+    return _length_around(mission, uavs, i, chart, x, y, to_x, to_y)
 
 
 @kernel
-def _length_by_islands(mission, uavs, i, chart, x, y, to_x, to_y):
-    """``path_length`` where there are no-fly cells: the way around all parked teammates.
+def _length_around(mission, uavs, i, chart, x, y, to_x, to_y):
+    """The way around all parked teammates.
 
     Or, if that is shorter, the way through and the time that a teammate charges in it.
     """
-    length, width = distance(chart, x, y, to_x, to_y), chart.zones.shape[1]
-    closed, count, is_met = np.empty(mission.uavs, np.int64), 0, False
+    width = chart.zones.shape[1]
+    closed, count = np.empty(mission.uavs, np.int64), 0
     for j in range(mission.uavs):
         o = uavs[j]
         if j != i and is_parked(o) and not (o.x == to_x and o.y == to_y):
             closed[count] = o.y * width + o.x
             count += 1
-            before = distance(chart, x, y, o.x, o.y)
-            is_met |= before + distance(chart, o.x, o.y, to_x, to_y) == length
-    if not is_met:
-        return length
     around = length_around(chart.zones, closed[:count], x, y, to_x, to_y)
     lacking = mission.charge_complete - mission.charge_start
-    return min(around, length + (lacking + mission.charge_rate - 1) // mission.charge_rate)
+    through = distance(chart, x, y, to_x, to_y)
+    return min(around, through + (lacking + mission.charge_rate - 1) // mission.charge_rate)
+
+
+class Parking(NamedTuple):
+    """Working memory of ``parking_cell``.
+
+    Attributes:
+        taken: (zone cells,) whether a teammate takes the cell.
+        free: (Z, I) in how many slots each pad of a zone will be free, at most I pads.
+    """
+
+    taken: np.ndarray
+    free: np.ndarray
 
 
 @kernel
-def parking_cell(mission, uavs, i, chart, taken):
-    """The zone cell where UAV ``i`` will charge: the nearest one that no teammate takes.
+def parking_memory(chart, uavs):
+    """Working memory for missions with so many UAVs."""
+    return Parking(np.empty(len(chart.parking), np.bool_), np.empty((MOST_ZONES, uavs), np.int64))
 
-    Teammates in a zone keep their cells. The other UAVs choose one after another, the lowest
-    battery first (ties in index order), so that no two UAVs fly to the same cell.
+
+@kernel
+def parking_cell(mission, uavs, i, chart, memory):
+    """The zone cell where UAV ``i`` will charge: of those that no teammate takes, the soonest.
+
+    Teammates in a zone keep their cells, and their pads if they have asked for one. The other UAVs
+    choose one after another, the lowest battery first (ties in index order), so that no two UAVs
+    fly to the same cell. Each chooses the cell where it gets a pad first, the nearest on a tie.
 
     Args:
         mission: ``MISSION`` record.
         uavs: (I,) ``UAV`` records.
         i: Index of the UAV.
         chart: ``Chart``.
-        taken: (zone cells,) working memory.
+        memory: ``parking_memory``.
 
     Returns:
-        The x and y of the cell and how many cells away it is; the UAV's own cell if all are taken.
+        The x and y of the cell, how many cells away it is, and the slots for which the UAV must
+        expect to wait there for a pad; the UAV's own cell if all are taken.
     """
-    u = uavs[i]
+    u, taken = uavs[i], memory.taken
     taken[:] = False
+    memory.free[:] = 0
     for j in range(mission.uavs):
         o = uavs[j]
         if j != i and o.active and o.zone >= 0:
             taken[chart.nearest[o.y, o.x]] = True
+            if o.pad_request >= 0:
+                _take_pad(mission, o, o.zone, 0, memory.free)
     last_battery, last = -1, -1
     while True:
         # the next UAV to choose
@@ -156,40 +177,49 @@ def parking_cell(mission, uavs, i, chart, taken):
                 continue
             if chooser < 0 or o.battery < uavs[chooser].battery:
                 chooser = j
-        last_battery, last = uavs[chooser].battery, chooser
-        if chooser != i and is_parked(uavs[chooser]):
+        o = uavs[chooser]
+        last_battery, last = o.battery, chooser
+        if chooser != i and is_parked(o):
             continue
-        cell, slots = _nearest_free(mission, uavs, chooser, chart, taken)
+        cell, slots = _soonest_free(mission, uavs, chooser, chart, memory)
+        if chooser == i and cell < 0:
+            return u.x, u.y, 0, 0
+        if cell < 0:
+            continue
+        x, y = chart.parking[cell, 0], chart.parking[cell, 1]
+        zone = np.int64(chart.zones[y, x])
         if chooser == i:
-            if cell < 0:
-                return u.x, u.y, 0
-            return chart.parking[cell, 0], chart.parking[cell, 1], slots
-        if cell >= 0:
-            taken[cell] = True
+            return x, y, slots, waiting_time(mission, u, zone, slots, memory.free)
+        taken[cell] = True
+        if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
+            _take_pad(mission, o, zone, slots, memory.free)
 
 
 @inlined
-def _nearest_free(mission, uavs, i, chart, taken):
-    """The number of the nearest parking cell that is not taken (-1 if none), and the way to it."""
+def _soonest_free(mission, uavs, i, chart, memory):
+    """The number of the best parking cell that is not taken (-1 if none), and the way to it."""
     u = uavs[i]
     # The nearest cell of all is free most of the time, so this one is tried first.
     cell = np.int64(chart.nearest[u.y, u.x])
     x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-    slots = distance(chart, u.x, u.y, x, y)
-    free = (slots == 0 or not taken[cell]) and not _is_given_up(mission, chart.zones[y, x])
+    zone, slots = np.int64(chart.zones[y, x]), distance(chart, u.x, u.y, x, y)
+    free = (slots == 0 or not memory.taken[cell]) and not _is_given_up(mission, zone)
+    free = free and (mission.zones == 1 or not waiting_time(mission, u, zone, slots, memory.free))
     if free and path_length(mission, uavs, i, chart, u.x, u.y, x, y) == slots:
         return cell, slots
-    best, least = -1, -1
+    best, way, least = -1, -1, -1
     for cell in range(len(chart.parking)):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
-        if taken[cell] and not (u.x == x and u.y == y):
+        zone = np.int64(chart.zones[y, x])
+        if memory.taken[cell] and not (u.x == x and u.y == y):
             continue
-        if _is_given_up(mission, chart.zones[y, x]):
+        if _is_given_up(mission, zone):
             continue
         slots = path_length(mission, uavs, i, chart, u.x, u.y, x, y)
-        if best < 0 or slots < least:
-            best, least = cell, slots
-    return best, least
+        until = slots * u.slots_per_cell + waiting_time(mission, u, zone, slots, memory.free)
+        if best < 0 or until < least or (until == least and slots < way):
+            best, way, least = cell, slots, until
+    return best, way
 
 
 @extension
@@ -200,51 +230,67 @@ def _is_given_up(mission, zone):
 
 
 @inlined
+def waiting_time(mission, u, zone, cells, free):
+    """The slots for which a UAV must expect to wait for a pad of a zone so many cells away.
+
+    It asks for one on its arrival, if its battery is not above C_S then. To wait for more than C_S
+    is of no use.
+
+    Args:
+        mission: ``MISSION`` record.
+        u: ``UAV`` record.
+        zone: The number of the zone.
+        cells: Cells on the way to it.
+        free: As in ``Parking``.
+    """
+    few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
+    if u.pad_request >= 0 or not (mission.pad_rate > 0.0 or few):
+        return 0
+    pad = _first_pad(mission, zone, free)
+    until = free[zone, pad] if pad >= 0 else mission.max_slots
+    return min(max(until - _until_asked(mission, u, cells), 0), mission.charge_start - 1)
+
+
+@inlined
+def _first_pad(mission, zone, free):
+    """The pad of a zone that will be free first, or -1 if none works."""
+    first = -1
+    for pad in range(min(working_pads(mission, zone), mission.uavs)):
+        if first < 0 or free[zone, pad] < free[zone, first]:
+            first = pad
+    return first
+
+
+@inlined
+def _until_asked(mission, u, cells):
+    """The slots until a UAV may ask for a pad at a parking cell that is so many cells away."""
+    spare = u.battery - mission.charge_start
+    return max(cells * u.slots_per_cell, spare // max(mission.flight_cost, 1))
+
+
+@inlined
+def _take_pad(mission, u, zone, cells, free):
+    """Let a UAV use the pad of a zone that is free first, from its arrival until it is charged."""
+    pad = _first_pad(mission, zone, free)
+    if pad < 0:
+        return
+    asked = 0 if u.pad_request >= 0 else _until_asked(mission, u, cells)
+    begin = max(free[zone, pad], asked)
+    flying = 0 if u.charging else begin
+    lacking = mission.charge_complete - max(u.battery - flying * mission.flight_cost, 0)
+    rate = mission.charge_rate
+    if mission.power > 0:
+        rate = max(min(rate, mission.power // working_pads(mission, zone)), 1)
+    free[zone, pad] = begin + (lacking + rate - 1) // rate
+
+
+@inlined
 def margin(mission, u):
     """The margin [%] on the way of UAV ``u`` to the zone for detours around teammates.
 
     A detour goes forth and back, so the wind costs the most in one direction only.
     """
     return (mission.active - 1) * (MARGIN_PER_TEAMMATE * u.slots_per_cell + mission.wind_most)
-
-
-@inlined
-def waiting_time(mission, uavs, i, chart, home_x, home_y):
-    """The slots for which UAV ``i`` must expect to wait for a pad at its parking cell.
-
-    Before it, pads are given to the teammates there that have asked, and to those in the air that
-    must charge, are nearest to this zone and have less battery (on a tie, a lower index). If they
-    take all pads that work, it waits until they are charged. More than C_S is of no use, since a
-    UAV may ask for a pad only at or below C_S.
-
-    Args:
-        mission: ``MISSION`` record.
-        uavs: (I,) ``UAV`` records.
-        i: Index of the UAV.
-        chart: ``Chart``.
-        home_x, home_y: Its parking cell.
-    """
-    u = uavs[i]
-    zone = zone_near(chart, home_x, home_y)
-    few = mission.plans_waits and mission.uavs > mission.zone_pads[zone]
-    if u.pad_request >= 0 or not (mission.pad_rate > 0.0 or few):
-        return 0
-    ahead = lacking = 0
-    for j in range(mission.uavs):
-        o = uavs[j]
-        has_asked = o.active and o.pad_request >= 0
-        is_lower = o.battery < u.battery or (o.battery == u.battery and j < i)
-        must = flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o)
-        if j != i and zone_near(chart, o.x, o.y) == zone and (has_asked or (must and is_lower)):
-            ahead += 1
-            lacking += mission.charge_complete - min(o.battery, mission.charge_start)
-    pads = working_pads(mission, zone)
-    if ahead < pads:
-        return 0
-    power = max(pads, 1) * mission.charge_rate
-    if mission.power > 0:
-        power = min(power, mission.power)
-    return min((lacking + power - 1) // power, mission.charge_start - 1)
 
 
 @inlined
@@ -337,7 +383,7 @@ def contest(mission, uavs, i, x, y):
 
 
 @inlined
-def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
+def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     """Find the safe actions: those after which UAV ``i`` can still reach its parking cell in time.
 
     If there is no such action, the actions that lead nearest to the parking cell are safe, except
@@ -353,7 +399,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
         i: Index of the UAV.
         chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
-        home_x, home_y: Its parking cell.
+        home_x, home_y, wait: Its parking cell and the wait there, as of ``parking_cell``.
         reach: The table of ``reach_of``.
 
     Returns:
@@ -361,9 +407,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, reach):
     """
     u = uavs[i]
     spare = margin(mission, u)
-    reserve = 0
-    if charge:
-        reserve = spare + waiting_time(mission, uavs, i, chart, home_x, home_y)
+    reserve = spare + wait if charge else 0
     # Sets of actions, a bit for each: those that no teammate with the right of way contests, those
     # that lead nearest to the parking cell, and those that are not later than the margin allows.
     clear = nearest = in_time = 0
@@ -415,15 +459,15 @@ def _needed(mission, uavs, i, chart, action, x, y, home_x, home_y, reach):
 @kernel
 def _mask(missions, uavs, residual, rows_mission, rows_uav, chart, reach):
     masks = np.zeros((len(rows_mission), 5), np.bool_)
-    taken = np.empty(len(chart.parking), np.bool_)
+    memory = parking_memory(chart, uavs.shape[1])
     for row in range(len(rows_mission)):
         b, i = rows_mission[row], rows_uav[row]
         mission, team = missions[b], uavs[b]
         charge = must_charge(mission, team[i], data_left(mission, residual[b]))
-        home_x, home_y = 0, 0
+        home_x = home_y = wait = 0
         if charge:
-            home_x, home_y, _ = parking_cell(mission, team, i, chart, taken)
-        safe = safe_moves(mission, team, i, chart, charge, home_x, home_y, reach)
+            home_x, home_y, _, wait = parking_cell(mission, team, i, chart, memory)
+        safe = safe_moves(mission, team, i, chart, charge, home_x, home_y, wait, reach)
         for action in range(5):
             masks[row, action] = safe >> action & 1
     return masks

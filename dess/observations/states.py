@@ -117,7 +117,7 @@ def compact_states(state: State, chart: Chart, guarded: bool) -> CompactStates:
 
 @kernel
 def _fill(missions, uavs, residual, guarded, chart, reach, out):
-    taken = np.empty(len(chart.parking), np.bool_)
+    memory = guard.parking_memory(chart, uavs.shape[1])
     for b in range(len(missions)):
         mission, team = missions[b], uavs[b]
         out.missions[b, CHARGE_START] = mission.charge_start
@@ -133,14 +133,14 @@ def _fill(missions, uavs, residual, guarded, chart, reach, out):
             if not u.active:
                 continue
             row[MUST_CHARGE] = guard.must_charge(mission, u, data)
-            home_x, home_y, slots = guard.parking_cell(mission, team, i, chart, taken)
+            home_x, home_y, slots, wait = guard.parking_cell(mission, team, i, chart, memory)
             home = guard.battery_home(mission, u, chart, home_x, home_y, slots, reach)
             row[HOME] = min(home, _MOST)
             if may_act(u):
                 if guarded:
                     charge = row[MUST_CHARGE] != 0
                     row[MASK] = guard.safe_moves(
-                        mission, team, i, chart, charge, home_x, home_y, reach
+                        mission, team, i, chart, charge, home_x, home_y, wait, reach
                     )
                 else:
                     row[MASK] = legal_moves(chart, u)

@@ -130,48 +130,65 @@ def _turned(turn: Turn, team: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
-    """How far away the cells are where UAV ``i`` may charge, and whether the choice was clear.
+    """How far away the cell is where UAV ``i`` may charge, and whether the choice was clear.
 
-    In plain Python: the UAVs choose one after the other, the lowest battery first. Parked teammates
-    are islands, where the way around them is not longer than to wait for a charge. Without other
-    islands, they take two cells more on a way that is in line.
+    In plain Python: the UAVs choose one after the other, the lowest battery first, where they get a
+    pad first. Parked teammates are islands, where the way around them is not longer than to wait
+    for a charge.
     """
     team, space = [u for u in sea.state.uavs[0] if u["active"]], sea.space
     me, clear, mission = sea.state.uavs[0][i], True, sea.state.missions[0]
-    wait = math.ceil(
-        (mission["charge_complete"] - mission["charge_start"]) / mission["charge_rate"]
-    )
-    cells = [(x + a, y + b) for x, y, w, h in space.rectangles for b in range(h) for a in range(w)]
+    start, complete, rate = (mission[f"charge_{name}"] for name in ("start", "complete", "rate"))
+    zones = {
+        (x + a, y + b): zone
+        for zone, (x, y, w, h) in enumerate(space.rectangles)
+        for b in range(h)
+        for a in range(w)
+    }
+    free = [[0] * min(mission["zone_pads"][zone], len(team)) for zone in range(mission["zones"])]
     places = [(int(u["x"]), int(u["y"])) for u in team]
     parked = [p for p, u in zip(places, team, strict=True) if u["latch"] and u["zone"] >= 0]
     taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0 and u is not me}
     own = int(me["x"]), int(me["y"])
     taken.discard(own)
     for u in sorted(team, key=lambda u: u["battery"]):
-        place = int(u["x"]), int(u["y"])
+        place, cost = (int(u["x"]), int(u["y"])), mission["flight_cost"]
         if place in parked and place != own:
             continue
-        ways = {}
-        for cell in cells:
+        options = []
+        for cell, zone in zones.items():
             if cell in taken and cell != place:
                 continue
-            mates = {p for p in parked if p != place and p != cell}
+            mates = {p for p in parked if p not in (place, cell)}
             islands = {*space.no_fly}
-            length = reached(place, *space.size, islands)[cell]
-            if islands:
-                around = reached(place, *space.size, islands | mates)
-                ways[cell] = min(around.get(cell, math.inf), length + wait)
-            else:
-                corners = map(min, place, cell), map(max, place, cell)
-                (left, top), (right, bottom) = corners
-                line = {*product(range(left, right + 1), range(top, bottom + 1))}
-                ways[cell] = length + 2 * bool((left == right or top == bottom) and line & mates)
-        lengths = sorted(ways.values())
-        clear &= len(lengths) < 2 or lengths[0] < lengths[1]
+            around = reached(place, *space.size, islands | mates).get(cell, math.inf)
+            through = reached(place, *space.size, islands)[cell]
+            on_the_way = [
+                p
+                for p in mates
+                if reached(place, *space.size, islands)[p] + reached(p, *space.size, islands)[cell]
+                == through
+            ]
+            way = around
+            if islands or len(on_the_way) > 1:
+                way = min(around, through + math.ceil((complete - start) / rate))
+            asked = max(way * u["slots_per_cell"], (u["battery"] - start) // cost)
+            wait = min(max(min(free[zone]) - asked, 0), start - 1)
+            wait *= mission["uavs"] > mission["zone_pads"][zone]
+            options.append((way * u["slots_per_cell"] + wait, way, zone, asked, cell))
+        options.sort()
+        clear &= len(options) < 2 or options[0][:2] < options[1][:2]
         if place == own:
-            return lengths[:1], clear
-        if ways:
-            taken.add(min(ways, key=lambda cell: ways[cell]))
+            return [way for _, way, *_ in options[:1]], clear
+        if options:
+            _, _, zone, asked, cell = options[0]
+            taken.add(cell)
+            needed = math.ceil((u["quota"] - u["communications"]) / mission["communication_slots"])
+            if u["battery"] < cost * needed:
+                pad = int(np.argmin(free[zone]))
+                begin = max(free[zone][pad], asked)
+                lacking = complete - max(u["battery"] - begin * cost, 0)
+                free[zone][pad] = begin + math.ceil(lacking / rate)
     raise AssertionError("an active UAV chooses")
 
 

@@ -118,15 +118,16 @@ HERE, THERE = {"x": 20, "y": 4}, {"x": 20, "y": 8, "latch": True}
         ([HERE, THERE], NEAR, (26, 4, 6)),  # it is full
         ([HERE | {"battery": 70}, {"x": 20, "y": 10}], NEAR, (26, 4, 6)),  # less battery first
         ([HERE], NEAR | PADS_FAIL, (26, 4, 6)),  # its pad is out of order for good
-        ([HERE], NEAR | {"failures": {"pad_rate": 0.1, "pad_repair": 9.0}}, (20, 8, 4)),
+        # It will be repaired, but a pad works two cells farther.
+        ([HERE], NEAR | {"failures": {"pad_rate": 0.1, "pad_repair": 9.0}}, (26, 4, 6)),
     ],
 )
-def test_a_uav_charges_at_the_nearest_cell_that_is_free(
+def test_a_uav_charges_at_the_cell_where_it_can_soonest(
     uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
 ) -> None:
     state, chart = placed(uavs, **scenario)
     state.missions["pads_out"][0, 16] = 1  # the first pad of the second zone
-    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart) == home
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
 
 
 def test_the_battery_to_a_zone_farther_than_the_nearest_is_that_of_the_way_there() -> None:
@@ -157,7 +158,7 @@ def test_parked_teammates_are_islands(
     uavs: list[dict[str, Any]], scenario: dict[str, Any], home: tuple[int, ...]
 ) -> None:
     state, chart = placed(uavs, **scenario, charge_complete=80)
-    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart) == home
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[:3] == home
 
 
 ISLANDS = """
@@ -209,7 +210,7 @@ def test_hardly_any_guarded_uav_runs_dry_among_islands_and_no_lone_one_does(pict
 
 # --- pads ---
 
-# One UAV far off, and two in the zone; C_S 30, C_C 80, 10 % per slot.
+# C_S 30, C_C 80, 10 % per slot. UAV 0 is two cells from the zone and asks for a pad in two slots.
 QUEUE: dict[str, Any] = {"charge_start": 30, "charge_complete": 80, "pads": 1}
 OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
 
@@ -217,30 +218,42 @@ OFF: dict[str, Any] = {"charging": {"plan_waits": False}}
 @pytest.mark.parametrize(
     ("batteries", "asked", "scenario", "slots"),
     [
-        ([60, 30, 60], [1], OFF, 0),
-        ([60, 30, 60], [1], OFF | {"failures": {"pad_rate": 0.1}}, 5),
-        ([60, 30, 60], [1], {"charging": {"measured": True}}, 5),
-        ([60, 30, 60], [1], {}, 5),  # 50 % at 10 % per slot
-        ([60, 70, 70], [], {}, 0),  # it comes first
-        ([60, 20, 50], [1], {}, 11),  # 60 % and, of the one in the air at C_S, 50 %
-        ([60, 20, 60], [1], {}, 6),  # on a tie the lower index, its own, comes first
-        ([60, 20, 20], [1, 2], {"pads": 2}, 6),  # 120 % at 20 % per slot
-        ([60, 20, 20], [1], {"pads": 3}, 0),
-        ([60, 20, 20], [1, 2], {"charging": {"power": 5}}, 24),
-        ([60, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
+        ([32, 30, 32], [1], OFF, 0),
+        ([32, 30, 32], [1], OFF | {"failures": {"pad_rate": 0.1}}, 3),
+        ([32, 30, 32], [1], {"charging": {"measured": True}}, 3),
+        ([32, 30, 32], [1], {}, 3),  # 50 % in 5 slots
+        ([50, 30, 50], [1], {}, 0),  # it may ask in 20 slots
+        ([32, 70, 70], [], {}, 0),  # it comes first
+        # 60 % in 6 slots, then another 6 as 31 - 6 % are left; its own cell is 3 slots away
+        ([32, 20, 31], [1], {}, 9),
+        ([32, 20, 32], [1], {}, 4),  # on a tie the lower index, its own, comes first
+        ([32, 20, 10], [1, 2], {"pads": 2}, 4),
+        ([32, 20, 20], [1], {"pads": 3}, 0),
+        ([32, 20, 20], [1, 2], {"charging": {"power": 5}}, 25),  # 12 slots, and 15 for 72 %
+        ([32, 20, 20], [1, 2], {"charging": {"power": 1}}, 29),  # C_S - 1 at most
         ([20, 20, 20], [0, 1], {}, 0),  # it has asked
-        ([60, 50, 50], [], {"quota": 40}, 0),  # they need not charge
-        ([60, 30, 60], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 0),  # all are at another zone
+        ([32, 31, 31], [], {"quota": 40}, 0),  # they need not charge
+        ([32, 30, 32], [1], {"zones": [{"cells": [0, 0, 9, 9]}]}, 3),  # too far off
+        ([32, 30, 32], [1], {"zones": [{"cells": [24, 8, 1, 1]}]}, 0),  # 4 slots, not 2 + 3
     ],
 )
 def test_the_time_that_a_uav_expects_to_wait(
     batteries: list[int], asked: list[int], scenario: dict[str, Any], slots: int
 ) -> None:
-    uavs = [{"battery": b, "pad_request": -1, "communications": 0, "x": 0} for b in batteries]
+    uavs = [
+        {"battery": b, "pad_request": -1, "communications": 0, "x": 24, "y": 4} for b in batteries
+    ]
     for i in asked:
-        uavs[i]["pad_request"] = 0
+        uavs[i] |= {"pad_request": 0, "x": 26 + i, "y": 2, "latch": True}
     state, chart = placed(uavs, **QUEUE | scenario)
-    assert compiled.waiting_time(state.missions[0], state.uavs[0], 0, chart, 26, 2) == slots
+    assert compiled.parking_cell(state.missions[0], state.uavs[0], 0, chart)[3] == slots
+
+
+def test_two_parked_teammates_side_by_side_are_flown_around() -> None:
+    """Without no-fly cells, too, they close all shortest ways to the cells behind them."""
+    side_by_side = [{"x": x, "y": 5, "latch": True} for x in (26, 27)]
+    state, chart = placed([{"x": 27, "y": 6}, *side_by_side])
+    assert compiled.path(state.missions[0], state.uavs[0], 0, chart, 26, 4) == 5
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
