@@ -189,7 +189,9 @@ def parking_cell(mission, uavs, i, chart, memory):
         x, y = chart.parking[cell, 0], chart.parking[cell, 1]
         zone = np.int64(chart.zones[y, x])
         if chooser == i:
-            return x, y, slots, waiting_time(mission, u, zone, slots, memory.free)
+            # To wait for more than C_S is of no use, as a UAV may ask only at or below C_S.
+            wait = waiting_time(mission, u, zone, slots, memory.free)
+            return x, y, slots, min(wait, mission.charge_start - 1)
         taken[cell] = True
         if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
             _take_pad(mission, o, zone, slots, memory.free)
@@ -233,8 +235,7 @@ def _is_given_up(mission, zone):
 def waiting_time(mission, u, zone, cells, free):
     """The slots for which a UAV must expect to wait for a pad of a zone so many cells away.
 
-    It asks for one on its arrival, if its battery is not above C_S then. To wait for more than C_S
-    is of no use.
+    It asks for one on its arrival, if its battery is not above C_S then.
 
     Args:
         mission: ``MISSION`` record.
@@ -248,7 +249,7 @@ def waiting_time(mission, u, zone, cells, free):
         return 0
     pad = _first_pad(mission, zone, free)
     until = free[zone, pad] if pad >= 0 else mission.max_slots
-    return min(max(until - _until_asked(mission, u, cells), 0), mission.charge_start - 1)
+    return max(until - _until_asked(mission, u, cells), 0)
 
 
 @inlined
@@ -399,7 +400,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         i: Index of the UAV.
         chart: ``Chart``.
         charge: Whether the UAV must charge; if not, every legal action is safe.
-        home_x, home_y, wait: Its parking cell and the wait there, as of ``parking_cell``.
+        home_x, home_y, wait: The result of ``parking_cell``, without the way.
         reach: The table of ``reach_of``.
 
     Returns:
@@ -414,7 +415,9 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
     least = 1_000_000  # battery [%] that lacks on the way to the parking cell
     for action in range(5):
         x, y = u.x + STEP_X[action], u.y + STEP_Y[action]
-        contested = contest(mission, uavs, i, x, y)
+        # Teammates fly around a parked UAV, so it need not leave its cell for any.
+        stays = action == HOVER and is_parked(u)
+        contested = 0 if stays else contest(mission, uavs, i, x, y)
         if not is_open(chart, x, y) or contested == 3:
             continue
         late = 0

@@ -173,7 +173,7 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
             if islands or len(on_the_way) > 1:
                 way = min(around, through + math.ceil((complete - start) / rate))
             asked = max(way * u["slots_per_cell"], (u["battery"] - start) // cost)
-            wait = min(max(min(free[zone]) - asked, 0), start - 1)
+            wait = max(min(free[zone]) - asked, 0)
             wait *= mission["uavs"] > mission["zone_pads"][zone]
             options.append((way * u["slots_per_cell"] + wait, way, zone, asked, cell))
         options.sort()

@@ -12,7 +12,7 @@ from dess import streams
 from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.observations.guard import guard
-from dess.observations.states import HOME, compact_states
+from dess.observations.states import HOME, compact_states, masks
 from dess.scenario import ScenarioSpace
 from dess.state import BATTERY, HOVER
 from dess.view import View
@@ -254,6 +254,13 @@ def test_two_parked_teammates_side_by_side_are_flown_around() -> None:
     side_by_side = [{"x": x, "y": 5, "latch": True} for x in (26, 27)]
     state, chart = placed([{"x": 27, "y": 6}, *side_by_side])
     assert compiled.path(state.missions[0], state.uavs[0], 0, chart, 26, 4) == 5
+
+
+def test_a_uav_stays_in_its_parking_cell_whoever_is_near() -> None:
+    """Its teammate has the right of way, but flies around it: both must not move on and on."""
+    state, chart = placed([{"x": 27, "y": 6}, {"x": 27, "y": 5, "latch": True}])
+    state.uavs["battery"] = 5
+    assert masks(compact_states(state, chart, True), np.array([0]), np.array([1]))[0, HOVER]
 
 
 def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
