@@ -3,6 +3,7 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 
 from analysis.bound import upper_bound
@@ -158,24 +159,25 @@ def check_effort(
 
 
 def _check_policies(study: Study) -> None:
-    """Check that every policy can act on every layout of the design (zones, no-fly cells, nodes).
+    """Check that every policy can act on every layout of the design, in the first mission slot.
+
+    A layout is the zones, no-fly cells and nodes.
 
     Errors other than ``InputError`` are ignored here, because the run records them as failures.
     """
     spaces = (point.scenario for point in study.points)
-    places = [
-        *{
-            (space.size, space.rectangles, space.no_fly, space.nodes): space for space in spaces
-        }.values()
-    ]
-    for policy in study.policies:
-        try:
-            team = load_team(policy, max(space.uavs[1] for space in places))
-            simulate_missions(study.engine, places, team, study.seed, range(len(places)))
-        except InputError:
-            raise
-        except Exception:  # the run will record it as a failure
-            continue
+    places = {(space.size, space.rectangles, space.no_fly, space.nodes): space for space in spaces}
+    loaded = cache(partial(load_team, uavs=max(space.uavs[1] for space in places.values())))
+    for number, space in enumerate(places.values()):
+        first_slot = space.model_copy(update={"max_slots": 1})
+        for policy in study.policies:
+            try:
+                team = loaded(policy)
+                simulate_missions(study.engine, [first_slot], team, study.seed, [number])
+            except InputError:
+                raise
+            except Exception:  # the run will record it as a failure
+                continue
 
 
 def _counted(study: Study, store: Store) -> list[Planned]:
