@@ -155,6 +155,7 @@ def parking_cell(mission, uavs, i, chart, memory):
         expect to wait there for a pad; the UAV's own cell if all are taken.
     """
     u, taken = uavs[i], memory.taken
+    own_request = _until_asked(mission, u, distance_home(chart, u.x, u.y))
     taken[:] = False
     memory.free[:] = 0
     for j in range(mission.uavs):
@@ -194,7 +195,10 @@ def parking_cell(mission, uavs, i, chart, memory):
             return x, y, slots, min(wait, mission.charge_start - 1)
         taken[cell] = True
         if flies(o) and o.battery < mission.flight_cost * slots_needed(mission, o):
-            _take_pad(mission, o, zone, slots, memory.free)
+            # It may stay away for some time and come just before this UAV.
+            latest = min(own_request, o.battery // max(mission.flight_cost, 1) - 1)
+            asked = max(_until_asked(mission, o, slots), latest)
+            _take_pad(mission, o, zone, asked, memory.free)
 
 
 @inlined
@@ -270,12 +274,11 @@ def _until_asked(mission, u, cells):
 
 
 @inlined
-def _take_pad(mission, u, zone, cells, free):
-    """Let a UAV use the pad of a zone that is free first, from its arrival until it is charged."""
+def _take_pad(mission, u, zone, asked, free):
+    """Let a UAV that asks for a pad in so many slots use the one that is free first."""
     pad = _first_pad(mission, zone, free)
     if pad < 0:
         return
-    asked = 0 if u.pad_request >= 0 else _until_asked(mission, u, cells)
     begin = max(free[zone, pad], asked)
     flying = 0 if u.charging else begin
     lacking = mission.charge_complete - max(u.battery - flying * mission.flight_cost, 0)
@@ -431,7 +434,7 @@ def safe_moves(mission, uavs, i, chart, charge, home_x, home_y, wait, reach):
         bit = 1 << action
         if contested < 2:
             clear |= bit
-        if late <= spare:
+        if late <= reserve:
             in_time |= bit
         if late < least:
             least, nearest = late, 0

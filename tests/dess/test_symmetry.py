@@ -151,6 +151,8 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
     taken = {p for p, u in zip(places, team, strict=True) if u["zone"] >= 0 and u is not me}
     own = int(me["x"]), int(me["y"])
     taken.discard(own)
+    home = min(reached(own, *space.size, {*space.no_fly})[cell] for cell in zones)
+    request = _until_asked(me, home, mission)
     for u in sorted(team, key=lambda u: u["battery"]):
         place, cost = (int(u["x"]), int(u["y"])), mission["flight_cost"]
         if place in parked and place != own:
@@ -172,7 +174,7 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
             way = around
             if islands or len(on_the_way) > 1:
                 way = min(around, through + math.ceil((complete - start) / rate))
-            asked = max(way * u["slots_per_cell"], (u["battery"] - start) // cost)
+            asked = _until_asked(u, way, mission)
             wait = max(min(free[zone]) - asked, 0)
             wait *= mission["uavs"] > mission["zone_pads"][zone]
             options.append((way * u["slots_per_cell"] + wait, way, zone, asked, cell))
@@ -185,11 +187,18 @@ def _homes(sea: Sea, i: int) -> tuple[list[int], bool]:
             taken.add(cell)
             needed = math.ceil((u["quota"] - u["communications"]) / mission["communication_slots"])
             if u["battery"] < cost * needed:
+                asked = max(asked, min(request, u["battery"] // cost - 1))
                 pad = int(np.argmin(free[zone]))
                 begin = max(free[zone][pad], asked)
                 lacking = complete - max(u["battery"] - begin * cost, 0)
                 free[zone][pad] = begin + math.ceil(lacking / rate)
     raise AssertionError("an active UAV chooses")
+
+
+def _until_asked(u: np.void, way: float, mission: np.void) -> float:
+    """The slots until a UAV may ask for a pad so many cells away."""
+    spare = (u["battery"] - mission["charge_start"]) // mission["flight_cost"]
+    return max(way * u["slots_per_cell"], spare)
 
 
 def _are_near_one_zone(sea: Sea) -> bool:

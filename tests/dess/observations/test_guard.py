@@ -13,7 +13,7 @@ from dess.batch import simulate_batch
 from dess.mission import simulate
 from dess.observations.guard import guard
 from dess.observations.states import HOME, compact_states, masks
-from dess.scenario import ScenarioSpace
+from dess.scenario import ScenarioSpace, load_scenario
 from dess.state import BATTERY, HOVER
 from dess.view import View
 from tests import compiled
@@ -271,3 +271,12 @@ def test_where_no_pad_will_ever_work_no_uav_must_charge() -> None:
     assert not compiled.must_charge(mission, u, 1e6)
     mission["pad_repair"] = 0.5
     assert compiled.must_charge(mission, u, 1e6)
+
+
+@pytest.mark.parametrize(("uavs", "pads"), [(2, 1), (4, 2)])
+def test_with_a_pad_for_two_uavs_the_second_comes_early_enough_to_wait(
+    uavs: int, pads: int
+) -> None:
+    space = load_scenario("paper", uavs=uavs, pads=pads)
+    missions = simulate_batch(space, policies.load("greedy"), 777301, 200).missions
+    assert missions["success"].mean() >= 0.99
