@@ -25,7 +25,7 @@ from tests import drawn
 CASES: list[dict[str, Any]] = [
     {},
     {"pads": 1, "zone": [26, 2, 4, 1]},
-    {"uavs": 3, "pads": 1, "communication_slots": 3, "quota": 700, "max_slots": 200},
+    {"uavs": 4, "pads": 1, "communication_slots": 3, "quota": 700, "max_slots": 200},
 ]
 
 
